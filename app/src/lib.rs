@@ -1,0 +1,1 @@
+//! The palpate workbench: window and command line.

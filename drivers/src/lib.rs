@@ -1,0 +1,1 @@
+//! Motion controllers and load cells, real and simulated.

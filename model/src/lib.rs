@@ -1,0 +1,1 @@
+//! Vocabulary and mathematics of soft-tissue indentation, without I/O.

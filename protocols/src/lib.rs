@@ -1,0 +1,1 @@
+//! The engine, its plans, the runner and replay.
