@@ -1,1 +1,9 @@
 //! Motion controllers and load cells, real and simulated.
+//!
+//! This crate turns commands into bytes and bytes into readings. It never decides: what to do
+//! with a reading is the engine's business, and nothing here starts a move by itself.
+//! Start reading at [`rig`], the trait every rig implements.
+
+pub mod rig;
+
+pub use rig::{Rig, RigError, RigEvent, RigEventBody};

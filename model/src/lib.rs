@@ -1,1 +1,20 @@
-//! Vocabulary and mathematics of soft-tissue indentation, without I/O.
+//! Vocabulary and mathematics of soft-tissue indentation.
+//!
+//! This crate knows units, the words in which a rig is commanded and observed,
+//! the load-cell calibration, the viscoelastic force models and their fit.
+//! It never reads a file, a port or a clock, starts no thread and draws nothing:
+//! every result is a function of its arguments.
+//!
+//! Start reading at [`units`], then [`rig`] for the words every crate shares,
+//! [`viscoelastic`] for the force model and [`fit`] for its identification.
+
+pub mod calibration;
+pub mod fit;
+pub mod rig;
+pub mod signal;
+pub mod time;
+pub mod units;
+pub mod viscoelastic;
+
+pub use time::Nanos;
+pub use units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};

@@ -1,0 +1,56 @@
+//! The trait every rig implements, simulated or real: commands in, events out.
+
+use palpate_model::Nanos;
+use palpate_model::rig::{Ack, Fault, Reading, RigCommand, RigDescription};
+use thiserror::Error;
+
+/// Something a rig reported, with the time it reached the host.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RigEvent {
+    /// Arrival on the host's clock.
+    pub at: Nanos,
+    /// What arrived.
+    pub body: RigEventBody,
+}
+
+/// What a rig can report.
+#[derive(Clone, Debug, PartialEq)]
+pub enum RigEventBody {
+    /// One sample.
+    Reading(Reading),
+    /// A command was accepted.
+    Ack(Ack),
+    /// Something went wrong.
+    Fault(Fault),
+}
+
+/// A rig could not be opened.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RigError {
+    /// The name does not stand for a rig.
+    #[error("no rig is called '{name}'; use 'sim', or 'sim:NAME' for a shared simulated rig")]
+    Unknown {
+        /// The name given.
+        name: String,
+    },
+}
+
+/// A connected rig.
+///
+/// Time is the caller's: `next_event` never returns an event later than `until`, and a command
+/// takes effect at the time of the newest event returned. A rig on real wires blocks in
+/// `next_event` until something arrives or `until` has come; the simulated rig computes.
+pub trait Rig: Send {
+    /// What the rig is, as read from it when it was connected.
+    fn description(&self) -> &RigDescription;
+
+    /// Hands one command to the rig. Refusals arrive as [`Fault::CommandRefused`].
+    fn send(&mut self, command: RigCommand);
+
+    /// The next event at or before `until`, if there is one.
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent>;
+
+    /// Whether time is simulated, so that the caller may run it at any pace.
+    fn is_virtual(&self) -> bool;
+}

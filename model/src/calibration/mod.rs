@@ -1,0 +1,1 @@
+//! Load-cell calibration: weights to volts and back.

@@ -1,0 +1,54 @@
+//! What a rig can be told. Only the runner sends these, and only because the engine asked.
+
+use crate::units::{MmPerS, MmPerS2, Position};
+use serde::{Deserialize, Serialize};
+
+/// A move to an absolute pulse position on a trapezoidal profile.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MoveTo {
+    /// Target in pulses of the controller's own counter.
+    pub target_pulses: i64,
+    /// Cruise speed; a rig only makes whole multiples of its speed quantum.
+    pub speed: MmPerS,
+    /// Acceleration and deceleration.
+    pub acceleration: MmPerS2,
+}
+
+/// One command to a rig.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "command", rename_all = "snake_case")]
+pub enum RigCommand {
+    /// Energise the motor and hold position (Galil `SH`).
+    EnableMotor,
+    /// Move to an absolute position (Galil `PA`, `SP`, `AC`, `BG`).
+    MoveTo(MoveTo),
+    /// Decelerate to rest and hold (Galil `ST`).
+    Stop,
+    /// Cut the motion at once (Galil `AB`).
+    Halt,
+    /// Give the present position a new count (Galil `DP`).
+    DefinePosition {
+        /// The count the present position gets.
+        pulses: i64,
+    },
+}
+
+impl RigCommand {
+    /// Whether this command takes speed out of the axis; such commands overtake all others.
+    #[must_use]
+    pub fn is_stopping(&self) -> bool {
+        matches!(self, Self::Stop | Self::Halt)
+    }
+}
+
+/// Machine position of a pulse count.
+#[must_use]
+pub fn position_from_pulses(pulses: i64, mm_per_pulse: f64) -> Position {
+    Position(pulses as f64 * mm_per_pulse)
+}
+
+/// The whole pulse nearest to a machine position.
+#[must_use]
+pub fn pulses_from_position(position: Position, mm_per_pulse: f64) -> i64 {
+    (position.0 / mm_per_pulse).round() as i64
+}

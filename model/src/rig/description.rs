@@ -1,0 +1,76 @@
+//! What a rig is: the facts it reports about itself when it is connected.
+
+use crate::units::{MmPerS, MmPerS2, Position, Seconds, Volts};
+use serde::{Deserialize, Serialize};
+
+/// The converter between the load cell and the host.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct AdcDescription {
+    /// Lowest count.
+    pub counts_min: i32,
+    /// Highest count.
+    pub counts_max: i32,
+    /// Volts of one count.
+    pub volts_per_count: f64,
+}
+
+/// A rig's identity and its physical truths.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RigDescription {
+    /// Name as the operator knows it, such as `sim`.
+    pub name: String,
+    /// Model and firmware as the rig reports them.
+    pub identity: String,
+    /// Settings that reproduce a simulated rig exactly (profile, seed, clock); empty on a real one.
+    pub settings: std::collections::BTreeMap<String, String>,
+    /// Travel of one pulse, in mm.
+    pub mm_per_pulse: f64,
+    /// End of the travel; home is position 0.
+    pub travel: Position,
+    /// True length of one controller clock count, in nanoseconds.
+    pub tick_nanos: u64,
+    /// Speeds are whole multiples of this.
+    pub speed_quantum: MmPerS,
+    /// Fastest speed allowed.
+    pub speed_max: MmPerS,
+    /// Acceleration used for every move, as the controller reads it back.
+    pub acceleration: MmPerS2,
+    /// The load cell's converter; `None` where volts arrive without one.
+    pub adc: Option<AdcDescription>,
+    /// White noise of the signal expected at rest (standard deviation).
+    pub noise_expected: Volts,
+}
+
+impl RigDescription {
+    /// Length of one controller clock count.
+    #[must_use]
+    pub fn tick(&self) -> Seconds {
+        Seconds(self.tick_nanos as f64 * 1e-9)
+    }
+
+    /// Checks a speed against range and quantum, and explains a refusal.
+    pub fn check_speed(&self, speed: MmPerS) -> Result<(), String> {
+        let quantum = self.speed_quantum.0;
+        if !speed.is_finite() {
+            return Err("the speed is not a number; give millimetres per second".into());
+        }
+        if speed.0 < quantum * (1.0 - 1e-9) || speed.0 > self.speed_max.0 * (1.0 + 1e-9) {
+            return Err(format!(
+                "a speed of {speed} is outside what rig {} makes; choose from {} to {}",
+                self.name, self.speed_quantum, self.speed_max
+            ));
+        }
+        let multiple = speed.0 / quantum;
+        // 1e-6 of a quantum forgives decimal rounding of the request, nothing more.
+        if (multiple - multiple.round()).abs() > 1e-6 {
+            let below = multiple.floor() * quantum;
+            return Err(format!(
+                "rig {} cannot make {speed}: its speeds are multiples of {}; the nearest are {below:.4} and {:.4} mm/s",
+                self.name,
+                self.speed_quantum,
+                below + quantum
+            ));
+        }
+        Ok(())
+    }
+}

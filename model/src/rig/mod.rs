@@ -1,0 +1,19 @@
+//! The words every crate shares about a rig: what it is, what it is told, what it reports.
+
+pub mod command;
+pub mod description;
+pub mod event;
+pub mod limits;
+pub mod path;
+pub mod phase;
+pub mod profile;
+pub mod reading;
+
+pub use command::{MoveTo, RigCommand};
+pub use description::{AdcDescription, RigDescription};
+pub use event::{Ack, Fault};
+pub use limits::Limits;
+pub use path::{PathError, PathTracker};
+pub use phase::Phase;
+pub use profile::Profile;
+pub use reading::{AxisStatus, Reading};

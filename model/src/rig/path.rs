@@ -1,0 +1,156 @@
+//! Follows the commanded path sample by sample and checks it against the reported pulses.
+//!
+//! Reported pulses are 15-micrometre stairs; the path between them is known, because every
+//! profile is. The tracker starts a profile at the tick at which the axis first reports motion
+//! and refuses the path when it is more than one pulse away from what the controller reports.
+
+use super::command::{MoveTo, position_from_pulses};
+use super::description::RigDescription;
+use super::profile::Profile;
+use super::reading::{AxisStatus, Reading};
+use crate::units::{MmPerS, Position, Seconds};
+use thiserror::Error;
+
+/// The path and the pulses do not agree.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[error(
+    "commanded path at {expected_pulses:.2} pulses but the controller reports {reported_pulses}; steps were lost or the axis was moved by hand, home it again"
+)]
+pub struct PathError {
+    /// Where the commanded profile is, in pulses.
+    pub expected_pulses: f64,
+    /// What the controller reported.
+    pub reported_pulses: i64,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Motion {
+    Rest,
+    Moving {
+        profile: Profile,
+        start_tick: u64,
+        is_stopping: bool,
+    },
+}
+
+/// Commanded position as a function of the samples and commands seen so far.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathTracker {
+    mm_per_pulse: f64,
+    tick: Seconds,
+    position: Option<Position>,
+    velocity: MmPerS,
+    pending: Option<MoveTo>,
+    motion: Motion,
+}
+
+impl PathTracker {
+    /// A tracker that takes its first position from the first sample.
+    #[must_use]
+    pub fn new(rig: &RigDescription) -> Self {
+        Self {
+            mm_per_pulse: rig.mm_per_pulse,
+            tick: rig.tick(),
+            position: None,
+            velocity: MmPerS(0.0),
+            pending: None,
+            motion: Motion::Rest,
+        }
+    }
+
+    /// A move was sent; its profile starts when the axis reports motion.
+    pub fn on_move(&mut self, command: MoveTo) {
+        self.pending = Some(command);
+    }
+
+    /// The present position was given a new count.
+    pub fn on_define(&mut self, pulses: i64) {
+        self.position = Some(position_from_pulses(pulses, self.mm_per_pulse));
+        self.motion = Motion::Rest;
+        self.pending = None;
+    }
+
+    /// Commanded velocity at the newest sample.
+    #[must_use]
+    pub fn velocity(&self) -> MmPerS {
+        self.velocity
+    }
+
+    /// Whether the axis is at rest with no move under way or awaited.
+    #[must_use]
+    pub fn is_at_rest(&self) -> bool {
+        self.pending.is_none() && matches!(self.motion, Motion::Rest)
+    }
+
+    /// Takes one sample and returns the commanded position at its tick.
+    pub fn on_reading(&mut self, reading: &Reading) -> Result<Position, PathError> {
+        let reported = position_from_pulses(reading.pulses, self.mm_per_pulse);
+        let at_rest = self.position.unwrap_or(reported);
+        let is_moving = reading.status.has(AxisStatus::MOVING);
+        if is_moving && matches!(self.motion, Motion::Rest) {
+            if let Some(command) = self.pending.take() {
+                let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
+                self.motion = Motion::Moving {
+                    profile: Profile::to_rest(at_rest, target, command.speed, command.acceleration),
+                    start_tick: reading.tick,
+                    is_stopping: false,
+                };
+            }
+        }
+        let position = match &mut self.motion {
+            Motion::Rest => at_rest,
+            Motion::Moving {
+                profile,
+                start_tick,
+                is_stopping,
+            } => {
+                let mut since = Seconds((reading.tick - *start_tick) as f64 * self.tick.0);
+                if reading.status.has(AxisStatus::STOPPING) && !*is_stopping {
+                    *profile = profile.stopped_at(since);
+                    *start_tick = reading.tick;
+                    *is_stopping = true;
+                    since = Seconds(0.0);
+                }
+                self.velocity = profile.velocity(since);
+                let here = profile.position(since);
+                if is_moving {
+                    here
+                } else {
+                    self.rest_at(here, since, reading)
+                }
+            }
+        };
+        if !is_moving && matches!(self.motion, Motion::Rest) {
+            self.velocity = MmPerS(0.0);
+        }
+        self.position = Some(position);
+        let expected_pulses = position.0 / self.mm_per_pulse;
+        // One pulse, plus rounding of a position of up to 1e5 pulses in double precision.
+        if (expected_pulses - reading.pulses as f64).abs() > 1.0 + 1e-6 {
+            return Err(PathError {
+                expected_pulses,
+                reported_pulses: reading.pulses,
+            });
+        }
+        Ok(position)
+    }
+
+    /// The axis no longer moves: the profile's end, or the whole pulse where it was cut short.
+    fn rest_at(&mut self, here: Position, since: Seconds, reading: &Reading) -> Position {
+        let Motion::Moving {
+            profile,
+            is_stopping,
+            ..
+        } = self.motion
+        else {
+            return here;
+        };
+        self.motion = Motion::Rest;
+        // A stepper rests on a whole pulse: its target, or the pulse at which it was cut short.
+        if !is_stopping && since.0 + self.tick.0 >= profile.duration().0 {
+            profile.end()
+        } else {
+            position_from_pulses(reading.pulses, self.mm_per_pulse)
+        }
+    }
+}
