@@ -10,6 +10,8 @@ pub struct Limits {
     pub travel_max: Position,
     /// Highest force above tare.
     pub force_max: Newtons,
+    /// Lowest force above tare: a cell that reads tension is unplugged or broken.
+    pub force_min: Newtons,
     /// Highest raw signal, independent of any calibration.
     pub volts_max: Volts,
     /// Fastest change of force between two 10-sample means, in N/s.
@@ -25,6 +27,7 @@ impl Limits {
         Self {
             travel_max,
             force_max: Newtons(9.0),
+            force_min: Newtons(-1.0),
             volts_max: Volts(2.80),
             force_rate_max: 50.0,
         }

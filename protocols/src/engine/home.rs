@@ -1,0 +1,94 @@
+//! Homing: find the home switch fast, back off, touch it slowly, call that pulse zero.
+
+use super::context::{Context, Progress};
+use super::input::Record;
+use palpate_model::rig::{AxisStatus, Reading, RigCommand};
+use palpate_model::units::MmPerS;
+
+/// Distance to back off from the switch before the slow touch, in mm: over ten times the braking
+/// distance of the fast search.
+const BACK_OFF_MM: f64 = 2.0;
+
+/// How far past the back-off distance the slow touch may look, in mm.
+const TOUCH_REACH_MM: f64 = 2.0;
+
+#[derive(Clone, Debug, PartialEq)]
+enum Stage {
+    Searching,
+    Braking,
+    BackingOff,
+    Touching,
+    TouchBraking { edge_pulses: i64 },
+    Defining,
+}
+
+/// Data of a homing in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Homing {
+    speed: MmPerS,
+    touch_speed: MmPerS,
+    stage: Stage,
+}
+
+impl Homing {
+    pub fn begin(cx: &mut Context<'_>, speed: MmPerS, touch_speed: MmPerS) -> Result<Self, String> {
+        cx.state.is_homed = false;
+        // The axis can be anywhere on its travel, so the search covers all of it and a margin.
+        let reach = pulses(cx, cx.state.config.limits.travel_max.0 + 10.0);
+        cx.move_to_pulses(cx.state.pulses - reach, speed)?;
+        Ok(Self { speed, touch_speed, stage: Stage::Searching })
+    }
+
+    pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
+        match self.advance(cx, reading) {
+            Ok(progress) => progress,
+            Err(reason) => Progress::Fail(format!("home: {reason}")),
+        }
+    }
+
+    fn advance(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
+        let is_at_switch = reading.status.has(AxisStatus::HOME);
+        let at_rest = cx.at_rest()?;
+        match self.stage {
+            Stage::Searching if is_at_switch => {
+                cx.stop_move();
+                self.stage = Stage::Braking;
+            }
+            Stage::Braking if at_rest => {
+                let target = reading.pulses + pulses(cx, BACK_OFF_MM);
+                cx.move_to_pulses(target, self.speed)?;
+                self.stage = Stage::BackingOff;
+            }
+            Stage::BackingOff if at_rest => {
+                if is_at_switch {
+                    return Err("the home switch stays closed; check it".into());
+                }
+                let target = reading.pulses - pulses(cx, BACK_OFF_MM + TOUCH_REACH_MM);
+                cx.move_to_pulses(target, self.touch_speed)?;
+                self.stage = Stage::Touching;
+            }
+            Stage::Touching if is_at_switch => {
+                cx.stop_move();
+                self.stage = Stage::TouchBraking { edge_pulses: reading.pulses };
+            }
+            Stage::Searching | Stage::Touching if at_rest => {
+                return Err("the home switch was not found; check it and its cable".into());
+            }
+            Stage::TouchBraking { edge_pulses } if at_rest => {
+                cx.command(RigCommand::DefinePosition { pulses: reading.pulses - edge_pulses });
+                cx.record(Record::Homed { edge_pulses });
+                self.stage = Stage::Defining;
+            }
+            Stage::Defining if cx.state.unacknowledged.is_empty() => {
+                cx.state.is_homed = true;
+                return Ok(Progress::Done);
+            }
+            _ => {}
+        }
+        Ok(Progress::Continue)
+    }
+}
+
+fn pulses(cx: &Context<'_>, distance_mm: f64) -> i64 {
+    (distance_mm / cx.state.config.rig.mm_per_pulse).round() as i64
+}

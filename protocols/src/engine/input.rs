@@ -1,0 +1,185 @@
+//! The two closed enums of the engine: what it sees and what it does.
+
+use super::interlock::Interlock;
+use palpate_model::fit::LiveEstimate;
+use palpate_model::rig::{Ack, Fault, Phase, Reading, RigCommand};
+use palpate_model::units::{Newtons, Position, Volts};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// Everything the engine can see.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "input", rename_all = "snake_case")]
+pub enum Input {
+    /// One sample.
+    Reading(Reading),
+    /// The rig accepted a command.
+    Ack(Ack),
+    /// Something outside the plan went wrong.
+    Fault(Fault),
+    /// The operator asked for something.
+    Operator {
+        /// What.
+        choice: Operator,
+    },
+    /// The live fit has a new answer. It enters only here, so a replay decides from the record.
+    LiveFit(LiveEstimate),
+    /// No sample arrived for a while; time passed.
+    Tick,
+}
+
+/// What an operator can ask for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Operator {
+    /// Begin the plan.
+    Start,
+    /// Decelerate, hold, keep the data.
+    Stop,
+    /// As stop, and mark the run failed.
+    Abort,
+    /// Cut the motion at once.
+    Halt,
+    /// After a stop: leave the tissue.
+    Retract,
+    /// After a stop: end the session where the probe stands.
+    Close,
+}
+
+/// Everything the engine can do.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "effect", rename_all = "snake_case")]
+pub enum Effect {
+    /// Tell the rig something.
+    Command(RigCommand),
+    /// Write something down.
+    Record(Record),
+    /// The run has ended.
+    Finished(Outcome),
+}
+
+/// What is written down beside samples and commands.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "record", rename_all = "snake_case")]
+pub enum Record {
+    /// A phase began.
+    PhaseStarted {
+        /// Which.
+        phase: Phase,
+        /// Index of the step in the plan.
+        step_index: usize,
+    },
+    /// Position zero was defined at the home switch.
+    Homed {
+        /// Counter value at which the switch closed, before it was redefined.
+        edge_pulses: i64,
+    },
+    /// The unloaded signal was averaged.
+    Tared {
+        /// Mean signal.
+        volts: Volts,
+        /// Standard deviation of one sample.
+        noise: Volts,
+        /// How many samples.
+        samples: u64,
+    },
+    /// Enough consecutive samples were above the contact criterion.
+    ContactTriggered {
+        /// 1 for the approach, 2 for the slow pass.
+        pass: u8,
+        /// Where.
+        position: Position,
+        /// Signal of the triggering sample, unfiltered.
+        volts: Volts,
+        /// Filtered force above tare.
+        force: Newtons,
+    },
+    /// The contact position was estimated from the slow pass.
+    ContactFound {
+        /// Estimate, from home.
+        position: Position,
+        /// Standard error in mm.
+        std_error_mm: f64,
+    },
+    /// An interlock tripped.
+    InterlockTripped {
+        /// Which.
+        interlock: Interlock,
+        /// What was seen, in words.
+        reason: String,
+    },
+    /// The run began to end other than by finishing its plan.
+    EndingStarted {
+        /// How.
+        ending: EndingKind,
+        /// Why.
+        reason: String,
+    },
+}
+
+/// The five ways a run ends.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum EndingKind {
+    /// The plan ran to its end.
+    Finish,
+    /// Stopped by the operator; data kept.
+    Stop,
+    /// Given up: a step failed or the operator aborted.
+    Abort,
+    /// Motion cut at once.
+    Halt,
+    /// An interlock tripped.
+    Interlock,
+}
+
+impl EndingKind {
+    /// The word for it in logs and on screens.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Finish => "finish",
+            Self::Stop => "stop",
+            Self::Abort => "abort",
+            Self::Halt => "halt",
+            Self::Interlock => "interlock",
+        }
+    }
+}
+
+impl fmt::Display for EndingKind {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// How a run ended and why.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// How.
+    pub ending: EndingKind,
+    /// Why, in words.
+    pub reason: String,
+}
+
+impl fmt::Display for Record {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::PhaseStarted { phase, .. } => write!(f, "{phase}"),
+            Self::Homed { edge_pulses } => {
+                write!(f, "home found at counter {edge_pulses}; position zero set there")
+            }
+            Self::Tared { volts, noise, .. } => {
+                write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)
+            }
+            Self::ContactTriggered { pass, position, force, .. } => {
+                write!(f, "pass {pass} felt {force:.3} at {position:.3}")
+            }
+            Self::ContactFound { position, std_error_mm } => {
+                write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
+            }
+            Self::InterlockTripped { interlock, reason } => write!(f, "{interlock} interlock: {reason}"),
+            Self::EndingStarted { ending, reason } => write!(f, "{ending}: {reason}"),
+        }
+    }
+}

@@ -1,0 +1,216 @@
+//! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
+
+use super::state::State;
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Limits, Reading};
+use palpate_model::units::{Newtons, Position, Volts};
+use serde::{Deserialize, Serialize};
+use std::fmt;
+
+/// What tripped. The order of the variants is the order of judgement: the first that trips is
+/// the reason given.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Interlock {
+    /// The signal is not a number: nothing below can be judged.
+    Signal,
+    /// A limit switch closed, or the position left the travel.
+    Travel,
+    /// Force above tare out of bounds.
+    Force,
+    /// Raw signal too high, whatever the calibration says.
+    Volts,
+    /// Force changes faster than tissue can.
+    ForceRate,
+    /// Samples arrive too late for the speed.
+    SampleAge,
+    /// Pulses and commanded path disagree.
+    Path,
+    /// The link or the controller failed.
+    Link,
+}
+
+impl Interlock {
+    /// The word for it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Signal => "signal",
+            Self::Travel => "travel",
+            Self::Force => "force",
+            Self::Volts => "raw signal",
+            Self::ForceRate => "force rate",
+            Self::SampleAge => "sample age",
+            Self::Path => "path",
+            Self::Link => "link",
+        }
+    }
+}
+
+impl fmt::Display for Interlock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
+    }
+}
+
+/// An interlock that tripped, with what was seen.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Trip {
+    pub interlock: Interlock,
+    pub reason: String,
+}
+
+/// Samples in each of the two means whose difference is the force rate.
+const RATE_SAMPLES: usize = 10;
+
+/// While the operator retracts after an over-force the limits that stopped the run are already
+/// exceeded; the ceiling becomes what was felt at the start of the retract plus this.
+const RETRACT_HEADROOM: Newtons = Newtons(0.5);
+const RETRACT_HEADROOM_VOLTS: Volts = Volts(0.05);
+
+/// What the interlocks remember between samples.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Watch {
+    last_at: Option<Nanos>,
+    last_tick: Option<u64>,
+    /// The newest forces, oldest first once full.
+    recent: [f64; 2 * RATE_SAMPLES],
+    recent_count: usize,
+    retract_ceiling: Option<(Newtons, Volts)>,
+    newest: (Newtons, Volts),
+}
+
+impl Watch {
+    /// Samples are expected from now on.
+    pub fn start(&mut self, now: Nanos) {
+        self.last_at.get_or_insert(now);
+    }
+
+    /// The operator retracts: what is felt now may stay, but not grow.
+    pub fn allow_retract(&mut self) {
+        let (force, volts) = self.newest;
+        self.retract_ceiling = Some((force + RETRACT_HEADROOM, volts + RETRACT_HEADROOM_VOLTS));
+    }
+
+    /// The signal's zero moved (tare): forces before and after do not compare.
+    pub fn forget_rate(&mut self) {
+        self.recent_count = 0;
+    }
+
+    /// Change of force between the two newest means, in N/s, once there are enough samples.
+    fn push_rate(&mut self, force: f64, tick_secs: f64) -> Option<f64> {
+        self.recent.rotate_left(1);
+        self.recent[2 * RATE_SAMPLES - 1] = force;
+        self.recent_count = (self.recent_count + 1).min(2 * RATE_SAMPLES);
+        if self.recent_count < 2 * RATE_SAMPLES {
+            return None;
+        }
+        let (older, newer) = self.recent.split_at(RATE_SAMPLES);
+        let difference = newer.iter().sum::<f64>() - older.iter().sum::<f64>();
+        Some(difference / RATE_SAMPLES as f64 / (RATE_SAMPLES as f64 * tick_secs))
+    }
+}
+
+/// Judges one sample. `state.derived` already belongs to it; `path_error` is the tracker's word.
+pub(super) fn judge(
+    state: &mut State,
+    now: Nanos,
+    reading: &Reading,
+    path_error: Option<String>,
+) -> Option<Trip> {
+    let limits = state.config.limits;
+    let age = age_trip(state, now);
+    state.watch.last_at = Some(now);
+    if !reading.volts.is_finite() {
+        return trip(Interlock::Signal, "the load cell's signal is not a number; check its wiring".into());
+    }
+    let force = state.force_from_volts(reading.volts);
+    state.watch.newest = (force, reading.volts);
+    let rate = state.watch.push_rate(force.0, state.config.rig.tick().0);
+    let (force_max, volts_max) = match state.watch.retract_ceiling {
+        Some((force, volts)) => (
+            Newtons(limits.force_max.0.max(force.0)),
+            Volts(limits.volts_max.0.max(volts.0)),
+        ),
+        None => (limits.force_max, limits.volts_max),
+    };
+    travel_trip(state, reading, &limits)
+        .or_else(|| force_trip(force, limits.force_min, force_max))
+        .or_else(|| {
+            (reading.volts > volts_max).then(|| Trip {
+                interlock: Interlock::Volts,
+                reason: format!("the raw signal is {:.3}, above {volts_max:.2}", reading.volts),
+            })
+        })
+        .or_else(|| rate_trip(rate, limits.force_rate_max))
+        .or(age)
+        .or_else(|| path_error.map(|reason| Trip { interlock: Interlock::Path, reason }))
+}
+
+/// Judges the passing of time without a sample.
+pub(super) fn judge_silence(state: &State, now: Nanos) -> Option<Trip> {
+    age_trip(state, now)
+}
+
+fn trip(interlock: Interlock, reason: String) -> Option<Trip> {
+    Some(Trip { interlock, reason })
+}
+
+fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip> {
+    let position = state.derived.position;
+    for (bit, which) in
+        [(AxisStatus::FORWARD_LIMIT, "far"), (AxisStatus::REVERSE_LIMIT, "rear")]
+    {
+        if reading.status.has(bit) {
+            return trip(Interlock::Travel, format!("the {which} limit switch closed"));
+        }
+    }
+    if state.is_homed && position > limits.travel_max {
+        let Position(end) = limits.travel_max;
+        return trip(
+            Interlock::Travel,
+            format!("the probe is at {:.3} mm, past its travel of {end:.1} mm", position.0),
+        );
+    }
+    None
+}
+
+fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
+    if force > force_max {
+        return trip(Interlock::Force, format!("the force is {force:.2}, above {force_max:.2}"));
+    }
+    if force < force_min {
+        return trip(
+            Interlock::Force,
+            format!("the load cell reads {force:.2} in tension; check its wiring"),
+        );
+    }
+    None
+}
+
+fn rate_trip(rate: Option<f64>, rate_max: f64) -> Option<Trip> {
+    let rate = rate.filter(|rate| rate.abs() > rate_max)?;
+    trip(Interlock::ForceRate, format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s"))
+}
+
+fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
+    let last_at = state.watch.last_at?;
+    let age = now.since(last_at).seconds();
+    let age_max = Limits::sample_age_max(state.derived.velocity);
+    if age <= age_max {
+        return None;
+    }
+    trip(
+        Interlock::SampleAge,
+        format!("no sample for {:.0} ms; at most {:.0} ms are allowed at this speed", age.0 * 1e3, age_max.0 * 1e3),
+    )
+}
+
+impl Watch {
+    /// Whether the controller clock went backward: the controller restarted.
+    pub fn is_clock_restarted(&mut self, tick: u64) -> bool {
+        let is_restarted = self.last_tick.is_some_and(|last| tick <= last);
+        self.last_tick = Some(tick);
+        is_restarted
+    }
+}

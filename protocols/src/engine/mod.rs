@@ -1,0 +1,26 @@
+//! The engine: `step(state, now, input) -> (state, effects)`, pure and total.
+//!
+//! [`Input`] is everything the engine can see and [`Effect`] everything it can do. It reads no
+//! clock, holds no device and knows no disk, so a dry run, a replay and a real run are the same
+//! code fed from different places.
+
+mod contact;
+mod context;
+mod home;
+mod input;
+mod interlock;
+mod self_test;
+mod state;
+mod stats;
+mod step;
+mod stop;
+mod tare;
+
+pub use input::{Effect, EndingKind, Input, Operator, Outcome, Record};
+pub use interlock::Interlock;
+pub use state::{Config, Contact, Derived, Power, State, Tare};
+pub use step::step;
+
+/// Version of the engine's decisions. Raised whenever a recorded session could decide
+/// differently; replay compares decisions only where versions match.
+pub const ENGINE_VERSION: u32 = 1;

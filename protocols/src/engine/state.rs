@@ -1,0 +1,283 @@
+//! The engine's state: a plain value, cloneable, comparable, printable.
+
+use super::contact::ContactSearch;
+use super::home::Homing;
+use super::input::{EndingKind, Outcome};
+use super::interlock::Watch;
+use super::self_test::SelfTest;
+use super::tare::Taring;
+use crate::plans::{Plan, Step};
+use palpate_model::Nanos;
+use palpate_model::calibration::Curve;
+use palpate_model::fit::LiveEstimate;
+use palpate_model::rig::{Limits, PathTracker, Phase, RigCommand, RigDescription};
+use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+use std::collections::VecDeque;
+use std::sync::Arc;
+
+/// What does not change during a run.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Config {
+    /// The rig as it described itself.
+    pub rig: RigDescription,
+    /// Interlock thresholds.
+    pub limits: Limits,
+    /// Volts to newtons and back.
+    pub curve: Curve,
+    /// What to do.
+    pub plan: Plan,
+    /// Whether the axis was homed earlier on this connection.
+    pub is_homed: bool,
+}
+
+/// Whether motion is possible. Any fault or stop goes straight to `Stopped`, and the way back
+/// leads through `Reset`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Power {
+    /// No motion.
+    Stopped,
+    /// The motor is being energised and the rig checked.
+    Reset,
+    /// Motion is allowed.
+    Enabled,
+}
+
+/// The unloaded signal.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tare {
+    /// Mean signal without load.
+    pub volts: Volts,
+    /// Standard deviation of one sample, quantisation included.
+    pub noise: Volts,
+}
+
+/// Where the tissue begins.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    /// Estimated contact position from home.
+    pub position: Position,
+    /// Its standard error in mm.
+    pub std_error_mm: f64,
+}
+
+/// What was derived from the newest sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Derived {
+    /// Commanded position; from home once the axis is homed.
+    pub position: Position,
+    /// Commanded velocity.
+    pub velocity: MmPerS,
+    /// Force above tare, once tared.
+    pub force: Option<Newtons>,
+    /// Standard uncertainty of that force from signal noise and the curve's sensitivity.
+    pub force_sigma: Option<Newtons>,
+    /// Depth from contact, once contact is known.
+    pub depth: Option<Depth>,
+}
+
+/// A step in progress, holding only its own data.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Active {
+    SelfTest(SelfTest),
+    Home(Homing),
+    Tare(Taring),
+    Contact(Box<ContactSearch>),
+    /// Ramp, retract and jog: one move, done when the axis rests.
+    Move,
+    /// Hold until this controller tick.
+    Hold {
+        until_tick: u64,
+    },
+}
+
+/// What the run as a whole is doing.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Activity {
+    /// Not started.
+    Waiting,
+    /// Running the plan.
+    Step(Active),
+    /// Decelerating because of `ending`.
+    Braking { ending: Outcome, deadline: Nanos },
+    /// At rest after a stop; the operator may retract or close.
+    Holding { ending: Outcome },
+    /// Leaving the tissue after a stop, at the operator's request.
+    Retracting { ending: Outcome },
+    /// Over.
+    Ended(Outcome),
+}
+
+/// A move under way, for its time limit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct MoveInFlight {
+    pub deadline: Nanos,
+}
+
+/// Everything the engine remembers between inputs.
+#[derive(Clone, Debug, PartialEq)]
+pub struct State {
+    pub(super) config: Arc<Config>,
+    pub(super) activity: Activity,
+    pub(super) power: Power,
+    pub(super) is_homed: bool,
+    pub(super) phase: Phase,
+    pub(super) step_index: usize,
+    pub(super) step_started: Nanos,
+    pub(super) path: PathTracker,
+    pub(super) tick: u64,
+    pub(super) pulses: i64,
+    pub(super) tare: Option<Tare>,
+    pub(super) contact: Option<Contact>,
+    pub(super) derived: Derived,
+    pub(super) watch: Watch,
+    pub(super) unacknowledged: VecDeque<(Nanos, RigCommand)>,
+    pub(super) in_flight: Option<MoveInFlight>,
+    pub(super) live: Option<LiveEstimate>,
+}
+
+impl State {
+    /// A run that has not started.
+    #[must_use]
+    pub fn new(config: Arc<Config>) -> Self {
+        Self {
+            activity: Activity::Waiting,
+            power: Power::Stopped,
+            is_homed: config.is_homed,
+            phase: Phase::Idle,
+            step_index: 0,
+            step_started: Nanos::ZERO,
+            path: PathTracker::new(&config.rig),
+            tick: 0,
+            pulses: 0,
+            tare: None,
+            contact: None,
+            derived: Derived::default(),
+            watch: Watch::default(),
+            unacknowledged: VecDeque::new(),
+            in_flight: None,
+            live: None,
+            config,
+        }
+    }
+
+    /// What the run is doing now.
+    #[must_use]
+    pub fn phase(&self) -> Phase {
+        self.phase
+    }
+
+    /// Cycle number; a ramp and hold has one cycle.
+    #[must_use]
+    pub fn cycle(&self) -> u32 {
+        u32::from(matches!(self.phase, Phase::Ramp | Phase::Hold))
+    }
+
+    /// Index of the step in progress, and since when.
+    #[must_use]
+    pub fn step_progress(&self) -> (usize, Nanos) {
+        (self.step_index, self.step_started)
+    }
+
+    /// Values derived from the newest sample.
+    #[must_use]
+    pub fn derived(&self) -> &Derived {
+        &self.derived
+    }
+
+    /// Whether motion is possible.
+    #[must_use]
+    pub fn power(&self) -> Power {
+        self.power
+    }
+
+    /// Whether position zero is known.
+    #[must_use]
+    pub fn is_homed(&self) -> bool {
+        self.is_homed
+    }
+
+    /// Where the tissue begins, once found.
+    #[must_use]
+    pub fn contact(&self) -> Option<Contact> {
+        self.contact
+    }
+
+    /// The unloaded signal, once measured.
+    #[must_use]
+    pub fn tare(&self) -> Option<Tare> {
+        self.tare
+    }
+
+    /// Newest answer of the live fit, as it came in.
+    #[must_use]
+    pub fn live(&self) -> Option<&LiveEstimate> {
+        self.live.as_ref()
+    }
+
+    /// Whether the axis may be moving or about to move.
+    #[must_use]
+    pub fn is_motion_possible(&self) -> bool {
+        matches!(
+            self.activity,
+            Activity::Step(_) | Activity::Braking { .. } | Activity::Retracting { .. }
+        )
+    }
+
+    /// Set while the run has stopped and awaits the operator's choice to retract or close.
+    #[must_use]
+    pub fn holding(&self) -> Option<&Outcome> {
+        match &self.activity {
+            Activity::Holding { ending } => Some(ending),
+            _ => None,
+        }
+    }
+
+    /// Why the operator cannot retract now, if so.
+    pub fn can_retract(&self) -> Result<(), &'static str> {
+        match &self.activity {
+            Activity::Holding { ending } if ending.ending == EndingKind::Halt || !self.is_homed => {
+                Err("the position is no longer known; move the probe by hand, then home")
+            }
+            Activity::Holding { .. } if self.contact.is_none() => {
+                Err("no contact was found, so there is nothing to retract from")
+            }
+            Activity::Holding { .. } => Ok(()),
+            _ => Err("retract follows a stop"),
+        }
+    }
+
+    /// How the run ended, once it has.
+    #[must_use]
+    pub fn outcome(&self) -> Option<&Outcome> {
+        match &self.activity {
+            Activity::Ended(outcome) => Some(outcome),
+            _ => None,
+        }
+    }
+
+    /// The plan's step in progress, if any.
+    #[must_use]
+    pub fn current_step(&self) -> Option<&Step> {
+        self.config.plan.steps.get(self.step_index)
+    }
+
+    /// What does not change during the run.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// Controller ticks of a span, rounded up.
+    pub(super) fn ticks(&self, span: Seconds) -> u64 {
+        // 1e-6 of a tick forgives the rounding of span / tick, so 50 s is 50 000 ticks, not one more.
+        (span.0 / self.config.rig.tick().0 - 1e-6).ceil().max(0.0) as u64
+    }
+
+    /// Force above tare of a signal; before tare, above the calibration's own zero.
+    pub(super) fn force_from_volts(&self, volts: Volts) -> Newtons {
+        let curve = &self.config.curve;
+        let zero = curve.volts_from_newtons(Newtons(0.0));
+        let shift = self.tare.map_or(0.0, |tare| tare.volts.0 - zero.0);
+        curve.newtons_from_volts(Volts(volts.0 - shift))
+    }
+}

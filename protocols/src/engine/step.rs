@@ -1,0 +1,253 @@
+//! The one entry point: interlocks first, then the plan.
+
+use super::contact::ContactSearch;
+use super::context::{Context, Progress};
+use super::home::Homing;
+use super::input::{Effect, EndingKind, Input, Operator, Outcome, Record};
+use super::interlock::{self, Interlock, Trip};
+use super::self_test::SelfTest;
+use super::state::{Active, Activity, Derived, Power, State};
+use super::stop;
+use super::tare::Taring;
+use crate::plans::Step;
+use palpate_model::Nanos;
+use palpate_model::rig::{Ack, Fault, Reading, RigCommand};
+use palpate_model::units::{Depth, Position, Seconds};
+
+/// Longest time a controller may take to acknowledge a command.
+const ACK_MAX: Seconds = Seconds(1.0);
+
+/// Advances a run by one input. Pure: the same arguments give the same answer, for ever.
+#[must_use]
+pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) {
+    let mut effects = Vec::new();
+    let mut cx = Context { state: &mut state, now, effects: &mut effects };
+    match input {
+        Input::Reading(reading) => on_reading(&mut cx, &reading),
+        Input::Tick => on_tick(&mut cx),
+        Input::Ack(ack) => on_ack(&mut cx, ack),
+        Input::Fault(fault) => on_fault(&mut cx, &fault),
+        Input::Operator { choice } => on_operator(&mut cx, choice),
+        Input::LiveFit(estimate) => cx.state.live = Some(estimate),
+    }
+    (state, effects)
+}
+
+fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
+    if cx.state.watch.is_clock_restarted(reading.tick) {
+        return on_fault(cx, &Fault::ControllerReset);
+    }
+    let path_error = derive(cx.state, reading);
+    let trip = interlock::judge(cx.state, cx.now, reading, path_error);
+    if let Some(trip) = trip.or_else(|| acknowledgement_trip(cx)) {
+        return on_trip(cx, trip);
+    }
+    match cx.state.activity.take_step() {
+        Some(active) => run_step(cx, active, reading),
+        None => stop::on_time(cx),
+    }
+}
+
+/// Computes what a sample means; the error is the path tracker's.
+fn derive(state: &mut State, reading: &Reading) -> Option<String> {
+    state.tick = reading.tick;
+    state.pulses = reading.pulses;
+    let (position, path_error) = match state.path.on_reading(reading) {
+        Ok(position) => (position, None),
+        Err(err) => (
+            Position(reading.pulses as f64 * state.config.rig.mm_per_pulse),
+            Some(err.to_string()),
+        ),
+    };
+    let tare = state.tare.filter(|_| reading.volts.is_finite());
+    let force = tare.map(|_| state.force_from_volts(reading.volts));
+    state.derived = Derived {
+        position,
+        velocity: state.path.velocity(),
+        force,
+        force_sigma: force
+            .zip(tare)
+            .map(|(force, tare)| state.config.curve.force_sigma(force, tare.noise)),
+        depth: state.contact.map(|contact| position.depth_from(contact.position)),
+    };
+    path_error
+}
+
+fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
+    let progress = match &mut active {
+        Active::SelfTest(test) => test.on_reading(cx, reading),
+        Active::Home(homing) => homing.on_reading(cx, reading),
+        Active::Tare(taring) => taring.on_reading(cx, reading),
+        Active::Contact(search) => search.on_reading(cx, reading),
+        Active::Move => match cx.at_rest() {
+            Ok(true) => Progress::Done,
+            Ok(false) => Progress::Continue,
+            Err(reason) => Progress::Fail(reason),
+        },
+        Active::Hold { until_tick } if reading.tick >= *until_tick => Progress::Done,
+        Active::Hold { .. } => Progress::Continue,
+    };
+    match progress {
+        Progress::Continue => cx.state.activity = Activity::Step(active),
+        Progress::Done => begin_step(cx, cx.state.step_index + 1),
+        Progress::Fail(reason) => stop::begin(cx, EndingKind::Abort, reason),
+    }
+}
+
+/// Begins a step of the plan, skipping what is already done, or finishes the run.
+fn begin_step(cx: &mut Context<'_>, step_index: usize) {
+    let Some(step) = cx.state.config.plan.steps.get(step_index).copied() else {
+        cx.state.power = Power::Stopped;
+        return stop::end(cx, Outcome { ending: EndingKind::Finish, reason: "the plan is complete".into() });
+    };
+    cx.state.step_index = step_index;
+    cx.state.step_started = cx.now;
+    if matches!(step, Step::Home { .. }) && cx.state.is_homed {
+        return begin_step(cx, step_index + 1);
+    }
+    cx.enter_phase(step.phase());
+    match begin_active(cx, &step) {
+        Ok(active) => cx.state.activity = Activity::Step(active),
+        Err(reason) => stop::begin(cx, EndingKind::Abort, format!("{}: {reason}", step.phase())),
+    }
+}
+
+fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
+    if step.needs_homed_axis() && !cx.state.is_homed {
+        return Err("the axis is not homed; home it first".into());
+    }
+    Ok(match *step {
+        Step::SelfTest { duration } => Active::SelfTest(SelfTest::begin(cx, duration)),
+        Step::Home { speed, touch_speed } => Active::Home(Homing::begin(cx, speed, touch_speed)?),
+        Step::Tare { duration } => {
+            cx.state.tare = None;
+            cx.state.watch.forget_rate();
+            Active::Tare(Taring::begin(cx, duration))
+        }
+        Step::FindContact(plan) => {
+            cx.state.contact = None;
+            Active::Contact(Box::new(ContactSearch::begin(cx, plan)?))
+        }
+        Step::Ramp { speed, depth } => {
+            let target = position_of(cx, depth)?;
+            cx.move_to(target, speed)?;
+            Active::Move
+        }
+        Step::Hold { duration } => {
+            Active::Hold { until_tick: cx.state.tick + cx.state.ticks(duration) }
+        }
+        Step::Retract { speed, clearance_mm } => {
+            let target = position_of(cx, Depth(-clearance_mm))?;
+            cx.move_to(Position(target.0.max(0.0)), speed)?;
+            Active::Move
+        }
+        Step::Jog { distance_mm, speed } => {
+            let pulses = (distance_mm / cx.state.config.rig.mm_per_pulse).round() as i64;
+            cx.move_to_pulses(cx.state.pulses + pulses, speed)?;
+            Active::Move
+        }
+    })
+}
+
+fn position_of(cx: &Context<'_>, depth: Depth) -> Result<Position, String> {
+    let contact = cx.state.contact.ok_or("contact is not known; find it first")?;
+    let target = depth.position_from(contact.position);
+    let travel = cx.state.config.limits.travel_max;
+    if target > travel {
+        return Err(format!(
+            "a depth of {depth} from contact at {:.3} mm ends at {:.3} mm, beyond the travel of {:.1} mm",
+            contact.position.0, target.0, travel.0
+        ));
+    }
+    Ok(target)
+}
+
+fn on_tick(cx: &mut Context<'_>) {
+    let trip = interlock::judge_silence(cx.state, cx.now).or_else(|| acknowledgement_trip(cx));
+    match trip {
+        Some(trip) => on_trip(cx, trip),
+        None => stop::on_time(cx),
+    }
+}
+
+fn on_ack(cx: &mut Context<'_>, ack: Ack) {
+    let expected = cx.state.unacknowledged.pop_front().map(|(_, command)| command);
+    if expected != Some(ack.command) {
+        let reason = match expected {
+            Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
+            None => format!("the rig acknowledged {:?}, which was not asked", ack.command),
+        };
+        return stop::begin(cx, EndingKind::Abort, reason);
+    }
+    match ack.command {
+        RigCommand::DefinePosition { pulses } => {
+            cx.state.path.on_define(pulses);
+            cx.state.pulses = pulses;
+        }
+        RigCommand::EnableMotor => stop::on_motor_enabled(cx),
+        _ => {}
+    }
+}
+
+fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
+    let reason = fault.to_string();
+    match fault {
+        Fault::LinkLost { .. } | Fault::ControllerReset => {
+            cx.state.is_homed = false;
+            on_trip(cx, Trip { interlock: Interlock::Link, reason });
+        }
+        Fault::CommandRefused { .. } => {
+            cx.state.unacknowledged.clear();
+            stop::begin(cx, EndingKind::Abort, reason);
+        }
+        Fault::LogFailed { .. } => stop::begin(cx, EndingKind::Abort, reason),
+    }
+}
+
+fn on_trip(cx: &mut Context<'_>, trip: Trip) {
+    // At rest after a stop there is nothing left to stop; the samples keep showing why.
+    if cx.state.is_motion_possible() && !stop::is_braking(cx.state) {
+        let Trip { interlock, reason } = trip;
+        cx.record(Record::InterlockTripped { interlock, reason: reason.clone() });
+        stop::begin(cx, EndingKind::Interlock, format!("{interlock} interlock: {reason}"));
+    } else {
+        stop::on_time(cx);
+    }
+}
+
+fn acknowledgement_trip(cx: &Context<'_>) -> Option<Trip> {
+    let (sent, command) = cx.state.unacknowledged.front()?;
+    let waited = cx.now.since(*sent).seconds();
+    (waited > ACK_MAX && cx.state.is_motion_possible()).then(|| Trip {
+        interlock: Interlock::Link,
+        reason: format!("the rig did not acknowledge {command:?} within {ACK_MAX}"),
+    })
+}
+
+fn on_operator(cx: &mut Context<'_>, choice: Operator) {
+    match choice {
+        Operator::Start if cx.state.activity == Activity::Waiting => {
+            cx.state.watch.start(cx.now);
+            begin_step(cx, 0);
+        }
+        Operator::Start => {}
+        Operator::Stop => stop::begin(cx, EndingKind::Stop, "the operator stopped the run".into()),
+        Operator::Abort => stop::begin(cx, EndingKind::Abort, "the operator aborted the run".into()),
+        Operator::Halt => stop::begin(cx, EndingKind::Halt, "the operator halted the motion".into()),
+        Operator::Retract => stop::retract(cx),
+        Operator::Close => stop::close(cx),
+    }
+}
+
+impl Activity {
+    /// The step in progress, taken out so that it can change beside the state.
+    fn take_step(&mut self) -> Option<Active> {
+        match std::mem::replace(self, Self::Waiting) {
+            Self::Step(active) => Some(active),
+            other => {
+                *self = other;
+                None
+            }
+        }
+    }
+}

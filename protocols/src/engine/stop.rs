@@ -1,0 +1,110 @@
+//! Every way a run ends other than by finishing its plan, and what may follow.
+//!
+//! Stop, abort and interlock decelerate and hold; halt cuts. Nothing moves again unless the
+//! operator asks for a retract, and never on a reading that was just distrusted.
+
+use super::context::Context;
+use super::input::{Effect, EndingKind, Outcome, Record};
+use super::state::{Activity, Power, State};
+use palpate_model::Nanos;
+use palpate_model::rig::{Phase, RigCommand};
+use palpate_model::units::{Depth, MmPerS, Position, Seconds};
+
+/// Time after which an axis told to stop counts as stopped even if no sample says so: the
+/// longest deceleration plus the longest acknowledgement.
+const BRAKE_MAX: Seconds = Seconds(2.0);
+
+/// Speed and distance of the operator's retract.
+const RETRACT_SPEED: MmPerS = MmPerS(6.0);
+const RETRACT_CLEARANCE_MM: f64 = 10.0;
+
+/// Begins to end the run. A halt always cuts at once, whatever is under way.
+pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
+    let is_halt = ending == EndingKind::Halt;
+    let outcome = match &cx.state.activity {
+        Activity::Ended(_) => return,
+        // The first reason stands; a halt or interlock during braking only acts.
+        Activity::Braking { ending, .. }
+        | Activity::Holding { ending }
+        | Activity::Retracting { ending } => ending.clone(),
+        Activity::Waiting | Activity::Step(_) => {
+            cx.record(Record::EndingStarted { ending, reason: reason.clone() });
+            Outcome { ending, reason }
+        }
+    };
+    cx.state.power = Power::Stopped;
+    cx.state.in_flight = None;
+    if is_halt {
+        // A stepper cut at speed may lose steps.
+        cx.state.is_homed = false;
+    }
+    // Any operator stop reaches the rig, also when the engine believes the axis at rest.
+    cx.command(if is_halt { RigCommand::Halt } else { RigCommand::Stop });
+    cx.enter_phase(Phase::Stopped);
+    let deadline = cx.now + Nanos::from_seconds(BRAKE_MAX);
+    cx.state.activity = Activity::Braking { ending: outcome, deadline };
+}
+
+/// Whether the axis is already being stopped.
+pub(super) fn is_braking(state: &State) -> bool {
+    matches!(&state.activity, Activity::Braking { .. })
+}
+
+/// Time passed, or a sample came, outside the plan's steps.
+pub(super) fn on_time(cx: &mut Context<'_>) {
+    match cx.state.activity.clone() {
+        Activity::Braking { ending, deadline } => {
+            let is_silent = cx.now > deadline;
+            if (cx.state.path.is_at_rest() && cx.state.unacknowledged.is_empty()) || is_silent {
+                cx.state.activity = Activity::Holding { ending };
+            }
+        }
+        Activity::Retracting { ending } => match cx.at_rest() {
+            Ok(true) if cx.state.power == Power::Enabled => end(cx, ending),
+            Ok(_) => {}
+            Err(reason) => begin(cx, EndingKind::Abort, reason),
+        },
+        _ => {}
+    }
+}
+
+/// The operator wants the probe out of the tissue after a stop.
+pub(super) fn retract(cx: &mut Context<'_>) {
+    if cx.state.can_retract().is_err() {
+        return;
+    }
+    let Activity::Holding { ending } = cx.state.activity.clone() else { return };
+    cx.state.power = Power::Reset;
+    cx.state.watch.allow_retract();
+    cx.enter_phase(Phase::Retract);
+    cx.state.activity = Activity::Retracting { ending };
+    cx.command(RigCommand::EnableMotor);
+}
+
+/// The motor is energised: a self-test goes on by itself, a retract may now move.
+pub(super) fn on_motor_enabled(cx: &mut Context<'_>) {
+    if !matches!(cx.state.activity, Activity::Retracting { .. }) || cx.state.power != Power::Reset {
+        return;
+    }
+    let Some(contact) = cx.state.contact else { return };
+    cx.state.power = Power::Enabled;
+    let target = Depth(-RETRACT_CLEARANCE_MM).position_from(contact.position);
+    if let Err(reason) = cx.move_to(Position(target.0.max(0.0)), RETRACT_SPEED) {
+        begin(cx, EndingKind::Abort, reason);
+    }
+}
+
+/// The operator ends the session where the probe stands.
+pub(super) fn close(cx: &mut Context<'_>) {
+    if let Activity::Holding { ending } = cx.state.activity.clone() {
+        end(cx, ending);
+    }
+}
+
+/// The run is over.
+pub(super) fn end(cx: &mut Context<'_>, outcome: Outcome) {
+    cx.state.power = Power::Stopped;
+    cx.enter_phase(Phase::Ended);
+    cx.state.activity = Activity::Ended(outcome.clone());
+    cx.effects.push(Effect::Finished(outcome));
+}

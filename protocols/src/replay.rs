@@ -1,0 +1,331 @@
+//! Replay: the recorded inputs of a session drive the same engine again.
+//!
+//! Decisions (commands, records, endings) must be equal where the engine version is; derived
+//! numbers must agree within a stated tolerance whatever the version.
+
+use crate::engine::{self, Config, ENGINE_VERSION, Effect, Input, State};
+use crate::plans::Plan;
+use crate::runner::{LiveFeed, to_json};
+use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{AxisStatus, Reading};
+use palpate_model::units::Volts;
+use palpate_sessions::log::Session;
+use palpate_sessions::record::{Entry, EntryKind, Row};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Force and depth come from the same arithmetic on the same raw numbers; `exp` and friends may
+/// differ in the last digits between platforms, which depth (under 200 mm) and force (under 50 N)
+/// turn into less than this, in mm and N.
+pub const TOLERANCE_DERIVED: f64 = 1e-9;
+
+/// The live fit accumulates over the whole run; relative.
+pub const TOLERANCE_LIVE: f64 = 1e-6;
+
+/// A session cannot be replayed at all.
+#[derive(Debug, Error)]
+pub enum ReplayError {
+    /// The manifest's plan or calibration is not what this version knows.
+    #[error("the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it")]
+    Manifest {
+        /// Plan, calibration or settings.
+        what: &'static str,
+        /// The parser's words.
+        detail: String,
+    },
+    /// A recorded input is not what this version knows.
+    #[error("input {order} of the session cannot be understood ({detail})")]
+    Input {
+        /// Its number.
+        order: u64,
+        /// The parser's words.
+        detail: String,
+    },
+}
+
+/// The first place where recorded and recomputed differ.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Difference {
+    /// Session time.
+    pub at_s: f64,
+    /// Samples before it.
+    pub after_sample: u64,
+    /// What differs: `decision`, `force_N`, `depth_mm`, `phase` or `live fit`.
+    pub what: String,
+    /// Number of the decision, for a decision.
+    pub decision: Option<usize>,
+    /// What the session says.
+    pub recorded: Value,
+    /// What the engine says now.
+    pub now: Value,
+}
+
+/// A decision that is allowed to differ, for a reason somebody reviewed.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Blessing {
+    /// Number of the decision.
+    pub decision: usize,
+    /// What the engine decides now.
+    pub now: Value,
+    /// Why that is right.
+    pub reason: String,
+}
+
+/// What a replay found.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ReplayReport {
+    /// Samples fed.
+    pub samples: u64,
+    /// Decisions compared.
+    pub decisions: usize,
+    /// Whether decisions were compared: the engine version is the recorded one.
+    pub is_same_engine: bool,
+    /// Decisions that differ as blessed.
+    pub blessed: usize,
+    /// Largest difference of a derived force, in N.
+    pub force_difference_n: f64,
+    /// Largest difference of a derived depth, in mm.
+    pub depth_difference_mm: f64,
+    /// The first difference that matters, if any.
+    pub first_difference: Option<Difference>,
+}
+
+/// Replays a session.
+pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport, ReplayError> {
+    let config = Arc::new(config_of(session)?);
+    let mut inputs = inputs_of(session)?;
+    let mut run = Replay {
+        live: LiveFeed::new(&config),
+        state: Some(State::new(config)),
+        recorded: session.entries.iter().filter(|entry| entry.kind == EntryKind::Decision).collect(),
+        is_finished: session.end.is_some(),
+        expected_live: VecDeque::new(),
+        blessings,
+        report: ReplayReport {
+            samples: session.rows.len() as u64,
+            decisions: 0,
+            is_same_engine: session.manifest.engine_version == ENGINE_VERSION,
+            blessed: 0,
+            force_difference_n: 0.0,
+            depth_difference_mm: 0.0,
+            first_difference: None,
+        },
+    };
+    for (i, row) in session.rows.iter().enumerate() {
+        run.feed_inputs(&mut inputs, i as u64);
+        run.feed_row(i as u64, row);
+    }
+    run.feed_inputs(&mut inputs, u64::MAX);
+    run.finish();
+    Ok(run.report)
+}
+
+fn config_of(session: &Session) -> Result<Config, ReplayError> {
+    let manifest = &session.manifest;
+    let bad = |what, detail: String| ReplayError::Manifest { what, detail };
+    let plan: Plan = serde_json::from_value(manifest.plan.clone())
+        .map_err(|err| bad("plan", err.to_string()))?;
+    let calibration: Calibration = serde_json::from_value(manifest.calibration.clone())
+        .map_err(|err| bad("calibration", err.to_string()))?;
+    let is_homed = manifest
+        .settings
+        .get("is_homed_at_start")
+        .and_then(Value::as_bool)
+        .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
+    Ok(Config {
+        rig: manifest.rig.clone(),
+        limits: manifest.limits,
+        curve: calibration.curve().map_err(|err| bad("calibration", err.to_string()))?,
+        plan,
+        is_homed,
+    })
+}
+
+struct RecordedInput {
+    after_sample: u64,
+    now: Nanos,
+    input: Input,
+}
+
+fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
+    session
+        .entries
+        .iter()
+        .filter(|entry| entry.kind != EntryKind::Decision)
+        .map(|entry| {
+            let input = serde_json::from_value(entry.body.clone())
+                .map_err(|err| ReplayError::Input { order: entry.order, detail: err.to_string() })?;
+            Ok(RecordedInput { after_sample: entry.after_sample, now: entry.now, input })
+        })
+        .collect()
+}
+
+struct Replay<'a> {
+    state: Option<State>,
+    live: LiveFeed,
+    recorded: Vec<&'a Entry>,
+    is_finished: bool,
+    expected_live: VecDeque<Value>,
+    blessings: &'a [Blessing],
+    report: ReplayReport,
+}
+
+impl Replay<'_> {
+    /// Feeds the inputs that came before sample `index`.
+    fn feed_inputs(&mut self, inputs: &mut VecDeque<RecordedInput>, index: u64) {
+        while let Some(next) = inputs.pop_front_if(|next| next.after_sample <= index) {
+            if let Input::LiveFit(estimate) = &next.input {
+                let recorded = to_json(estimate);
+                let recomputed = self.expected_live.pop_front().unwrap_or(Value::Null);
+                if !agree(&recorded, &recomputed, TOLERANCE_LIVE) {
+                    self.differ(next.now, index, "live fit", None, recorded, recomputed);
+                }
+            }
+            self.step(next.now, next.after_sample, next.input);
+        }
+    }
+
+    fn feed_row(&mut self, index: u64, row: &Row) {
+        let reading = Reading {
+            tick: row.tick,
+            counts: row.counts,
+            volts: Volts(row.volts),
+            pulses: row.pulses,
+            status: AxisStatus(row.status),
+        };
+        self.step(row.host, index + 1, Input::Reading(reading));
+        let Some(state) = &self.state else { return };
+        let derived = *state.derived();
+        let (phase, cycle) = (state.phase(), state.cycle());
+        if let Some(estimate) = self.live.push(&reading, state) {
+            self.expected_live.push_back(to_json(&estimate));
+        }
+        let force = (row.force, derived.force.map(|force| force.0));
+        let depth = (row.depth, derived.depth.map(|depth| depth.0));
+        for (what, (recorded, now)) in [("force_N", force), ("depth_mm", depth)] {
+            match (recorded, now) {
+                (Some(recorded), Some(now)) => {
+                    let difference = (recorded - now).abs();
+                    let largest = if what == "force_N" {
+                        &mut self.report.force_difference_n
+                    } else {
+                        &mut self.report.depth_difference_mm
+                    };
+                    *largest = largest.max(difference);
+                    if difference <= TOLERANCE_DERIVED {
+                        continue;
+                    }
+                }
+                (None, None) => continue,
+                _ => {}
+            }
+            self.differ(row.host, index, what, None, to_json(&recorded), to_json(&now));
+        }
+        // Labels follow decisions: they are the engine's, not arithmetic.
+        if self.report.is_same_engine
+            && self.report.blessed == 0
+            && (row.phase, row.cycle) != (phase, cycle)
+        {
+            self.differ(row.host, index, "phase", None, to_json(&row.phase), to_json(&phase));
+        }
+    }
+
+    fn step(&mut self, now: Nanos, after_sample: u64, input: Input) {
+        let Some(state) = self.state.take() else { return };
+        let (state, effects) = engine::step(state, now, input);
+        self.state = Some(state);
+        for effect in effects {
+            self.compare(now, after_sample, &effect);
+        }
+    }
+
+    fn compare(&mut self, now: Nanos, after_sample: u64, effect: &Effect) {
+        let index = self.report.decisions;
+        self.report.decisions += 1;
+        if !self.report.is_same_engine {
+            return;
+        }
+        let decided = to_json(effect);
+        let recorded = match self.recorded.get(index) {
+            Some(entry) if entry.now == now && agree(&entry.body, &decided, TOLERANCE_DERIVED) => return,
+            Some(entry) => entry.body.clone(),
+            // The recording broke off before this decision.
+            None if !self.is_finished => return,
+            None => Value::Null,
+        };
+        let is_blessed = self
+            .blessings
+            .iter()
+            .any(|blessing| blessing.decision == index && agree(&blessing.now, &decided, TOLERANCE_DERIVED));
+        if is_blessed {
+            self.report.blessed += 1;
+        } else {
+            self.differ(now, after_sample, "decision", Some(index), recorded, decided);
+        }
+    }
+
+    fn finish(&mut self) {
+        let decided = self.report.decisions;
+        if let (true, Some(entry)) = (self.report.is_same_engine, self.recorded.get(decided)) {
+            let (now, after_sample, body) = (entry.now, entry.after_sample, entry.body.clone());
+            self.differ(now, after_sample, "decision", Some(decided), body, Value::Null);
+        }
+    }
+
+    fn differ(
+        &mut self,
+        at: Nanos,
+        after_sample: u64,
+        what: &str,
+        decision: Option<usize>,
+        recorded: Value,
+        now: Value,
+    ) {
+        self.report.first_difference.get_or_insert(Difference {
+            at_s: at.seconds().0,
+            after_sample,
+            what: what.into(),
+            decision,
+            recorded,
+            now,
+        });
+    }
+}
+
+/// Whether two JSON values are equal, numbers within a relative (above 1) or absolute tolerance.
+fn agree(a: &Value, b: &Value, tolerance: f64) -> bool {
+    match (a, b) {
+        (Value::Number(x), Value::Number(y)) => match (x.as_f64(), y.as_f64()) {
+            _ if x == y => true,
+            (Some(x), Some(y)) => (x - y).abs() <= tolerance * x.abs().max(y.abs()).max(1.0),
+            _ => false,
+        },
+        (Value::Array(x), Value::Array(y)) => {
+            x.len() == y.len() && x.iter().zip(y).all(|(x, y)| agree(x, y, tolerance))
+        }
+        (Value::Object(x), Value::Object(y)) => {
+            x.len() == y.len()
+                && x.iter().all(|(key, x)| y.get(key).is_some_and(|y| agree(x, y, tolerance)))
+        }
+        _ => a == b,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::agree;
+    use serde_json::json;
+
+    #[test]
+    fn numbers_agree_within_tolerance_and_words_exactly() {
+        let check = |a, b| agree(&a, &b, 1e-9);
+        assert!(check(json!({"x": 6.4, "n": [1, 2]}), json!({"x": 6.4 + 1e-12, "n": [1, 2]})));
+        assert!(!check(json!({"x": 6.4}), json!({"x": 6.4 + 1e-6})));
+        assert!(!check(json!({"x": 1}), json!({"y": 1})));
+        assert!(!check(json!("stop"), json!("halt")));
+    }
+}

@@ -1,0 +1,344 @@
+//! One run in progress: the engine's state with its log, its live fit and its plot history.
+
+use super::snapshot::{LogLine, RunView};
+use super::start::AfterStop;
+use crate::engine::{self, Config, Effect, Input, Operator, Outcome, Record, State};
+use crate::preview::Preview;
+use palpate_model::Nanos;
+use palpate_model::fit::LiveFit;
+use palpate_model::rig::{Fault, Phase, Reading, RigCommand};
+use palpate_model::signal::LiveTrace;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_sessions::log::SessionWriter;
+use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
+use std::collections::{BTreeMap, VecDeque};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Samples between two answers of the live fit: half a second at 1 kHz.
+pub(crate) const LIVE_FIT_EVERY: u64 = 500;
+
+/// Buckets of the live plots: two points a bucket, two buckets a pixel on a wide screen.
+const TRACE_BUCKETS: usize = 2048;
+
+pub(super) struct ActiveRun {
+    /// `None` only while `engine::step` has it.
+    engine: Option<State>,
+    preview: Preview,
+    writer: Option<SessionWriter>,
+    folder: PathBuf,
+    origin: Nanos,
+    after_stop: AfterStop,
+    now: Nanos,
+    samples: u64,
+    order: u64,
+    live: LiveFeed,
+    trace: Arc<LiveTrace>,
+    force_peak: Option<Newtons>,
+    events: VecDeque<LogLine>,
+    phases: Arc<Vec<(f64, Phase)>>,
+    time_use: BTreeMap<&'static str, u64>,
+    is_log_failure_told: bool,
+    outcome: Option<Outcome>,
+    log_error: Option<String>,
+}
+
+impl ActiveRun {
+    pub fn new(
+        config: Config,
+        preview: Preview,
+        writer: SessionWriter,
+        folder: PathBuf,
+        origin: Nanos,
+        after_stop: AfterStop,
+    ) -> Self {
+        let live = LiveFeed::new(&config);
+        Self {
+            engine: Some(State::new(Arc::new(config))),
+            preview,
+            writer: Some(writer),
+            folder,
+            origin,
+            after_stop,
+            now: Nanos::ZERO,
+            samples: 0,
+            order: 0,
+            live,
+            trace: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
+            force_peak: None,
+            events: VecDeque::new(),
+            phases: Arc::new(Vec::new()),
+            time_use: BTreeMap::new(),
+            is_log_failure_told: false,
+            outcome: None,
+            log_error: None,
+        }
+    }
+
+    /// The engine's state, except inside [`Self::feed`].
+    pub fn engine(&self) -> Option<&State> {
+        self.engine.as_ref()
+    }
+
+    /// Whether the run is over and its log closed.
+    pub fn is_over(&self) -> bool {
+        self.outcome.is_some()
+    }
+
+    /// Session time of a time on the rig's clock.
+    pub fn session_time(&self, at: Nanos) -> Nanos {
+        at.since(self.origin)
+    }
+
+    /// Feeds one input to the engine and returns the commands for the rig, stops first.
+    pub fn feed(&mut self, now: Nanos, input: Input) -> Vec<RigCommand> {
+        let mut commands = Vec::new();
+        self.feed_one(now, input, &mut commands);
+        commands.sort_by_key(|command| !command.is_stopping());
+        commands
+    }
+
+    fn feed_one(&mut self, now: Nanos, input: Input, commands: &mut Vec<RigCommand>) {
+        let Some(state) = self.engine.take() else { return };
+        *self.time_use.entry(state.phase().name()).or_default() += now.since(self.now).0;
+        self.now = now;
+        let reading = match &input {
+            Input::Reading(reading) => Some(*reading),
+            other => {
+                self.note_input(now, other);
+                self.log(now, kind_of(other), to_json(other));
+                None
+            }
+        };
+        let (state, effects) = engine::step(state, now, input);
+        if let Some(reading) = reading {
+            self.log_row(now, &reading, &state);
+        }
+        let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
+        self.engine = Some(state);
+        for effect in effects {
+            self.log(now, EntryKind::Decision, to_json(&effect));
+            match effect {
+                Effect::Command(command) => commands.push(command),
+                Effect::Record(record) => self.note_record(now, &record),
+                Effect::Finished(outcome) => self.close(outcome),
+            }
+        }
+        if let Some(estimate) = estimate {
+            self.feed_one(now, Input::LiveFit(estimate), commands);
+        }
+        self.after_feed(now, commands);
+    }
+
+    /// What the runner owes the engine after each input: news of a failed log, and the choice of
+    /// an operator who is not there.
+    fn after_feed(&mut self, now: Nanos, commands: &mut Vec<RigCommand>) {
+        let failure = self.writer.as_ref().and_then(SessionWriter::failure);
+        if let (Some(detail), false) = (failure, self.is_log_failure_told) {
+            self.is_log_failure_told = true;
+            self.feed_one(now, Input::Fault(Fault::LogFailed { detail }), commands);
+        }
+        let is_holding = self.engine.as_ref().is_some_and(|state| state.holding().is_some());
+        if is_holding && self.after_stop == AfterStop::Close {
+            self.feed_one(now, Input::Operator { choice: Operator::Close }, commands);
+        }
+    }
+
+    fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
+        let derived = state.derived();
+        self.samples += 1;
+        if let Some(force) = derived.force {
+            if self.force_peak.is_none_or(|peak| force > peak) {
+                self.force_peak = Some(force);
+            }
+            let depth = derived.depth.unwrap_or(Depth(f64::NAN));
+            Arc::make_mut(&mut self.trace).push(now.seconds(), depth, force);
+        }
+        let row = Row {
+            tick: reading.tick,
+            host: now,
+            counts: reading.counts,
+            volts: reading.volts.0,
+            pulses: reading.pulses,
+            status: reading.status.0,
+            force: derived.force.map(|force| force.0),
+            depth: derived.depth.map(|depth| depth.0),
+            phase: state.phase(),
+            cycle: state.cycle(),
+        };
+        if let Some(writer) = &mut self.writer {
+            writer.push_row(row);
+        }
+    }
+
+    fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
+        let entry = Entry { kind, order: self.order, after_sample: self.samples, now, body };
+        self.order += 1;
+        if let Some(writer) = &mut self.writer {
+            writer.push_entry(entry);
+        }
+    }
+
+    fn note_input(&mut self, now: Nanos, input: &Input) {
+        match input {
+            Input::Operator { choice } => {
+                let text = format!("operator: {choice:?}").to_lowercase();
+                self.note(LogLine { at: now, text, is_alarm: false });
+            }
+            Input::Fault(fault) => {
+                self.note(LogLine { at: now, text: fault.to_string(), is_alarm: true });
+            }
+            _ => {}
+        }
+    }
+
+    fn note_record(&mut self, now: Nanos, record: &Record) {
+        if let Record::PhaseStarted { phase, .. } = record {
+            Arc::make_mut(&mut self.phases).push((now.seconds().0, *phase));
+        }
+        let is_alarm = matches!(record, Record::InterlockTripped { .. } | Record::EndingStarted { .. });
+        self.note(LogLine { at: now, text: record.to_string(), is_alarm });
+    }
+
+    fn note(&mut self, line: LogLine) {
+        if self.events.len() == RunView::EVENTS_MAX {
+            self.events.pop_front();
+        }
+        self.events.push_back(line);
+    }
+
+    fn close(&mut self, outcome: Outcome) {
+        self.note(LogLine {
+            at: self.now,
+            text: format!("{}: {}", outcome.ending, outcome.reason),
+            is_alarm: outcome.ending != engine::EndingKind::Finish,
+        });
+        let end = EndRecord {
+            outcome: outcome.ending.name().into(),
+            reason: outcome.reason.clone(),
+            samples: self.samples,
+            entries: self.order,
+            ended_at: self.now,
+            time_use: self
+                .time_use
+                .iter()
+                .map(|(phase, nanos)| ((*phase).to_string(), Nanos(*nanos).seconds().0))
+                .collect(),
+        };
+        if let Some(writer) = self.writer.take()
+            && let Err(err) = writer.close(end)
+        {
+            self.log_error = Some(err.to_string());
+        }
+        self.outcome = Some(outcome);
+    }
+
+    /// The run as the world may see it.
+    pub fn view(&self) -> Option<RunView> {
+        let state = self.engine.as_ref()?;
+        let (step_index, step_started) = state.step_progress();
+        let (time_left, fraction) = self.progress(step_index, step_started);
+        Some(RunView {
+            plan_name: state.config().plan.name.clone(),
+            folder: self.folder.clone(),
+            phase: state.phase(),
+            power: state.power(),
+            steps: Arc::new(self.preview.steps.clone()),
+            step_index,
+            now: self.now,
+            time_left,
+            fraction,
+            derived: *state.derived(),
+            tare: state.tare(),
+            contact: state.contact(),
+            force_peak: self.force_peak,
+            live: state.live().cloned(),
+            trace: Arc::clone(&self.trace),
+            phases: Arc::clone(&self.phases),
+            samples: self.samples,
+            saved_through: self.writer.as_ref().map_or(self.now, SessionWriter::saved_through),
+            is_motion_possible: state.is_motion_possible(),
+            holding: state.holding().cloned(),
+            can_retract: state.can_retract().map_err(String::from),
+            outcome: self.outcome.clone(),
+            log_error: self.log_error.clone(),
+            events: Arc::new(self.events.iter().cloned().collect()),
+        })
+    }
+
+    /// Expected time left and share done, from the preview and the step in progress.
+    fn progress(&self, step_index: usize, step_started: Nanos) -> (Seconds, f64) {
+        if self.outcome.is_some() {
+            return (Seconds(0.0), 1.0);
+        }
+        let spent = self.now.since(step_started).seconds().0;
+        let left: f64 = self
+            .preview
+            .steps
+            .iter()
+            .enumerate()
+            .skip(step_index)
+            .map(|(i, step)| {
+                if i == step_index { (step.expected.0 - spent).max(0.0) } else { step.expected.0 }
+            })
+            .sum();
+        let done = self.now.seconds().0;
+        (Seconds(left), done / (done + left).max(1e-9))
+    }
+}
+
+fn kind_of(input: &Input) -> EntryKind {
+    if matches!(input, Input::LiveFit(_)) { EntryKind::Fit } else { EntryKind::Input }
+}
+
+/// The on-disk form of an input or effect. The types have no map keys but strings and reject
+/// non-finite numbers before they get here, so this cannot fail; if it ever does, the log says so.
+pub(crate) fn to_json<T: serde::Serialize>(value: &T) -> serde_json::Value {
+    serde_json::to_value(value).unwrap_or_else(|err| serde_json::json!({ "unwritable": err.to_string() }))
+}
+
+/// Feeds ramp and hold to the live fit and says when it has a new answer.
+pub(crate) struct LiveFeed {
+    fit: LiveFit,
+    first_tick: Option<u64>,
+    tick_secs: f64,
+    samples: u64,
+}
+
+impl LiveFeed {
+    pub fn new(config: &Config) -> Self {
+        Self {
+            fit: LiveFit::new(deepest(config)),
+            first_tick: None,
+            tick_secs: config.rig.tick().0,
+            samples: 0,
+        }
+    }
+
+    /// Takes a sample after the engine did; every [`LIVE_FIT_EVERY`] samples there is an answer.
+    pub fn push(
+        &mut self,
+        reading: &Reading,
+        state: &State,
+    ) -> Option<palpate_model::fit::LiveEstimate> {
+        let derived = state.derived();
+        if !matches!(state.phase(), Phase::Ramp | Phase::Hold) {
+            return None;
+        }
+        let (depth, force, sigma) = (derived.depth?, derived.force?, derived.force_sigma?);
+        let first_tick = *self.first_tick.get_or_insert(reading.tick);
+        let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
+        self.fit.push(t, depth, force, sigma);
+        self.samples += 1;
+        if self.samples.is_multiple_of(LIVE_FIT_EVERY) { self.fit.estimate() } else { None }
+    }
+}
+
+/// The deepest point of the plan: the scale of the fit's basis.
+fn deepest(config: &Config) -> Depth {
+    let deepest = config.plan.steps.iter().fold(0.0f64, |deepest, step| match step {
+        crate::plans::Step::Ramp { depth, .. } => deepest.max(depth.0),
+        _ => deepest,
+    });
+    Depth(if deepest > 0.0 { deepest } else { 1.0 })
+}

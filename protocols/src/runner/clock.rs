@@ -1,0 +1,120 @@
+//! The only place that reads a clock: pacing of virtual time against the wall.
+#![expect(clippy::disallowed_methods, reason = "this file is the clock")]
+
+use palpate_model::Nanos;
+use std::fmt;
+use std::str::FromStr;
+use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
+use std::time::{Duration, Instant};
+
+/// How fast simulated time runs against the wall.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TimeScale {
+    /// This many session seconds per second.
+    Factor(f64),
+    /// As fast as the computer can.
+    Max,
+}
+
+impl FromStr for TimeScale {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        if text == "max" {
+            return Ok(Self::Max);
+        }
+        match text.parse::<f64>() {
+            // Below a thousandth nothing seems to happen; above a million use `max`.
+            Ok(factor) if (1e-3..=1e6).contains(&factor) => Ok(Self::Factor(factor)),
+            _ => Err(format!("'{text}' is not a time scale; give a number from 0.001 to 1000000, or max")),
+        }
+    }
+}
+
+impl fmt::Display for TimeScale {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Factor(factor) => write!(f, "{factor}"),
+            Self::Max => f.write_str("max"),
+        }
+    }
+}
+
+/// What ended a wait.
+pub(super) enum Wake<T> {
+    /// The time came.
+    Time,
+    /// A request came; session time has reached this.
+    Request(T, Nanos),
+    /// Nobody can send requests any more.
+    Disconnected,
+}
+
+/// Maps session time to wall time and sleeps the difference.
+pub(super) struct Pacer {
+    scale: TimeScale,
+    wall_anchor: Instant,
+    time_anchor: Nanos,
+}
+
+impl Pacer {
+    pub fn new(scale: TimeScale, now: Nanos) -> Self {
+        Self { scale, wall_anchor: Instant::now(), time_anchor: now }
+    }
+
+    /// Waits until session time `at`, or until a request arrives.
+    pub fn wait<T>(&mut self, at: Nanos, requests: &Receiver<T>) -> Wake<T> {
+        let TimeScale::Factor(factor) = self.scale else {
+            return match requests.try_recv() {
+                Ok(request) => Wake::Request(request, at),
+                Err(TryRecvError::Empty) => Wake::Time,
+                Err(TryRecvError::Disconnected) => Wake::Disconnected,
+            };
+        };
+        let due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
+        let elapsed = self.wall_anchor.elapsed();
+        let left = due.saturating_sub(elapsed);
+        // A suspended computer or a debugger leaves virtual time behind: do not race to catch up.
+        if elapsed > due + Duration::from_millis(250) {
+            *self = Self::new(self.scale, at);
+        }
+        match requests.recv_timeout(left) {
+            Ok(request) => Wake::Request(request, self.now().min(at)),
+            Err(RecvTimeoutError::Timeout) => Wake::Time,
+            Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
+        }
+    }
+
+    /// Session time that corresponds to the wall now.
+    fn now(&self) -> Nanos {
+        let TimeScale::Factor(factor) = self.scale else { return self.time_anchor };
+        let passed = self.wall_anchor.elapsed().as_nanos() as f64 * factor;
+        self.time_anchor + Nanos(passed as u64)
+    }
+}
+
+/// Lets something happen at most once per interval of wall time.
+pub(super) struct Throttle {
+    interval: Duration,
+    last: Option<Instant>,
+}
+
+impl Throttle {
+    pub fn new(interval: Duration) -> Self {
+        Self { interval, last: None }
+    }
+
+    pub fn is_due(&mut self) -> bool {
+        let now = Instant::now();
+        let is_due = self.last.is_none_or(|last| now - last >= self.interval);
+        if is_due {
+            self.last = Some(now);
+        }
+        is_due
+    }
+}
+
+/// The wall clock, for the manifest.
+pub(super) fn wall_now() -> std::time::SystemTime {
+    std::time::SystemTime::now()
+}

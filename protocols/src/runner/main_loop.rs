@@ -1,0 +1,316 @@
+//! The only loop: wait for time or a request, collect what the rig reports, let the engine
+//! decide, act, publish.
+
+use super::active_run::ActiveRun;
+use super::clock::{Pacer, Throttle, TimeScale, Wake};
+use super::snapshot::{RigView, Snapshot};
+use super::start::{Bench, RunRequest, StartError, start};
+use crate::engine::{Input, Operator};
+use arc_swap::ArcSwap;
+use palpate_drivers::{Rig, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Grid of the watchdog: silence is judged this often in session time.
+const TICK: Nanos = Nanos::from_millis(10);
+
+/// How far time runs between looks at the requests, at full pace.
+const STRIDE_MAX: Nanos = Nanos::from_millis(100);
+
+/// Snapshots per second of wall time: 30.
+const PUBLISH_EVERY: Duration = Duration::from_millis(33);
+
+/// Requests that may wait. An operator cannot press faster than the loop turns.
+const REQUESTS_MAX: usize = 64;
+
+/// What the runner can be asked.
+pub enum Request {
+    /// Start a run; the reply says whether it started.
+    Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
+    /// The operator's choice for the run in progress. A stop without a run stops the axis.
+    Operator(Operator),
+    /// Stop motion and end the thread.
+    Shutdown,
+}
+
+/// The runner's thread and the two ways to talk with it: requests in, snapshots out.
+pub struct Runner {
+    requests: SyncSender<Request>,
+    snapshot: Arc<ArcSwap<Snapshot>>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Runner {
+    /// Takes a rig and starts the runner's thread. `wake` is called after each snapshot.
+    pub fn start(
+        rig: Box<dyn Rig>,
+        scale: TimeScale,
+        wake: impl Fn() + Send + 'static,
+    ) -> std::io::Result<Self> {
+        let (requests, receiver) = sync_channel(REQUESTS_MAX);
+        let main_loop = MainLoop::new(rig, scale);
+        let snapshot = Arc::new(ArcSwap::from_pointee(main_loop.snapshot(0)));
+        let shared = Arc::clone(&snapshot);
+        let thread = std::thread::Builder::new()
+            .name("runner".into())
+            .spawn(move || main_loop.run(&receiver, &shared, &wake))?;
+        Ok(Self { requests, snapshot, thread: Some(thread) })
+    }
+
+    /// Asks for something. Fails only when the runner has ended or is swamped.
+    pub fn request(&self, request: Request) -> Result<(), String> {
+        self.requests
+            .try_send(request)
+            .map_err(|_| "the runner does not answer; close palpate and check the rig".to_string())
+    }
+
+    /// Starts a run and waits for the runner's word.
+    pub fn run(&self, request: RunRequest) -> Result<(), StartError> {
+        let (reply, answer) = sync_channel(1);
+        self.request(Request::Run(Box::new(request), reply)).map_err(StartError::Failed)?;
+        answer.recv().unwrap_or_else(|_| Err(StartError::Failed("the runner ended".into())))
+    }
+
+    /// Passes on the operator's choice.
+    pub fn operator(&self, choice: Operator) -> Result<(), String> {
+        self.request(Request::Operator(choice))
+    }
+
+    /// The newest snapshot.
+    #[must_use]
+    pub fn snapshot(&self) -> Arc<Snapshot> {
+        self.snapshot.load_full()
+    }
+}
+
+impl Drop for Runner {
+    fn drop(&mut self) {
+        // The thread ends on the request or, if the queue is full, on the closed channel.
+        let _ = self.requests.try_send(Request::Shutdown);
+        let (closed, _) = sync_channel(1);
+        self.requests = closed;
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+struct MainLoop {
+    rig: Box<dyn Rig>,
+    description: Arc<RigDescription>,
+    scale: TimeScale,
+    now: Nanos,
+    next_tick: Nanos,
+    is_sample_seen: bool,
+    reading: Option<Reading>,
+    is_homed: bool,
+    link_error: Option<String>,
+    run: Option<ActiveRun>,
+    refusal: Option<String>,
+}
+
+impl MainLoop {
+    fn new(rig: Box<dyn Rig>, scale: TimeScale) -> Self {
+        Self {
+            description: Arc::new(rig.description().clone()),
+            rig,
+            scale,
+            now: Nanos::ZERO,
+            next_tick: TICK,
+            is_sample_seen: false,
+            reading: None,
+            is_homed: false,
+            link_error: None,
+            run: None,
+            refusal: None,
+        }
+    }
+
+    fn run(
+        mut self,
+        requests: &Receiver<Request>,
+        shared: &ArcSwap<Snapshot>,
+        wake: &impl Fn(),
+    ) {
+        let mut publish = Throttle::new(PUBLISH_EVERY);
+        let mut sequence = 0;
+        let mut pacer = Pacer::new(self.pace(), self.now);
+        loop {
+            let was_running = self.is_running();
+            let target = self.now + self.stride();
+            let is_ending = match pacer.wait(target, requests) {
+                Wake::Time => {
+                    self.advance(target);
+                    false
+                }
+                Wake::Request(request, at) => {
+                    // At full pace a request is served between strides, without moving time.
+                    self.advance(if self.pace() == TimeScale::Max { self.now } else { at });
+                    self.serve(request)
+                }
+                Wake::Disconnected => true,
+            };
+            if is_ending {
+                self.shut_down();
+            }
+            if self.is_running() != was_running {
+                pacer = Pacer::new(self.pace(), self.now);
+            }
+            if publish.is_due() || is_ending || self.is_running() != was_running {
+                sequence += 1;
+                shared.store(Arc::new(self.snapshot(sequence)));
+                wake();
+            }
+            if is_ending {
+                return;
+            }
+        }
+    }
+
+    fn is_running(&self) -> bool {
+        self.run.as_ref().is_some_and(|run| !run.is_over())
+    }
+
+    /// Time between runs passes as on the wall, at any pace.
+    fn pace(&self) -> TimeScale {
+        if self.is_running() { self.scale } else { TimeScale::Factor(1.0) }
+    }
+
+    fn stride(&self) -> Nanos {
+        match self.pace() {
+            TimeScale::Max => STRIDE_MAX,
+            TimeScale::Factor(factor) => {
+                Nanos(((TICK.0 as f64 * factor) as u64).clamp(1_000_000, STRIDE_MAX.0))
+            }
+        }
+    }
+
+    /// Lets time pass until `until`, feeding every event in order and a tick where none came.
+    fn advance(&mut self, until: Nanos) {
+        while self.now < until {
+            let limit = self.next_tick.min(until);
+            while let Some(event) = self.rig.next_event(limit) {
+                self.now = event.at;
+                self.on_event(event.body);
+            }
+            self.now = limit;
+            if limit == self.next_tick {
+                self.next_tick = limit + TICK;
+                if !std::mem::take(&mut self.is_sample_seen) {
+                    self.feed(Input::Tick);
+                }
+            }
+        }
+    }
+
+    fn on_event(&mut self, body: RigEventBody) {
+        match body {
+            RigEventBody::Reading(reading) => {
+                self.is_sample_seen = true;
+                self.reading = Some(reading);
+                self.feed(Input::Reading(reading));
+            }
+            RigEventBody::Ack(ack) => self.feed(Input::Ack(ack)),
+            RigEventBody::Fault(fault) => {
+                if matches!(fault, Fault::LinkLost { .. } | Fault::ControllerReset) {
+                    self.is_homed = false;
+                }
+                if let Fault::LinkLost { detail } = &fault {
+                    self.link_error = Some(detail.clone());
+                }
+                self.feed(Input::Fault(fault));
+            }
+        }
+    }
+
+    /// One input to the run in progress, if there is one, and its commands to the rig.
+    fn feed(&mut self, input: Input) {
+        let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else { return };
+        let now = run.session_time(self.now);
+        for command in run.feed(now, input) {
+            self.rig.send(command);
+        }
+        if let Some(state) = run.engine() {
+            self.is_homed = state.is_homed();
+        }
+    }
+
+    /// Serves one request; true ends the thread.
+    fn serve(&mut self, request: Request) -> bool {
+        match request {
+            Request::Run(request, reply) => {
+                let answer = self.start_run(&request);
+                self.refusal = answer.as_ref().err().map(ToString::to_string);
+                // Nobody may be waiting any more; the snapshot says the same.
+                let _ = reply.try_send(answer);
+            }
+            Request::Operator(choice) => {
+                if self.is_running() {
+                    self.feed(Input::Operator { choice });
+                } else if matches!(choice, Operator::Stop | Operator::Abort) {
+                    self.rig.send(RigCommand::Stop);
+                } else if choice == Operator::Halt {
+                    self.rig.send(RigCommand::Halt);
+                    self.is_homed = false;
+                }
+            }
+            Request::Shutdown => return true,
+        }
+        false
+    }
+
+    fn start_run(&mut self, request: &RunRequest) -> Result<(), StartError> {
+        if self.is_running() {
+            return Err(StartError::Refused("a run is in progress; stop it first".into()));
+        }
+        let bench = Bench {
+            rig: &self.description,
+            is_virtual: self.rig.is_virtual(),
+            is_homed: self.is_homed,
+            origin: self.now,
+        };
+        self.run = Some(start(request, &bench)?);
+        self.feed(Input::Operator { choice: Operator::Start });
+        Ok(())
+    }
+
+    /// Stops whatever moves, waits until it rests and closes the session.
+    fn shut_down(&mut self) {
+        if self.is_running() {
+            self.feed(Input::Operator { choice: Operator::Stop });
+            // Braking ends within its own time limit, a little over two seconds.
+            let give_up = self.now + Nanos::from_millis(3_000);
+            while self.is_running() && self.now < give_up {
+                self.advance(self.now + TICK);
+                let is_holding = self
+                    .run
+                    .as_ref()
+                    .and_then(ActiveRun::engine)
+                    .is_some_and(|state| state.holding().is_some());
+                if is_holding {
+                    self.feed(Input::Operator { choice: Operator::Close });
+                }
+            }
+        } else if self.reading.is_some_and(|reading| reading.status.has(AxisStatus::MOVING)) {
+            self.rig.send(RigCommand::Stop);
+        }
+    }
+
+    fn snapshot(&self, sequence: u64) -> Snapshot {
+        Snapshot {
+            rig: RigView {
+                description: Arc::clone(&self.description),
+                reading: self.reading,
+                is_homed: self.is_homed,
+                link_error: self.link_error.clone(),
+            },
+            run: self.run.as_ref().and_then(ActiveRun::view),
+            refusal: self.refusal.clone(),
+            sequence,
+        }
+    }
+}

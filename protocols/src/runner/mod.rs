@@ -1,0 +1,17 @@
+//! The runner: the only place where decisions meet hardware, disk and clock.
+//!
+//! One named thread owns the rig. It feeds what the rig reports to the engine, does what the
+//! engine asks (stop commands first), writes the session log and publishes snapshots. It contains
+//! no experiment logic.
+
+mod active_run;
+mod clock;
+mod main_loop;
+mod snapshot;
+mod start;
+
+pub(crate) use active_run::{LiveFeed, to_json};
+pub use clock::TimeScale;
+pub use main_loop::{Request, Runner};
+pub use snapshot::{LogLine, RigView, RunView, Snapshot};
+pub use start::{AfterStop, Labels, RunRequest, StartError};

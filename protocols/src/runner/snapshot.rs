@@ -1,0 +1,106 @@
+//! What the runner shows the world: one immutable value, swapped as a whole.
+
+use crate::engine::{Contact, Derived, Outcome, Power, Tare};
+use crate::preview::StepPreview;
+use palpate_model::Nanos;
+use palpate_model::fit::LiveEstimate;
+use palpate_model::rig::{Phase, Reading, RigDescription};
+use palpate_model::signal::LiveTrace;
+use palpate_model::units::{Newtons, Seconds};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Everything a window or a progress bar may draw.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// The rig and its newest sample.
+    pub rig: RigView,
+    /// The run in progress or the last one; `None` before the first.
+    pub run: Option<RunView>,
+    /// Why the last request to run was refused, until the next request.
+    pub refusal: Option<String>,
+    /// Counts published snapshots.
+    pub sequence: u64,
+}
+
+/// The rig as it is now.
+#[derive(Clone, Debug)]
+pub struct RigView {
+    /// What it is.
+    pub description: Arc<RigDescription>,
+    /// Newest sample, if any arrived.
+    pub reading: Option<Reading>,
+    /// Whether position zero is known.
+    pub is_homed: bool,
+    /// Why the link is down, if it is.
+    pub link_error: Option<String>,
+}
+
+/// A run as it stands.
+#[derive(Clone, Debug)]
+pub struct RunView {
+    /// Name of the plan.
+    pub plan_name: String,
+    /// Session folder.
+    pub folder: PathBuf,
+    /// What it is doing.
+    pub phase: Phase,
+    /// Whether motion is possible.
+    pub power: Power,
+    /// Every step with its expected duration.
+    pub steps: Arc<Vec<StepPreview>>,
+    /// Index of the step in progress.
+    pub step_index: usize,
+    /// Session time of the newest input.
+    pub now: Nanos,
+    /// Expected time left.
+    pub time_left: Seconds,
+    /// Share done, 0 to 1.
+    pub fraction: f64,
+    /// Newest derived values.
+    pub derived: Derived,
+    /// The unloaded signal.
+    pub tare: Option<Tare>,
+    /// Where the tissue begins.
+    pub contact: Option<Contact>,
+    /// Highest force so far.
+    pub force_peak: Option<Newtons>,
+    /// Newest live fit.
+    pub live: Option<LiveEstimate>,
+    /// Bounded history for plots.
+    pub trace: Arc<LiveTrace>,
+    /// Times at which phases began, in seconds of session time.
+    pub phases: Arc<Vec<(f64, Phase)>>,
+    /// Samples received.
+    pub samples: u64,
+    /// Session time through which everything is on disk.
+    pub saved_through: Nanos,
+    /// Whether the axis may be moving.
+    pub is_motion_possible: bool,
+    /// Set while the run waits for retract or close after a stop.
+    pub holding: Option<Outcome>,
+    /// Whether a retract is possible now, or why not.
+    pub can_retract: Result<(), String>,
+    /// How it ended, once it has and the log is closed.
+    pub outcome: Option<Outcome>,
+    /// What the log said when it could not be closed.
+    pub log_error: Option<String>,
+    /// What happened, newest last; the oldest lines fall out past [`RunView::EVENTS_MAX`].
+    pub events: Arc<Vec<LogLine>>,
+}
+
+impl RunView {
+    /// Most lines of the event log kept for the screen. The session log keeps them all.
+    pub const EVENTS_MAX: usize = 500;
+}
+
+/// One line of the event log.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogLine {
+    /// When, in session time.
+    pub at: Nanos,
+    /// What, in words.
+    pub text: String,
+    /// Whether it needs attention.
+    pub is_alarm: bool,
+}

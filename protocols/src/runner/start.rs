@@ -1,0 +1,128 @@
+//! Starting a run: everything that can refuse, before anything moves.
+
+use super::active_run::ActiveRun;
+use super::clock::wall_now;
+use crate::engine::{Config, ENGINE_VERSION};
+use crate::plans::Plan;
+use crate::preview::preview;
+use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{Limits, RigDescription};
+use palpate_sessions::log::{Pace, SessionWriter};
+use palpate_sessions::manifest::{Manifest, RECORD_VERSION, new_session_id};
+use palpate_sessions::folder::{SessionFolder, check_free_space, library_folder, new_session_folder};
+use serde::{Deserialize, Serialize};
+use std::path::PathBuf;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Who and what a session is about.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Labels {
+    /// Who ran it.
+    pub operator: String,
+    /// What was indented.
+    pub specimen: String,
+    /// With what.
+    pub indenter: String,
+}
+
+/// What happens when a run stopped before its plan was complete.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AfterStop {
+    /// Nobody watches: close the session where the probe stands.
+    Close,
+    /// Wait for the operator to retract or close.
+    Wait,
+}
+
+/// A run somebody wants.
+#[derive(Clone, Debug)]
+pub struct RunRequest {
+    /// What to do.
+    pub plan: Plan,
+    /// Volts to newtons.
+    pub calibration: Calibration,
+    /// Interlock thresholds.
+    pub limits: Limits,
+    /// Session folder; a new one in the library if none.
+    pub out: Option<PathBuf>,
+    /// Who and what.
+    pub labels: Labels,
+    /// Whether the operator acknowledged what the preview asks to acknowledge.
+    pub is_acknowledged: bool,
+    /// What follows a stop.
+    pub after_stop: AfterStop,
+}
+
+/// A run did not start.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum StartError {
+    /// What was asked cannot be done; nothing was touched.
+    #[error("{0}")]
+    Refused(String),
+    /// It should have worked and did not.
+    #[error("{0}")]
+    Failed(String),
+}
+
+/// What the runner knows about the rig when a run is asked for.
+pub(super) struct Bench<'a> {
+    pub rig: &'a Arc<RigDescription>,
+    pub is_virtual: bool,
+    pub is_homed: bool,
+    /// The rig's clock now: session time zero.
+    pub origin: Nanos,
+}
+
+/// Checks a request and opens its session.
+pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun, StartError> {
+    let refused = |reason: String| StartError::Refused(reason);
+    let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
+    let preview = preview(&request.plan, bench.rig, &request.limits, &curve, bench.is_homed);
+    preview.verdict(request.is_acknowledged).map_err(refused)?;
+
+    let started_at = wall_now();
+    let session_id = new_session_id(started_at);
+    let path = match &request.out {
+        Some(path) => path.clone(),
+        None => {
+            let library = library_folder().map_err(|err| refused(err.to_string()))?;
+            new_session_folder(&library, &session_id)
+        }
+    };
+    let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
+    check_free_space(folder.path(), preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
+
+    let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
+        value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
+    };
+    let acknowledgements = if request.is_acknowledged { preview.acknowledgements.clone() } else { Vec::new() };
+    let manifest = Manifest {
+        record_version: RECORD_VERSION,
+        session_id,
+        software_version: env!("CARGO_PKG_VERSION").into(),
+        engine_version: ENGINE_VERSION,
+        started_at: palpate_sessions::manifest::rfc3339(started_at),
+        operator: request.labels.operator.clone(),
+        specimen: request.labels.specimen.clone(),
+        indenter: request.labels.indenter.clone(),
+        rig: bench.rig.as_ref().clone(),
+        limits: request.limits,
+        calibration: json("calibration", serde_json::to_value(&request.calibration))?,
+        plan: json("plan", serde_json::to_value(&request.plan))?,
+        settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
+        acknowledgements,
+    };
+    let pace = if bench.is_virtual { Pace::Virtual } else { Pace::Real };
+    let writer = SessionWriter::start(folder, manifest, pace)
+        .map_err(|err| StartError::Failed(err.to_string()))?;
+    let config = Config {
+        rig: bench.rig.as_ref().clone(),
+        limits: request.limits,
+        curve,
+        plan: request.plan.clone(),
+        is_homed: bench.is_homed,
+    };
+    Ok(ActiveRun::new(config, preview, writer, path, bench.origin, request.after_stop))
+}
