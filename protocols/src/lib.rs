@@ -5,6 +5,7 @@
 //! same engine. Nothing here draws, and nothing in [`engine`] or [`plans`] does any I/O.
 //! Start reading at [`engine::step`].
 
+pub mod analysis;
 pub mod engine;
 pub mod plans;
 pub mod preview;

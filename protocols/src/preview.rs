@@ -74,15 +74,26 @@ pub fn preview(
     curve: &Curve,
     is_homed: bool,
 ) -> Preview {
-    let mut walk = Walk { rig, limits, refusals: Vec::new(), depth_now: 0.0, is_homed };
+    let mut walk = Walk {
+        rig,
+        limits,
+        refusals: Vec::new(),
+        depth_now: 0.0,
+        is_homed,
+    };
     let steps: Vec<StepPreview> = plan.steps.iter().map(|step| walk.step(step)).collect();
     let mut refusals = walk.refusals;
     if plan.steps.is_empty() {
         refusals.push("the plan has no steps".into());
     }
-    let total = |of: fn(&StepPreview) -> Seconds| Seconds(steps.iter().map(|step| of(step).0).sum());
+    let total =
+        |of: fn(&StepPreview) -> Seconds| Seconds(steps.iter().map(|step| of(step).0).sum());
     let (expected, longest) = (total(|step| step.expected), total(|step| step.longest));
-    let force_band = if refusals.is_empty() { force_band(plan) } else { [Newtons(0.0); 2] };
+    let force_band = if refusals.is_empty() {
+        force_band(plan)
+    } else {
+        [Newtons(0.0); 2]
+    };
     let (_, calibrated_max) = curve.force_range();
     let mut acknowledgements = Vec::new();
     if force_band[1] > calibrated_max {
@@ -136,7 +147,10 @@ impl Walk<'_> {
                 if self.is_homed {
                     (0.0, 0.0)
                 } else {
-                    (self.move_secs(0.1 * travel, speed) + touch, self.move_secs(travel, speed) + touch)
+                    (
+                        self.move_secs(0.1 * travel, speed) + touch,
+                        self.move_secs(travel, speed) + touch,
+                    )
                 }
             }
             Step::FindContact(search) => self.contact(phase, &search),
@@ -148,7 +162,10 @@ impl Walk<'_> {
                 let secs = self.move_secs(distance, speed);
                 (secs, secs)
             }
-            Step::Retract { speed, clearance_mm } => {
+            Step::Retract {
+                speed,
+                clearance_mm,
+            } => {
                 self.check_speed(phase, speed);
                 let secs = self.move_secs(self.depth_now + clearance_mm, speed);
                 self.depth_now = -clearance_mm;
@@ -160,7 +177,11 @@ impl Walk<'_> {
                 (secs, secs)
             }
         };
-        StepPreview { phase, expected: Seconds(expected), longest: Seconds(longest) }
+        StepPreview {
+            phase,
+            expected: Seconds(expected),
+            longest: Seconds(longest),
+        }
     }
 
     fn contact(&mut self, phase: Phase, search: &FindContact) -> (f64, f64) {
@@ -172,14 +193,24 @@ impl Walk<'_> {
         let slow = self.move_secs(search.retreat_mm + 1.0, search.pass_speed)
             + self.move_secs(1.0, search.pass_speed);
         let moves = 2.0 * approach(search.retreat_mm) + slow + rest;
-        (approach(CONTACT_EXPECTED_SHARE * travel) + moves, approach(travel) + moves)
+        (
+            approach(CONTACT_EXPECTED_SHARE * travel) + moves,
+            approach(travel) + moves,
+        )
     }
 
     fn move_secs(&self, distance_mm: f64, speed: MmPerS) -> f64 {
         if !(distance_mm.is_finite() && speed.0 > 0.0) {
             return 0.0;
         }
-        Profile::to_rest(Position(0.0), Position(distance_mm), speed, self.rig.acceleration).duration().0
+        Profile::to_rest(
+            Position(0.0),
+            Position(distance_mm),
+            speed,
+            self.rig.acceleration,
+        )
+        .duration()
+        .0
     }
 
     fn check_speed(&mut self, phase: Phase, speed: MmPerS) {
@@ -191,14 +222,18 @@ impl Walk<'_> {
     fn check_span(&mut self, phase: Phase, span: Seconds) {
         // A day is longer than any specimen lasts and keeps every tick count small.
         if !(span.0 >= 0.0 && span.0 <= 86_400.0) {
-            self.refusals.push(format!("{phase}: a duration of {span} is not possible; give 0 to 86400 s"));
+            self.refusals.push(format!(
+                "{phase}: a duration of {span} is not possible; give 0 to 86400 s"
+            ));
         }
     }
 
     fn check_depth(&mut self, depth: Depth) {
         let travel = self.limits.travel_max;
         if !(depth.0 > 0.0) {
-            self.refusals.push(format!("ramp: a depth of {depth} is not possible; give a depth above 0 mm"));
+            self.refusals.push(format!(
+                "ramp: a depth of {depth} is not possible; give a depth above 0 mm"
+            ));
         } else if depth.0 > travel.0 {
             self.refusals.push(format!(
                 "ramp: a depth of {depth} is beyond the travel of rig {}; it ends at {travel}",
@@ -213,8 +248,17 @@ fn force_band(plan: &Plan) -> [Newtons; 2] {
     let mut body_state = KelvinState::at_rest();
     let (mut depth, mut peak) = (0.0, 0.0f64);
     for step in &plan.steps {
-        let Step::Ramp { speed, depth: target } = *step else { continue };
-        let step_count = ((target.0 - depth) / speed.0 / PREDICTION_STEP.0).abs().ceil().max(1.0) as usize;
+        let Step::Ramp {
+            speed,
+            depth: target,
+        } = *step
+        else {
+            continue;
+        };
+        let step_count = ((target.0 - depth) / speed.0 / PREDICTION_STEP.0)
+            .abs()
+            .ceil()
+            .max(1.0) as usize;
         let dt = Seconds((target.0 - depth).abs() / speed.0 / step_count as f64);
         for i in 1..=step_count {
             let x = depth + (target.0 - depth) * i as f64 / step_count as f64;

@@ -15,6 +15,7 @@ use palpate_sessions::record::{Entry, EntryKind, Row};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::VecDeque;
+use std::path::Path;
 use std::sync::Arc;
 use thiserror::Error;
 
@@ -30,7 +31,9 @@ pub const TOLERANCE_LIVE: f64 = 1e-6;
 #[derive(Debug, Error)]
 pub enum ReplayError {
     /// The manifest's plan or calibration is not what this version knows.
-    #[error("the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it")]
+    #[error(
+        "the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it"
+    )]
     Manifest {
         /// Plan, calibration or settings.
         what: &'static str,
@@ -94,6 +97,24 @@ pub struct ReplayReport {
     pub first_difference: Option<Difference>,
 }
 
+/// The blessings of a session, from `blessed.json` in its folder; none if there is no such file.
+pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
+    let path = folder.join("blessed.json");
+    let Some(text) = palpate_sessions::folder::read_if_present(&path)? else {
+        return Ok(Vec::new());
+    };
+    let blessings: Vec<Blessing> = serde_json::from_str(&text)
+        .map_err(|err| format!("the blessings cannot be understood ({err}): {}", path.display()))?;
+    match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
+        Some(blessing) => Err(format!(
+            "decision {} is blessed without a reason; write it down: {}",
+            blessing.decision,
+            path.display()
+        )),
+        None => Ok(blessings),
+    }
+}
+
 /// Replays a session.
 pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport, ReplayError> {
     let config = Arc::new(config_of(session)?);
@@ -101,7 +122,11 @@ pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport,
     let mut run = Replay {
         live: LiveFeed::new(&config),
         state: Some(State::new(config)),
-        recorded: session.entries.iter().filter(|entry| entry.kind == EntryKind::Decision).collect(),
+        recorded: session
+            .entries
+            .iter()
+            .filter(|entry| entry.kind == EntryKind::Decision)
+            .collect(),
         is_finished: session.end.is_some(),
         expected_live: VecDeque::new(),
         blessings,
@@ -139,7 +164,9 @@ fn config_of(session: &Session) -> Result<Config, ReplayError> {
     Ok(Config {
         rig: manifest.rig.clone(),
         limits: manifest.limits,
-        curve: calibration.curve().map_err(|err| bad("calibration", err.to_string()))?,
+        curve: calibration
+            .curve()
+            .map_err(|err| bad("calibration", err.to_string()))?,
         plan,
         is_homed,
     })
@@ -157,9 +184,16 @@ fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> 
         .iter()
         .filter(|entry| entry.kind != EntryKind::Decision)
         .map(|entry| {
-            let input = serde_json::from_value(entry.body.clone())
-                .map_err(|err| ReplayError::Input { order: entry.order, detail: err.to_string() })?;
-            Ok(RecordedInput { after_sample: entry.after_sample, now: entry.now, input })
+            let input =
+                serde_json::from_value(entry.body.clone()).map_err(|err| ReplayError::Input {
+                    order: entry.order,
+                    detail: err.to_string(),
+                })?;
+            Ok(RecordedInput {
+                after_sample: entry.after_sample,
+                now: entry.now,
+                input,
+            })
         })
         .collect()
 }
@@ -223,19 +257,35 @@ impl Replay<'_> {
                 (None, None) => continue,
                 _ => {}
             }
-            self.differ(row.host, index, what, None, to_json(&recorded), to_json(&now));
+            self.differ(
+                row.host,
+                index,
+                what,
+                None,
+                to_json(&recorded),
+                to_json(&now),
+            );
         }
         // Labels follow decisions: they are the engine's, not arithmetic.
         if self.report.is_same_engine
             && self.report.blessed == 0
             && (row.phase, row.cycle) != (phase, cycle)
         {
-            self.differ(row.host, index, "phase", None, to_json(&row.phase), to_json(&phase));
+            self.differ(
+                row.host,
+                index,
+                "phase",
+                None,
+                to_json(&row.phase),
+                to_json(&phase),
+            );
         }
     }
 
     fn step(&mut self, now: Nanos, after_sample: u64, input: Input) {
-        let Some(state) = self.state.take() else { return };
+        let Some(state) = self.state.take() else {
+            return;
+        };
         let (state, effects) = engine::step(state, now, input);
         self.state = Some(state);
         for effect in effects {
@@ -251,20 +301,28 @@ impl Replay<'_> {
         }
         let decided = to_json(effect);
         let recorded = match self.recorded.get(index) {
-            Some(entry) if entry.now == now && agree(&entry.body, &decided, TOLERANCE_DERIVED) => return,
+            Some(entry) if entry.now == now && agree(&entry.body, &decided, TOLERANCE_DERIVED) => {
+                return;
+            }
             Some(entry) => entry.body.clone(),
             // The recording broke off before this decision.
             None if !self.is_finished => return,
             None => Value::Null,
         };
-        let is_blessed = self
-            .blessings
-            .iter()
-            .any(|blessing| blessing.decision == index && agree(&blessing.now, &decided, TOLERANCE_DERIVED));
+        let is_blessed = self.blessings.iter().any(|blessing| {
+            blessing.decision == index && agree(&blessing.now, &decided, TOLERANCE_DERIVED)
+        });
         if is_blessed {
             self.report.blessed += 1;
         } else {
-            self.differ(now, after_sample, "decision", Some(index), recorded, decided);
+            self.differ(
+                now,
+                after_sample,
+                "decision",
+                Some(index),
+                recorded,
+                decided,
+            );
         }
     }
 
@@ -272,7 +330,14 @@ impl Replay<'_> {
         let decided = self.report.decisions;
         if let (true, Some(entry)) = (self.report.is_same_engine, self.recorded.get(decided)) {
             let (now, after_sample, body) = (entry.now, entry.after_sample, entry.body.clone());
-            self.differ(now, after_sample, "decision", Some(decided), body, Value::Null);
+            self.differ(
+                now,
+                after_sample,
+                "decision",
+                Some(decided),
+                body,
+                Value::Null,
+            );
         }
     }
 
@@ -309,7 +374,8 @@ fn agree(a: &Value, b: &Value, tolerance: f64) -> bool {
         }
         (Value::Object(x), Value::Object(y)) => {
             x.len() == y.len()
-                && x.iter().all(|(key, x)| y.get(key).is_some_and(|y| agree(x, y, tolerance)))
+                && x.iter()
+                    .all(|(key, x)| y.get(key).is_some_and(|y| agree(x, y, tolerance)))
         }
         _ => a == b,
     }
@@ -323,7 +389,10 @@ mod tests {
     #[test]
     fn numbers_agree_within_tolerance_and_words_exactly() {
         let check = |a, b| agree(&a, &b, 1e-9);
-        assert!(check(json!({"x": 6.4, "n": [1, 2]}), json!({"x": 6.4 + 1e-12, "n": [1, 2]})));
+        assert!(check(
+            json!({"x": 6.4, "n": [1, 2]}),
+            json!({"x": 6.4 + 1e-12, "n": [1, 2]})
+        ));
         assert!(!check(json!({"x": 6.4}), json!({"x": 6.4 + 1e-6})));
         assert!(!check(json!({"x": 1}), json!({"y": 1})));
         assert!(!check(json!("stop"), json!("halt")));

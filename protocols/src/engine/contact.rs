@@ -78,7 +78,10 @@ struct Bin {
 
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
-        let tare = cx.state.tare.ok_or("tare the load cell before searching for contact")?;
+        let tare = cx
+            .state
+            .tare
+            .ok_or("tare the load cell before searching for contact")?;
         let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
         let filtered = noise.0 / (FILTER_SAMPLES as f64).sqrt();
         let criterion = Newtons(plan.criterion.0.max(CRITERION_SIGMAS * filtered));
@@ -115,7 +118,9 @@ impl ContactSearch {
         let filtered = Newtons(self.filter.push(force.0));
         let at_rest = cx.at_rest()?;
         if filtered > FORCE_MAX && matches!(self.stage, Stage::Approach | Stage::SlowPass) {
-            return Err(format!("the force reached {filtered:.2} before contact was certain"));
+            return Err(format!(
+                "the force reached {filtered:.2} before contact was certain"
+            ));
         }
         match self.stage.clone() {
             Stage::Approach => {
@@ -125,7 +130,10 @@ impl ContactSearch {
                     cx.stop_move();
                     self.stage = Stage::ApproachBraking;
                 } else if at_rest {
-                    return Err(format!("no tissue before {:.1} mm; check the specimen", position.0));
+                    return Err(format!(
+                        "no tissue before {:.1} mm; check the specimen",
+                        position.0
+                    ));
                 }
             }
             Stage::ApproachBraking if at_rest => {
@@ -183,13 +191,22 @@ impl ContactSearch {
     }
 
     fn is_triggered(&mut self, filtered: Newtons, criterion: Newtons) -> bool {
-        self.above = if filtered >= criterion { self.above + 1 } else { 0 };
+        self.above = if filtered >= criterion {
+            self.above + 1
+        } else {
+            0
+        };
         self.above >= CONSECUTIVE
     }
 
     fn record_trigger(&self, cx: &mut Context<'_>, reading: &Reading, pass: u8, force: Newtons) {
         let position = cx.state.derived.position;
-        cx.record(Record::ContactTriggered { pass, position, volts: reading.volts, force });
+        cx.record(Record::ContactTriggered {
+            pass,
+            position,
+            volts: reading.volts,
+            force,
+        });
     }
 
     /// Averages readings of the slow pass into points for the fit. Only constant speed counts:
@@ -222,7 +239,10 @@ impl ContactSearch {
                 estimate.std_error_mm, self.plan.std_error_mm_max
             ));
         }
-        Ok(Contact { position: estimate.position, std_error_mm: estimate.std_error_mm })
+        Ok(Contact {
+            position: estimate.position,
+            std_error_mm: estimate.std_error_mm,
+        })
     }
 }
 

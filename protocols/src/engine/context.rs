@@ -65,7 +65,11 @@ impl Context<'_> {
         if target_pulses == self.state.pulses && self.state.path.is_at_rest() {
             return Ok(());
         }
-        let command = MoveTo { target_pulses, speed, acceleration: rig.acceleration };
+        let command = MoveTo {
+            target_pulses,
+            speed,
+            acceleration: rig.acceleration,
+        };
         let from = self.state.derived.position;
         let to = palpate_model::rig::command::position_from_pulses(target_pulses, rig.mm_per_pulse);
         let duration = Profile::to_rest(from, to, speed, rig.acceleration).duration();
@@ -88,9 +92,9 @@ impl Context<'_> {
             return Ok(true);
         }
         match self.state.in_flight {
-            Some(flight) if self.now > flight.deadline => {
-                Err("the axis did not finish its move in time; check the motor and its supply".into())
-            }
+            Some(flight) if self.now > flight.deadline => Err(
+                "the axis did not finish its move in time; check the motor and its supply".into(),
+            ),
             _ => Ok(false),
         }
     }

@@ -36,7 +36,11 @@ impl Homing {
         // The axis can be anywhere on its travel, so the search covers all of it and a margin.
         let reach = pulses(cx, cx.state.config.limits.travel_max.0 + 10.0);
         cx.move_to_pulses(cx.state.pulses - reach, speed)?;
-        Ok(Self { speed, touch_speed, stage: Stage::Searching })
+        Ok(Self {
+            speed,
+            touch_speed,
+            stage: Stage::Searching,
+        })
     }
 
     pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
@@ -69,13 +73,17 @@ impl Homing {
             }
             Stage::Touching if is_at_switch => {
                 cx.stop_move();
-                self.stage = Stage::TouchBraking { edge_pulses: reading.pulses };
+                self.stage = Stage::TouchBraking {
+                    edge_pulses: reading.pulses,
+                };
             }
             Stage::Searching | Stage::Touching if at_rest => {
                 return Err("the home switch was not found; check it and its cable".into());
             }
             Stage::TouchBraking { edge_pulses } if at_rest => {
-                cx.command(RigCommand::DefinePosition { pulses: reading.pulses - edge_pulses });
+                cx.command(RigCommand::DefinePosition {
+                    pulses: reading.pulses - edge_pulses,
+                });
                 cx.record(Record::Homed { edge_pulses });
                 self.stage = Stage::Defining;
             }

@@ -167,18 +167,31 @@ impl fmt::Display for Record {
         match self {
             Self::PhaseStarted { phase, .. } => write!(f, "{phase}"),
             Self::Homed { edge_pulses } => {
-                write!(f, "home found at counter {edge_pulses}; position zero set there")
+                write!(
+                    f,
+                    "home found at counter {edge_pulses}; position zero set there"
+                )
             }
             Self::Tared { volts, noise, .. } => {
                 write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)
             }
-            Self::ContactTriggered { pass, position, force, .. } => {
+            Self::ContactTriggered {
+                pass,
+                position,
+                force,
+                ..
+            } => {
                 write!(f, "pass {pass} felt {force:.3} at {position:.3}")
             }
-            Self::ContactFound { position, std_error_mm } => {
+            Self::ContactFound {
+                position,
+                std_error_mm,
+            } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
             }
-            Self::InterlockTripped { interlock, reason } => write!(f, "{interlock} interlock: {reason}"),
+            Self::InterlockTripped { interlock, reason } => {
+                write!(f, "{interlock} interlock: {reason}")
+            }
             Self::EndingStarted { ending, reason } => write!(f, "{ending}: {reason}"),
         }
     }

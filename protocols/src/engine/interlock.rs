@@ -122,7 +122,10 @@ pub(super) fn judge(
     let age = age_trip(state, now);
     state.watch.last_at = Some(now);
     if !reading.volts.is_finite() {
-        return trip(Interlock::Signal, "the load cell's signal is not a number; check its wiring".into());
+        return trip(
+            Interlock::Signal,
+            "the load cell's signal is not a number; check its wiring".into(),
+        );
     }
     let force = state.force_from_volts(reading.volts);
     state.watch.newest = (force, reading.volts);
@@ -139,12 +142,20 @@ pub(super) fn judge(
         .or_else(|| {
             (reading.volts > volts_max).then(|| Trip {
                 interlock: Interlock::Volts,
-                reason: format!("the raw signal is {:.3}, above {volts_max:.2}", reading.volts),
+                reason: format!(
+                    "the raw signal is {:.3}, above {volts_max:.2}",
+                    reading.volts
+                ),
             })
         })
         .or_else(|| rate_trip(rate, limits.force_rate_max))
         .or(age)
-        .or_else(|| path_error.map(|reason| Trip { interlock: Interlock::Path, reason }))
+        .or_else(|| {
+            path_error.map(|reason| Trip {
+                interlock: Interlock::Path,
+                reason,
+            })
+        })
 }
 
 /// Judges the passing of time without a sample.
@@ -158,18 +169,25 @@ fn trip(interlock: Interlock, reason: String) -> Option<Trip> {
 
 fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip> {
     let position = state.derived.position;
-    for (bit, which) in
-        [(AxisStatus::FORWARD_LIMIT, "far"), (AxisStatus::REVERSE_LIMIT, "rear")]
-    {
+    for (bit, which) in [
+        (AxisStatus::FORWARD_LIMIT, "far"),
+        (AxisStatus::REVERSE_LIMIT, "rear"),
+    ] {
         if reading.status.has(bit) {
-            return trip(Interlock::Travel, format!("the {which} limit switch closed"));
+            return trip(
+                Interlock::Travel,
+                format!("the {which} limit switch closed"),
+            );
         }
     }
     if state.is_homed && position > limits.travel_max {
         let Position(end) = limits.travel_max;
         return trip(
             Interlock::Travel,
-            format!("the probe is at {:.3} mm, past its travel of {end:.1} mm", position.0),
+            format!(
+                "the probe is at {:.3} mm, past its travel of {end:.1} mm",
+                position.0
+            ),
         );
     }
     None
@@ -177,7 +195,10 @@ fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip
 
 fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
     if force > force_max {
-        return trip(Interlock::Force, format!("the force is {force:.2}, above {force_max:.2}"));
+        return trip(
+            Interlock::Force,
+            format!("the force is {force:.2}, above {force_max:.2}"),
+        );
     }
     if force < force_min {
         return trip(
@@ -190,7 +211,10 @@ fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<
 
 fn rate_trip(rate: Option<f64>, rate_max: f64) -> Option<Trip> {
     let rate = rate.filter(|rate| rate.abs() > rate_max)?;
-    trip(Interlock::ForceRate, format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s"))
+    trip(
+        Interlock::ForceRate,
+        format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s"),
+    )
 }
 
 fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
@@ -202,7 +226,11 @@ fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     }
     trip(
         Interlock::SampleAge,
-        format!("no sample for {:.0} ms; at most {:.0} ms are allowed at this speed", age.0 * 1e3, age_max.0 * 1e3),
+        format!(
+            "no sample for {:.0} ms; at most {:.0} ms are allowed at this speed",
+            age.0 * 1e3,
+            age_max.0 * 1e3
+        ),
     )
 }
 

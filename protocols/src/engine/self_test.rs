@@ -3,8 +3,8 @@
 
 use super::context::{Context, Progress};
 use super::state::Power;
-use palpate_model::rig::{Reading, RigCommand};
 use super::stats::RunningStats;
+use palpate_model::rig::{Reading, RigCommand};
 use palpate_model::units::{Newtons, Seconds, Volts};
 
 /// Data of a self-test in progress.
@@ -53,7 +53,9 @@ impl SelfTest {
         let received = self.volts.count();
         // One sample in a hundred may be late at the end; more is a link that loses data.
         if received * 100 < expected * 99 {
-            return Err(format!("only {received} of {expected} samples arrived; check the link"));
+            return Err(format!(
+                "only {received} of {expected} samples arrived; check the link"
+            ));
         }
         let noise = self.volts.std_dev();
         if noise == 0.0 {

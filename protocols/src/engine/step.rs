@@ -21,7 +21,11 @@ const ACK_MAX: Seconds = Seconds(1.0);
 #[must_use]
 pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) {
     let mut effects = Vec::new();
-    let mut cx = Context { state: &mut state, now, effects: &mut effects };
+    let mut cx = Context {
+        state: &mut state,
+        now,
+        effects: &mut effects,
+    };
     match input {
         Input::Reading(reading) => on_reading(&mut cx, &reading),
         Input::Tick => on_tick(&mut cx),
@@ -68,7 +72,9 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
         force_sigma: force
             .zip(tare)
             .map(|(force, tare)| state.config.curve.force_sigma(force, tare.noise)),
-        depth: state.contact.map(|contact| position.depth_from(contact.position)),
+        depth: state
+            .contact
+            .map(|contact| position.depth_from(contact.position)),
     };
     path_error
 }
@@ -98,7 +104,13 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
 fn begin_step(cx: &mut Context<'_>, step_index: usize) {
     let Some(step) = cx.state.config.plan.steps.get(step_index).copied() else {
         cx.state.power = Power::Stopped;
-        return stop::end(cx, Outcome { ending: EndingKind::Finish, reason: "the plan is complete".into() });
+        return stop::end(
+            cx,
+            Outcome {
+                ending: EndingKind::Finish,
+                reason: "the plan is complete".into(),
+            },
+        );
     };
     cx.state.step_index = step_index;
     cx.state.step_started = cx.now;
@@ -133,10 +145,13 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             cx.move_to(target, speed)?;
             Active::Move
         }
-        Step::Hold { duration } => {
-            Active::Hold { until_tick: cx.state.tick + cx.state.ticks(duration) }
-        }
-        Step::Retract { speed, clearance_mm } => {
+        Step::Hold { duration } => Active::Hold {
+            until_tick: cx.state.tick + cx.state.ticks(duration),
+        },
+        Step::Retract {
+            speed,
+            clearance_mm,
+        } => {
             let target = position_of(cx, Depth(-clearance_mm))?;
             cx.move_to(Position(target.0.max(0.0)), speed)?;
             Active::Move
@@ -150,7 +165,10 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
 }
 
 fn position_of(cx: &Context<'_>, depth: Depth) -> Result<Position, String> {
-    let contact = cx.state.contact.ok_or("contact is not known; find it first")?;
+    let contact = cx
+        .state
+        .contact
+        .ok_or("contact is not known; find it first")?;
     let target = depth.position_from(contact.position);
     let travel = cx.state.config.limits.travel_max;
     if target > travel {
@@ -171,11 +189,18 @@ fn on_tick(cx: &mut Context<'_>) {
 }
 
 fn on_ack(cx: &mut Context<'_>, ack: Ack) {
-    let expected = cx.state.unacknowledged.pop_front().map(|(_, command)| command);
+    let expected = cx
+        .state
+        .unacknowledged
+        .pop_front()
+        .map(|(_, command)| command);
     if expected != Some(ack.command) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
-            None => format!("the rig acknowledged {:?}, which was not asked", ack.command),
+            None => format!(
+                "the rig acknowledged {:?}, which was not asked",
+                ack.command
+            ),
         };
         return stop::begin(cx, EndingKind::Abort, reason);
     }
@@ -194,7 +219,13 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
     match fault {
         Fault::LinkLost { .. } | Fault::ControllerReset => {
             cx.state.is_homed = false;
-            on_trip(cx, Trip { interlock: Interlock::Link, reason });
+            on_trip(
+                cx,
+                Trip {
+                    interlock: Interlock::Link,
+                    reason,
+                },
+            );
         }
         Fault::CommandRefused { .. } => {
             cx.state.unacknowledged.clear();
@@ -208,8 +239,15 @@ fn on_trip(cx: &mut Context<'_>, trip: Trip) {
     // At rest after a stop there is nothing left to stop; the samples keep showing why.
     if cx.state.is_motion_possible() && !stop::is_braking(cx.state) {
         let Trip { interlock, reason } = trip;
-        cx.record(Record::InterlockTripped { interlock, reason: reason.clone() });
-        stop::begin(cx, EndingKind::Interlock, format!("{interlock} interlock: {reason}"));
+        cx.record(Record::InterlockTripped {
+            interlock,
+            reason: reason.clone(),
+        });
+        stop::begin(
+            cx,
+            EndingKind::Interlock,
+            format!("{interlock} interlock: {reason}"),
+        );
     } else {
         stop::on_time(cx);
     }
@@ -232,8 +270,14 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         }
         Operator::Start => {}
         Operator::Stop => stop::begin(cx, EndingKind::Stop, "the operator stopped the run".into()),
-        Operator::Abort => stop::begin(cx, EndingKind::Abort, "the operator aborted the run".into()),
-        Operator::Halt => stop::begin(cx, EndingKind::Halt, "the operator halted the motion".into()),
+        Operator::Abort => {
+            stop::begin(cx, EndingKind::Abort, "the operator aborted the run".into())
+        }
+        Operator::Halt => stop::begin(
+            cx,
+            EndingKind::Halt,
+            "the operator halted the motion".into(),
+        ),
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
     }

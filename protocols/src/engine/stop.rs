@@ -28,7 +28,10 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         | Activity::Holding { ending }
         | Activity::Retracting { ending } => ending.clone(),
         Activity::Waiting | Activity::Step(_) => {
-            cx.record(Record::EndingStarted { ending, reason: reason.clone() });
+            cx.record(Record::EndingStarted {
+                ending,
+                reason: reason.clone(),
+            });
             Outcome { ending, reason }
         }
     };
@@ -39,10 +42,17 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         cx.state.is_homed = false;
     }
     // Any operator stop reaches the rig, also when the engine believes the axis at rest.
-    cx.command(if is_halt { RigCommand::Halt } else { RigCommand::Stop });
+    cx.command(if is_halt {
+        RigCommand::Halt
+    } else {
+        RigCommand::Stop
+    });
     cx.enter_phase(Phase::Stopped);
     let deadline = cx.now + Nanos::from_seconds(BRAKE_MAX);
-    cx.state.activity = Activity::Braking { ending: outcome, deadline };
+    cx.state.activity = Activity::Braking {
+        ending: outcome,
+        deadline,
+    };
 }
 
 /// Whether the axis is already being stopped.
@@ -73,7 +83,9 @@ pub(super) fn retract(cx: &mut Context<'_>) {
     if cx.state.can_retract().is_err() {
         return;
     }
-    let Activity::Holding { ending } = cx.state.activity.clone() else { return };
+    let Activity::Holding { ending } = cx.state.activity.clone() else {
+        return;
+    };
     cx.state.power = Power::Reset;
     cx.state.watch.allow_retract();
     cx.enter_phase(Phase::Retract);
@@ -86,7 +98,9 @@ pub(super) fn on_motor_enabled(cx: &mut Context<'_>) {
     if !matches!(cx.state.activity, Activity::Retracting { .. }) || cx.state.power != Power::Reset {
         return;
     }
-    let Some(contact) = cx.state.contact else { return };
+    let Some(contact) = cx.state.contact else {
+        return;
+    };
     cx.state.power = Power::Enabled;
     let target = Depth(-RETRACT_CLEARANCE_MM).position_from(contact.position);
     if let Err(reason) = cx.move_to(Position(target.0.max(0.0)), RETRACT_SPEED) {

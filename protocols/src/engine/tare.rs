@@ -4,8 +4,8 @@ use super::context::{Context, Progress};
 use super::input::Record;
 use super::self_test::check_unloaded;
 use super::state::Tare;
-use palpate_model::rig::Reading;
 use super::stats::RunningStats;
+use palpate_model::rig::Reading;
 use palpate_model::units::{Seconds, Volts};
 
 /// Data of a tare in progress.
@@ -17,7 +17,10 @@ pub(crate) struct Taring {
 
 impl Taring {
     pub fn begin(cx: &mut Context<'_>, duration: Seconds) -> Self {
-        Self { until_tick: cx.state.tick + cx.state.ticks(duration), volts: RunningStats::default() }
+        Self {
+            until_tick: cx.state.tick + cx.state.ticks(duration),
+            volts: RunningStats::default(),
+        }
     }
 
     pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
@@ -30,10 +33,19 @@ impl Taring {
             return Progress::Fail(format!("tare: {reason}"));
         }
         // Quantisation adds a uniform error of one count; a quiet signal may hide inside it.
-        let count = cx.state.config.rig.adc.map_or(0.0, |adc| adc.volts_per_count);
+        let count = cx
+            .state
+            .config
+            .rig
+            .adc
+            .map_or(0.0, |adc| adc.volts_per_count);
         let noise = Volts(self.volts.std_dev().max(count / 12f64.sqrt()));
         cx.state.tare = Some(Tare { volts, noise });
-        cx.record(Record::Tared { volts, noise, samples: self.volts.count() });
+        cx.record(Record::Tared {
+            volts,
+            noise,
+            samples: self.volts.count(),
+        });
         Progress::Done
     }
 }

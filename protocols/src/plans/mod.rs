@@ -125,6 +125,9 @@ impl Step {
     /// Whether the step moves the probe by a known position, which needs a homed axis.
     #[must_use]
     pub fn needs_homed_axis(&self) -> bool {
-        matches!(self, Self::FindContact(_) | Self::Ramp { .. } | Self::Retract { .. })
+        matches!(
+            self,
+            Self::FindContact(_) | Self::Ramp { .. } | Self::Retract { .. }
+        )
     }
 }

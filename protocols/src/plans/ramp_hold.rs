@@ -18,7 +18,11 @@ pub struct RampHold {
 impl Default for RampHold {
     /// The identification run on pig stomach: 0.75 mm/s to 30 mm, 50 s at depth.
     fn default() -> Self {
-        Self { speed: MmPerS(0.75), depth: Depth(30.0), hold: Seconds(50.0) }
+        Self {
+            speed: MmPerS(0.75),
+            depth: Depth(30.0),
+            hold: Seconds(50.0),
+        }
     }
 }
 
@@ -30,13 +34,28 @@ impl RampHold {
             name: "ramp-hold".into(),
             version: 1,
             steps: vec![
-                Step::SelfTest { duration: Seconds(0.5) },
-                Step::Home { speed: MmPerS(9.0), touch_speed: MmPerS(0.3) },
-                Step::Tare { duration: Seconds(1.0) },
+                Step::SelfTest {
+                    duration: Seconds(0.5),
+                },
+                Step::Home {
+                    speed: MmPerS(9.0),
+                    touch_speed: MmPerS(0.3),
+                },
+                Step::Tare {
+                    duration: Seconds(1.0),
+                },
                 Step::FindContact(FindContact::default()),
-                Step::Ramp { speed: self.speed, depth: self.depth },
-                Step::Hold { duration: self.hold },
-                Step::Retract { speed: MmPerS(6.0), clearance_mm: 10.0 },
+                Step::Ramp {
+                    speed: self.speed,
+                    depth: self.depth,
+                },
+                Step::Hold {
+                    duration: self.hold,
+                },
+                Step::Retract {
+                    speed: MmPerS(6.0),
+                    clearance_mm: 10.0,
+                },
             ],
         }
     }

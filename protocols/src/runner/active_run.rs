@@ -99,7 +99,9 @@ impl ActiveRun {
     }
 
     fn feed_one(&mut self, now: Nanos, input: Input, commands: &mut Vec<RigCommand>) {
-        let Some(state) = self.engine.take() else { return };
+        let Some(state) = self.engine.take() else {
+            return;
+        };
         *self.time_use.entry(state.phase().name()).or_default() += now.since(self.now).0;
         self.now = now;
         let reading = match &input {
@@ -138,9 +140,18 @@ impl ActiveRun {
             self.is_log_failure_told = true;
             self.feed_one(now, Input::Fault(Fault::LogFailed { detail }), commands);
         }
-        let is_holding = self.engine.as_ref().is_some_and(|state| state.holding().is_some());
+        let is_holding = self
+            .engine
+            .as_ref()
+            .is_some_and(|state| state.holding().is_some());
         if is_holding && self.after_stop == AfterStop::Close {
-            self.feed_one(now, Input::Operator { choice: Operator::Close }, commands);
+            self.feed_one(
+                now,
+                Input::Operator {
+                    choice: Operator::Close,
+                },
+                commands,
+            );
         }
     }
 
@@ -172,7 +183,13 @@ impl ActiveRun {
     }
 
     fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
-        let entry = Entry { kind, order: self.order, after_sample: self.samples, now, body };
+        let entry = Entry {
+            kind,
+            order: self.order,
+            after_sample: self.samples,
+            now,
+            body,
+        };
         self.order += 1;
         if let Some(writer) = &mut self.writer {
             writer.push_entry(entry);
@@ -183,10 +200,18 @@ impl ActiveRun {
         match input {
             Input::Operator { choice } => {
                 let text = format!("operator: {choice:?}").to_lowercase();
-                self.note(LogLine { at: now, text, is_alarm: false });
+                self.note(LogLine {
+                    at: now,
+                    text,
+                    is_alarm: false,
+                });
             }
             Input::Fault(fault) => {
-                self.note(LogLine { at: now, text: fault.to_string(), is_alarm: true });
+                self.note(LogLine {
+                    at: now,
+                    text: fault.to_string(),
+                    is_alarm: true,
+                });
             }
             _ => {}
         }
@@ -196,8 +221,15 @@ impl ActiveRun {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((now.seconds().0, *phase));
         }
-        let is_alarm = matches!(record, Record::InterlockTripped { .. } | Record::EndingStarted { .. });
-        self.note(LogLine { at: now, text: record.to_string(), is_alarm });
+        let is_alarm = matches!(
+            record,
+            Record::InterlockTripped { .. } | Record::EndingStarted { .. }
+        );
+        self.note(LogLine {
+            at: now,
+            text: record.to_string(),
+            is_alarm,
+        });
     }
 
     fn note(&mut self, line: LogLine) {
@@ -256,7 +288,10 @@ impl ActiveRun {
             trace: Arc::clone(&self.trace),
             phases: Arc::clone(&self.phases),
             samples: self.samples,
-            saved_through: self.writer.as_ref().map_or(self.now, SessionWriter::saved_through),
+            saved_through: self
+                .writer
+                .as_ref()
+                .map_or(self.now, SessionWriter::saved_through),
             is_motion_possible: state.is_motion_possible(),
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
@@ -279,7 +314,11 @@ impl ActiveRun {
             .enumerate()
             .skip(step_index)
             .map(|(i, step)| {
-                if i == step_index { (step.expected.0 - spent).max(0.0) } else { step.expected.0 }
+                if i == step_index {
+                    (step.expected.0 - spent).max(0.0)
+                } else {
+                    step.expected.0
+                }
             })
             .sum();
         let done = self.now.seconds().0;
@@ -288,13 +327,18 @@ impl ActiveRun {
 }
 
 fn kind_of(input: &Input) -> EntryKind {
-    if matches!(input, Input::LiveFit(_)) { EntryKind::Fit } else { EntryKind::Input }
+    if matches!(input, Input::LiveFit(_)) {
+        EntryKind::Fit
+    } else {
+        EntryKind::Input
+    }
 }
 
 /// The on-disk form of an input or effect. The types have no map keys but strings and reject
 /// non-finite numbers before they get here, so this cannot fail; if it ever does, the log says so.
 pub(crate) fn to_json<T: serde::Serialize>(value: &T) -> serde_json::Value {
-    serde_json::to_value(value).unwrap_or_else(|err| serde_json::json!({ "unwritable": err.to_string() }))
+    serde_json::to_value(value)
+        .unwrap_or_else(|err| serde_json::json!({ "unwritable": err.to_string() }))
 }
 
 /// Feeds ramp and hold to the live fit and says when it has a new answer.
@@ -330,15 +374,23 @@ impl LiveFeed {
         let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
         self.fit.push(t, depth, force, sigma);
         self.samples += 1;
-        if self.samples.is_multiple_of(LIVE_FIT_EVERY) { self.fit.estimate() } else { None }
+        if self.samples.is_multiple_of(LIVE_FIT_EVERY) {
+            self.fit.estimate()
+        } else {
+            None
+        }
     }
 }
 
 /// The deepest point of the plan: the scale of the fit's basis.
 fn deepest(config: &Config) -> Depth {
-    let deepest = config.plan.steps.iter().fold(0.0f64, |deepest, step| match step {
-        crate::plans::Step::Ramp { depth, .. } => deepest.max(depth.0),
-        _ => deepest,
-    });
+    let deepest = config
+        .plan
+        .steps
+        .iter()
+        .fold(0.0f64, |deepest, step| match step {
+            crate::plans::Step::Ramp { depth, .. } => deepest.max(depth.0),
+            _ => deepest,
+        });
     Depth(if deepest > 0.0 { deepest } else { 1.0 })
 }

@@ -26,7 +26,9 @@ impl FromStr for TimeScale {
         match text.parse::<f64>() {
             // Below a thousandth nothing seems to happen; above a million use `max`.
             Ok(factor) if (1e-3..=1e6).contains(&factor) => Ok(Self::Factor(factor)),
-            _ => Err(format!("'{text}' is not a time scale; give a number from 0.001 to 1000000, or max")),
+            _ => Err(format!(
+                "'{text}' is not a time scale; give a number from 0.001 to 1000000, or max"
+            )),
         }
     }
 }
@@ -59,7 +61,11 @@ pub(super) struct Pacer {
 
 impl Pacer {
     pub fn new(scale: TimeScale, now: Nanos) -> Self {
-        Self { scale, wall_anchor: Instant::now(), time_anchor: now }
+        Self {
+            scale,
+            wall_anchor: Instant::now(),
+            time_anchor: now,
+        }
     }
 
     /// Waits until session time `at`, or until a request arrives.
@@ -87,7 +93,9 @@ impl Pacer {
 
     /// Session time that corresponds to the wall now.
     fn now(&self) -> Nanos {
-        let TimeScale::Factor(factor) = self.scale else { return self.time_anchor };
+        let TimeScale::Factor(factor) = self.scale else {
+            return self.time_anchor;
+        };
         let passed = self.wall_anchor.elapsed().as_nanos() as f64 * factor;
         self.time_anchor + Nanos(passed as u64)
     }
@@ -101,7 +109,10 @@ pub(super) struct Throttle {
 
 impl Throttle {
     pub fn new(interval: Duration) -> Self {
-        Self { interval, last: None }
+        Self {
+            interval,
+            last: None,
+        }
     }
 
     pub fn is_due(&mut self) -> bool {
@@ -117,4 +128,21 @@ impl Throttle {
 /// The wall clock, for the manifest.
 pub(super) fn wall_now() -> std::time::SystemTime {
     std::time::SystemTime::now()
+}
+
+/// Measures how long something took; decides nothing.
+pub struct Stopwatch(Instant);
+
+impl Stopwatch {
+    /// Starts now.
+    #[must_use]
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Seconds since the start.
+    #[must_use]
+    pub fn seconds(&self) -> f64 {
+        self.0.elapsed().as_secs_f64()
+    }
 }

@@ -58,7 +58,11 @@ impl Runner {
         let thread = std::thread::Builder::new()
             .name("runner".into())
             .spawn(move || main_loop.run(&receiver, &shared, &wake))?;
-        Ok(Self { requests, snapshot, thread: Some(thread) })
+        Ok(Self {
+            requests,
+            snapshot,
+            thread: Some(thread),
+        })
     }
 
     /// Asks for something. Fails only when the runner has ended or is swamped.
@@ -71,13 +75,28 @@ impl Runner {
     /// Starts a run and waits for the runner's word.
     pub fn run(&self, request: RunRequest) -> Result<(), StartError> {
         let (reply, answer) = sync_channel(1);
-        self.request(Request::Run(Box::new(request), reply)).map_err(StartError::Failed)?;
-        answer.recv().unwrap_or_else(|_| Err(StartError::Failed("the runner ended".into())))
+        self.request(Request::Run(Box::new(request), reply))
+            .map_err(StartError::Failed)?;
+        answer
+            .recv()
+            .unwrap_or_else(|_| Err(StartError::Failed("the runner ended".into())))
     }
 
     /// Passes on the operator's choice.
     pub fn operator(&self, choice: Operator) -> Result<(), String> {
         self.request(Request::Operator(choice))
+    }
+
+    /// A sender of requests for another thread, such as a signal handler.
+    #[must_use]
+    pub fn requests(&self) -> SyncSender<Request> {
+        self.requests.clone()
+    }
+
+    /// Whether the thread still runs.
+    #[must_use]
+    pub fn is_alive(&self) -> bool {
+        self.thread.as_ref().is_some_and(|thread| !thread.is_finished())
     }
 
     /// The newest snapshot.
@@ -130,12 +149,7 @@ impl MainLoop {
         }
     }
 
-    fn run(
-        mut self,
-        requests: &Receiver<Request>,
-        shared: &ArcSwap<Snapshot>,
-        wake: &impl Fn(),
-    ) {
+    fn run(mut self, requests: &Receiver<Request>, shared: &ArcSwap<Snapshot>, wake: &impl Fn()) {
         let mut publish = Throttle::new(PUBLISH_EVERY);
         let mut sequence = 0;
         let mut pacer = Pacer::new(self.pace(), self.now);
@@ -149,7 +163,11 @@ impl MainLoop {
                 }
                 Wake::Request(request, at) => {
                     // At full pace a request is served between strides, without moving time.
-                    self.advance(if self.pace() == TimeScale::Max { self.now } else { at });
+                    self.advance(if self.pace() == TimeScale::Max {
+                        self.now
+                    } else {
+                        at
+                    });
                     self.serve(request)
                 }
                 Wake::Disconnected => true,
@@ -177,7 +195,11 @@ impl MainLoop {
 
     /// Time between runs passes as on the wall, at any pace.
     fn pace(&self) -> TimeScale {
-        if self.is_running() { self.scale } else { TimeScale::Factor(1.0) }
+        if self.is_running() {
+            self.scale
+        } else {
+            TimeScale::Factor(1.0)
+        }
     }
 
     fn stride(&self) -> Nanos {
@@ -229,7 +251,9 @@ impl MainLoop {
 
     /// One input to the run in progress, if there is one, and its commands to the rig.
     fn feed(&mut self, input: Input) {
-        let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else { return };
+        let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else {
+            return;
+        };
         let now = run.session_time(self.now);
         for command in run.feed(now, input) {
             self.rig.send(command);
@@ -265,7 +289,9 @@ impl MainLoop {
 
     fn start_run(&mut self, request: &RunRequest) -> Result<(), StartError> {
         if self.is_running() {
-            return Err(StartError::Refused("a run is in progress; stop it first".into()));
+            return Err(StartError::Refused(
+                "a run is in progress; stop it first".into(),
+            ));
         }
         let bench = Bench {
             rig: &self.description,
@@ -274,14 +300,18 @@ impl MainLoop {
             origin: self.now,
         };
         self.run = Some(start(request, &bench)?);
-        self.feed(Input::Operator { choice: Operator::Start });
+        self.feed(Input::Operator {
+            choice: Operator::Start,
+        });
         Ok(())
     }
 
     /// Stops whatever moves, waits until it rests and closes the session.
     fn shut_down(&mut self) {
         if self.is_running() {
-            self.feed(Input::Operator { choice: Operator::Stop });
+            self.feed(Input::Operator {
+                choice: Operator::Stop,
+            });
             // Braking ends within its own time limit, a little over two seconds.
             let give_up = self.now + Nanos::from_millis(3_000);
             while self.is_running() && self.now < give_up {
@@ -292,10 +322,15 @@ impl MainLoop {
                     .and_then(ActiveRun::engine)
                     .is_some_and(|state| state.holding().is_some());
                 if is_holding {
-                    self.feed(Input::Operator { choice: Operator::Close });
+                    self.feed(Input::Operator {
+                        choice: Operator::Close,
+                    });
                 }
             }
-        } else if self.reading.is_some_and(|reading| reading.status.has(AxisStatus::MOVING)) {
+        } else if self
+            .reading
+            .is_some_and(|reading| reading.status.has(AxisStatus::MOVING))
+        {
             self.rig.send(RigCommand::Stop);
         }
     }

@@ -8,9 +8,11 @@ use crate::preview::preview;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
+use palpate_sessions::folder::{
+    SessionFolder, check_free_space, library_folder, new_session_folder,
+};
 use palpate_sessions::log::{Pace, SessionWriter};
 use palpate_sessions::manifest::{Manifest, RECORD_VERSION, new_session_id};
-use palpate_sessions::folder::{SessionFolder, check_free_space, library_folder, new_session_folder};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -78,8 +80,17 @@ pub(super) struct Bench<'a> {
 /// Checks a request and opens its session.
 pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
-    let curve = request.calibration.curve().map_err(|err| refused(err.to_string()))?;
-    let preview = preview(&request.plan, bench.rig, &request.limits, &curve, bench.is_homed);
+    let curve = request
+        .calibration
+        .curve()
+        .map_err(|err| refused(err.to_string()))?;
+    let preview = preview(
+        &request.plan,
+        bench.rig,
+        &request.limits,
+        &curve,
+        bench.is_homed,
+    );
     preview.verdict(request.is_acknowledged).map_err(refused)?;
 
     let started_at = wall_now();
@@ -92,12 +103,17 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         }
     };
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
-    check_free_space(folder.path(), preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
+    check_free_space(folder.path(), preview.storage_bytes)
+        .map_err(|err| refused(err.to_string()))?;
 
     let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
         value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
     };
-    let acknowledgements = if request.is_acknowledged { preview.acknowledgements.clone() } else { Vec::new() };
+    let acknowledgements = if request.is_acknowledged {
+        preview.acknowledgements.clone()
+    } else {
+        Vec::new()
+    };
     let manifest = Manifest {
         record_version: RECORD_VERSION,
         session_id,
@@ -114,7 +130,11 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
         acknowledgements,
     };
-    let pace = if bench.is_virtual { Pace::Virtual } else { Pace::Real };
+    let pace = if bench.is_virtual {
+        Pace::Virtual
+    } else {
+        Pace::Real
+    };
     let writer = SessionWriter::start(folder, manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {
@@ -124,5 +144,12 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         plan: request.plan.clone(),
         is_homed: bench.is_homed,
     };
-    Ok(ActiveRun::new(config, preview, writer, path, bench.origin, request.after_stop))
+    Ok(ActiveRun::new(
+        config,
+        preview,
+        writer,
+        path,
+        bench.origin,
+        request.after_stop,
+    ))
 }

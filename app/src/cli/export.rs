@@ -1,0 +1,54 @@
+//! `palpate export`: a session's samples as a table.
+
+use super::output::Output;
+use super::Failure;
+use clap::{Args, ValueEnum};
+use palpate_sessions::export::{export_csv, export_parquet};
+use palpate_sessions::log::Session;
+use std::path::PathBuf;
+
+/// Arguments of `palpate export`.
+#[derive(Debug, Args)]
+pub struct ExportArgs {
+    /// Session folder
+    session: PathBuf,
+    /// Kind of table
+    #[arg(long, value_enum)]
+    format: Format,
+    /// Folder to write to; the file takes the session folder's name
+    #[arg(long, value_name = "DIR", default_value = ".")]
+    to: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Format {
+    /// Comma-separated text, units in the column names
+    Csv,
+    /// Parquet, units in the file metadata
+    Parquet,
+}
+
+pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
+    let session = Session::open(&args.session).map_err(super::read_failure)?;
+    session.notes.iter().for_each(|note| output.note(note));
+    let name = args
+        .session
+        .canonicalize()
+        .ok()
+        .and_then(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()))
+        .unwrap_or_else(|| session.manifest.session_id.clone());
+    let (extension, write): (_, fn(&Session, &std::path::Path) -> _) = match args.format {
+        Format::Csv => ("csv", export_csv),
+        Format::Parquet => ("parquet", export_parquet),
+    };
+    let path = args.to.join(format!("{name}.{extension}"));
+    write(&session, &path).map_err(Failure::failed)?;
+    let object = serde_json::json!({
+        "command": "export", "file": path, "rows": session.rows.len(), "format": extension,
+    });
+    output.result(&object, || format!("{} rows written to {}", session.rows.len(), path.display()));
+    Ok(())
+}

@@ -1,0 +1,113 @@
+//! `palpate info`: what a session contains.
+
+use super::output::Output;
+use super::Failure;
+use clap::Args;
+use palpate_sessions::log::Session;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `palpate info`.
+#[derive(Debug, Args)]
+pub struct InfoArgs {
+    /// Session folder
+    session: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct Info<'a> {
+    command: &'static str,
+    session_id: &'a str,
+    started_at: &'a str,
+    software_version: &'a str,
+    engine_version: u32,
+    record_version: u32,
+    operator: &'a str,
+    specimen: &'a str,
+    indenter: &'a str,
+    rig: &'a str,
+    rig_settings: &'a std::collections::BTreeMap<String, String>,
+    plan: &'a serde_json::Value,
+    acknowledgements: &'a [String],
+    samples: usize,
+    duration_s: f64,
+    phases: Vec<(String, usize)>,
+    is_complete: bool,
+    ending: Option<&'a str>,
+    reason: Option<&'a str>,
+    time_use_s: Option<&'a [(String, f64)]>,
+    notes: &'a [String],
+}
+
+pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
+    let session = Session::open(&args.session).map_err(super::read_failure)?;
+    let manifest = &session.manifest;
+    let info = Info {
+        command: "info",
+        session_id: &manifest.session_id,
+        started_at: &manifest.started_at,
+        software_version: &manifest.software_version,
+        engine_version: manifest.engine_version,
+        record_version: manifest.record_version,
+        operator: &manifest.operator,
+        specimen: &manifest.specimen,
+        indenter: &manifest.indenter,
+        rig: &manifest.rig.identity,
+        rig_settings: &manifest.rig.settings,
+        plan: &manifest.plan,
+        acknowledgements: &manifest.acknowledgements,
+        samples: session.rows.len(),
+        duration_s: session.rows.last().map_or(0.0, |row| row.host.seconds().0),
+        phases: phases(&session),
+        is_complete: session.end.is_some(),
+        ending: session.end.as_ref().map(|end| end.outcome.as_str()),
+        reason: session.end.as_ref().map(|end| end.reason.as_str()),
+        time_use_s: session.end.as_ref().map(|end| end.time_use.as_slice()),
+        notes: &session.notes,
+    };
+    output.result(&info, || text(&info));
+    Ok(())
+}
+
+/// Samples in each stretch of one phase, in order.
+fn phases(session: &Session) -> Vec<(String, usize)> {
+    let mut phases: Vec<(String, usize)> = Vec::new();
+    for row in &session.rows {
+        match phases.last_mut() {
+            Some((name, count)) if name == row.phase.name() => *count += 1,
+            _ => phases.push((row.phase.name().into(), 1)),
+        }
+    }
+    phases
+}
+
+fn text(info: &Info<'_>) -> String {
+    let or_dash = |text: &str| if text.is_empty() { "-".to_string() } else { text.to_string() };
+    let mut lines = vec![
+        format!("session    {}", info.session_id),
+        format!("started    {}", info.started_at),
+        format!("operator   {}", or_dash(info.operator)),
+        format!("specimen   {}", or_dash(info.specimen)),
+        format!("indenter   {}", or_dash(info.indenter)),
+        format!("rig        {}", info.rig),
+    ];
+    lines.extend(info.rig_settings.iter().map(|(key, value)| format!("           {key} {value}")));
+    lines.push(format!("written by palpate {}, engine {}", info.software_version, info.engine_version));
+    lines.push(format!("samples    {} over {:.1} s", info.samples, info.duration_s));
+    let phases: Vec<String> = info.phases.iter().map(|(name, count)| format!("{name} {count}")).collect();
+    lines.push(format!("phases     {}", phases.join(", ")));
+    lines.extend(info.acknowledgements.iter().map(|line| format!("accepted   {line}")));
+    lines.push(match (info.ending, info.reason) {
+        (Some(ending), Some(reason)) => format!("ending     {ending}: {reason}"),
+        _ => "ending     none: the recording was interrupted".into(),
+    });
+    if let Some(time_use) = info.time_use_s {
+        let spent: Vec<String> = time_use.iter().map(|(phase, secs)| format!("{phase} {secs:.1} s")).collect();
+        lines.push(format!("time use   {}", spent.join(", ")));
+    }
+    lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
+    lines.join("\n")
+}

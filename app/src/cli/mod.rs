@@ -1,0 +1,118 @@
+//! The command line: one headless subcommand per file, none with logic of its own.
+
+mod export;
+mod fit;
+mod info;
+mod output;
+mod replay;
+mod rig;
+mod run;
+
+use clap::{Parser, Subcommand};
+use output::Output;
+use palpate_protocols::analysis::SourceError;
+use palpate_sessions::log::ReadError;
+use std::process::ExitCode;
+
+/// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
+#[derive(Debug, Parser)]
+#[command(name = "palpate", version, propagate_version = true)]
+pub struct Cli {
+    #[command(subcommand)]
+    command: Option<Command>,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Open the window
+    Window(rig::RigArgs),
+    /// Run a protocol without a window
+    #[command(subcommand)]
+    Run(run::RunCommand),
+    /// Fit the force model to a session or a table
+    Fit(fit::FitArgs),
+    /// Feed recorded sessions to the engine again and compare
+    Replay(replay::ReplayArgs),
+    /// Write a session's samples as a table
+    Export(export::ExportArgs),
+    /// Tell what a session contains
+    Info(info::InfoArgs),
+}
+
+/// Why a command did not do what was asked.
+#[derive(Debug)]
+pub enum Failure {
+    /// Wrong use: nothing was done. Exit code 2.
+    Usage(String),
+    /// It was tried and failed. Exit code 1.
+    Failed(String),
+}
+
+impl Failure {
+    fn usage(reason: impl ToString) -> Self {
+        Self::Usage(reason.to_string())
+    }
+
+    fn failed(reason: impl ToString) -> Self {
+        Self::Failed(reason.to_string())
+    }
+
+    fn code(&self) -> u8 {
+        match self {
+            Self::Usage(_) => 2,
+            Self::Failed(_) => 1,
+        }
+    }
+
+    fn sentence(&self) -> &str {
+        match self {
+            Self::Usage(sentence) | Self::Failed(sentence) => sentence,
+        }
+    }
+}
+
+/// Runs what the arguments ask for.
+#[must_use]
+pub fn main(cli: Cli) -> ExitCode {
+    let (output, result) = match cli.command {
+        None => (Output::text(), rig::window(&rig::RigArgs::default())),
+        Some(Command::Window(args)) => (Output::text(), rig::window(&args)),
+        Some(Command::Run(run::RunCommand::RampHold(args))) => with(args.json, |out| run::run(&args, out)),
+        Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
+        Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
+        Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
+    };
+    match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            output.error(failure.sentence(), failure.code());
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+fn with(
+    is_json: bool,
+    run: impl FnOnce(&Output) -> Result<(), Failure>,
+) -> (Output, Result<(), Failure>) {
+    let output = if is_json { Output::json() } else { Output::text() };
+    let result = run(&output);
+    (output, result)
+}
+
+/// A session that cannot be read: not being one, or being newer, is wrong use; damage is a failure.
+fn read_failure(err: ReadError) -> Failure {
+    match err {
+        ReadError::Damaged { .. } | ReadError::Io { .. } => Failure::failed(err),
+        _ => Failure::usage(err),
+    }
+}
+
+fn source_failure(err: SourceError) -> Failure {
+    match err {
+        SourceError::Session(err) => read_failure(err),
+        SourceError::Table(_) => Failure::usage(err),
+        SourceError::Empty | SourceError::Calibration { .. } => Failure::failed(err),
+    }
+}

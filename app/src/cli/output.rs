@@ -1,0 +1,57 @@
+//! What a command prints: text for people or one JSON object for machines.
+
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use serde::Serialize;
+use std::io::Write;
+
+/// Where results go.
+pub(super) struct Output {
+    is_json: bool,
+}
+
+impl Output {
+    pub fn text() -> Self {
+        Self { is_json: false }
+    }
+
+    pub fn json() -> Self {
+        Self { is_json: true }
+    }
+
+    /// Prints a result: `text` for people, `object` for machines.
+    pub fn result(&self, object: &impl Serialize, text: impl FnOnce() -> String) {
+        let line = if self.is_json {
+            serde_json::to_string(object).unwrap_or_else(|err| format!("{{\"error\":\"{err}\"}}"))
+        } else {
+            text()
+        };
+        // A closed pipe (`palpate info x | head`) is the reader's choice, not an error.
+        let _ = writeln!(std::io::stdout(), "{line}");
+    }
+
+    /// Prints a remark that is not the result.
+    pub fn note(&self, text: &str) {
+        let _ = writeln!(std::io::stderr(), "note: {text}");
+    }
+
+    /// Prints why the command failed.
+    pub fn error(&self, sentence: &str, exit: u8) {
+        let _ = writeln!(std::io::stderr(), "error: {sentence}");
+        if self.is_json {
+            let object = serde_json::json!({ "error": sentence, "exit": exit });
+            let _ = writeln!(std::io::stdout(), "{object}");
+        }
+    }
+
+    /// A progress bar on the terminal; silent in JSON and where nobody watches.
+    pub fn bar(&self, length: u64) -> ProgressBar {
+        let bar = ProgressBar::new(length);
+        if self.is_json {
+            bar.set_draw_target(ProgressDrawTarget::hidden());
+        }
+        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
+            bar.set_style(style);
+        }
+        bar
+    }
+}

@@ -1,0 +1,86 @@
+//! Which rig, at which pace: shared by every command that needs one.
+
+use super::Failure;
+use clap::Args;
+use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
+use palpate_drivers::Rig;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::Limits;
+use palpate_protocols::runner::TimeScale;
+use palpate_sessions::folder::{HolderLock, library_folder};
+
+/// The rig to use.
+#[derive(Clone, Debug, Args)]
+pub struct RigArgs {
+    /// Rig: sim, or sim:NAME for a simulated rig that only one program may hold
+    #[arg(long, default_value = "sim")]
+    pub rig: String,
+    /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
+    #[arg(long, default_value = "lab")]
+    pub profile: SimProfile,
+    /// Simulated rig: its randomness; the same seed gives the same run
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
+    #[arg(long, default_value = "nominal")]
+    pub clock: SimClock,
+    /// Session seconds per second, or max
+    #[arg(long, default_value = "1")]
+    pub time_scale: TimeScale,
+}
+
+impl Default for RigArgs {
+    fn default() -> Self {
+        Self {
+            rig: "sim".into(),
+            profile: SimProfile::Lab,
+            seed: 1,
+            clock: SimClock::Nominal,
+            time_scale: TimeScale::Factor(1.0),
+        }
+    }
+}
+
+impl RigArgs {
+    /// The settings of the simulated rig.
+    #[must_use]
+    pub fn settings(&self) -> SimSettings {
+        SimSettings { profile: self.profile, seed: self.seed, clock: self.clock }
+    }
+}
+
+/// A rig that is ours, with what is known about its cell.
+pub struct OpenRig {
+    /// The rig.
+    pub rig: Box<dyn Rig>,
+    /// Volts to newtons of its load cell.
+    pub calibration: Calibration,
+    /// Interlock thresholds.
+    pub limits: Limits,
+    /// Keeps other programs off a rig that has a name of its own.
+    pub lock: Option<HolderLock>,
+}
+
+/// Opens the rig, or says who holds it.
+pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
+    let settings = args.settings();
+    let rig = palpate_drivers::open(&args.rig, &settings).map_err(Failure::usage)?;
+    // A plain `sim` lives and dies with its program; a named one is shared like a real rig.
+    let lock = match args.rig.split_once(':') {
+        Some((_, name)) => Some(rig_lock(name)?),
+        None => None,
+    };
+    let limits = Limits::for_travel(rig.description().travel);
+    Ok(OpenRig { rig, calibration: settings.calibration(), limits, lock })
+}
+
+fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
+    let library = library_folder().map_err(Failure::usage)?;
+    HolderLock::acquire(&library.join("rigs").join(format!("{name}.lock")))
+        .map_err(|err| Failure::usage(format!("rig {name}: {err}")))
+}
+
+/// Opens the window.
+pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
+    Err(Failure::failed(format!("no window yet for {}", args.rig)))
+}

@@ -1,0 +1,250 @@
+//! `palpate run`: a protocol without a window, on the same runner.
+
+use super::output::Output;
+use super::rig::RigArgs;
+use super::Failure;
+use clap::{Args, Subcommand};
+use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_protocols::engine::{EndingKind, Operator};
+use palpate_protocols::plans::RampHold;
+use palpate_protocols::preview::{Preview, preview};
+use palpate_protocols::runner::{
+    AfterStop, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
+};
+use serde::Serialize;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
+
+/// The protocols.
+#[derive(Debug, Subcommand)]
+pub enum RunCommand {
+    /// Find the tissue, indent at constant speed, hold while the force relaxes
+    RampHold(RampHoldArgs),
+}
+
+/// Arguments of `palpate run ramp-hold`.
+#[derive(Debug, Args)]
+pub struct RampHoldArgs {
+    /// Indentation speed in mm/s
+    #[arg(long, default_value = "0.75", value_parser = number)]
+    speed: f64,
+    /// Depth from contact in mm
+    #[arg(long, default_value = "30", value_parser = number)]
+    depth: f64,
+    /// Time at depth in s
+    #[arg(long, default_value = "50", value_parser = number)]
+    hold: f64,
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Who runs it
+    #[arg(long, default_value = "")]
+    operator: String,
+    /// What is indented
+    #[arg(long, default_value = "")]
+    specimen: String,
+    /// With which probe
+    #[arg(long, default_value = "blunt 12 mm probe")]
+    indenter: String,
+    /// Accept what the preview asks to acknowledge; it is recorded
+    #[arg(long)]
+    acknowledge: bool,
+    /// Only tell what would happen
+    #[arg(long)]
+    preview: bool,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// A finite number, or one sentence.
+fn number(text: &str) -> Result<f64, String> {
+    match text.parse::<f64>() {
+        Ok(value) if value.is_finite() => Ok(value),
+        _ => Err("this is not a finite number; write it like 0.75".into()),
+    }
+}
+
+#[derive(Serialize)]
+struct RunReport {
+    command: &'static str,
+    plan: String,
+    session: PathBuf,
+    ending: &'static str,
+    reason: String,
+    samples: u64,
+    duration_s: f64,
+    contact_mm: Option<f64>,
+    contact_std_error_mm: Option<f64>,
+    force_peak_n: Option<f64>,
+    live: Option<palpate_model::fit::LiveEstimate>,
+}
+
+pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
+    let params = RampHold {
+        speed: MmPerS(args.speed),
+        depth: Depth(args.depth),
+        hold: Seconds(args.hold),
+    };
+    let bench = super::rig::open(&args.rig)?;
+    let request = RunRequest {
+        plan: params.plan(),
+        calibration: bench.calibration,
+        limits: bench.limits,
+        out: args.out.clone(),
+        labels: Labels {
+            operator: args.operator.clone(),
+            specimen: args.specimen.clone(),
+            indenter: args.indenter.clone(),
+        },
+        is_acknowledged: args.acknowledge,
+        after_stop: AfterStop::Close,
+    };
+    let curve = request.calibration.curve().map_err(Failure::usage)?;
+    let preview =
+        preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
+    if args.preview {
+        output.result(&preview, || preview_text(&preview));
+        return Ok(());
+    }
+    if let Err(reason) = preview.verdict(args.acknowledge) {
+        let hint = if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
+        return Err(Failure::usage(format!("{reason}{hint}")));
+    }
+    preview.notes.iter().for_each(|note| output.note(note));
+
+    let (wake, woken) = sync_channel(1);
+    let runner = Runner::start(bench.rig, args.rig.time_scale, move || {
+        // A full channel already says what this would say.
+        let _ = wake.try_send(());
+    })
+    .map_err(Failure::failed)?;
+    stop_on_signals(&runner)?;
+    runner.run(request).map_err(|err| match err {
+        StartError::Refused(reason) => Failure::Usage(reason),
+        StartError::Failed(reason) => Failure::Failed(reason),
+    })?;
+    let snapshot = watch(&runner, &woken, output)?;
+    let Some(view) = &snapshot.run else {
+        return Err(Failure::failed("the runner ended without a run"));
+    };
+    report(view, output)
+}
+
+/// The first signal stops, the second halts.
+fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
+    let requests = runner.requests();
+    let count = AtomicU32::new(0);
+    ctrlc::set_handler(move || {
+        let choice = match count.fetch_add(1, Ordering::Relaxed) {
+            0 => Operator::Stop,
+            _ => Operator::Halt,
+        };
+        let _ = requests.try_send(Request::Operator(choice));
+    })
+    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
+}
+
+/// Draws progress until the run is over.
+fn watch(runner: &Runner, woken: &Receiver<()>, output: &Output) -> Result<Arc<Snapshot>, Failure> {
+    let bar = output.bar(1000);
+    loop {
+        let is_alive = woken.recv_timeout(Duration::from_millis(500)).is_ok();
+        let snapshot = runner.snapshot();
+        let Some(view) = &snapshot.run else { continue };
+        bar.set_position((view.fraction * 1000.0) as u64);
+        bar.set_message(progress_text(view));
+        if view.outcome.is_some() {
+            bar.finish_and_clear();
+            return Ok(snapshot);
+        }
+        if !is_alive && !runner.is_alive() {
+            return Err(Failure::failed("the runner ended unexpectedly; the session is incomplete"));
+        }
+    }
+}
+
+fn progress_text(view: &RunView) -> String {
+    let left = view.time_left.0.round() as u64;
+    let force = view.derived.force.map_or(String::new(), |force| format!("  {force:.3}"));
+    let depth = view.derived.depth.map_or(String::new(), |depth| format!("  {depth:.2}"));
+    format!("{}{force}{depth}  {:02}:{:02} left", view.phase, left / 60, left % 60)
+}
+
+fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
+    let Some(outcome) = &view.outcome else {
+        return Err(Failure::failed("the run did not end"));
+    };
+    let report = RunReport {
+        command: "run",
+        plan: view.plan_name.clone(),
+        session: view.folder.clone(),
+        ending: outcome.ending.name(),
+        reason: outcome.reason.clone(),
+        samples: view.samples,
+        duration_s: view.now.seconds().0,
+        contact_mm: view.contact.map(|contact| contact.position.0),
+        contact_std_error_mm: view.contact.map(|contact| contact.std_error_mm),
+        force_peak_n: view.force_peak.map(|force| force.0),
+        live: view.live.clone(),
+    };
+    output.result(&report, || run_text(&report));
+    if let Some(reason) = &view.log_error {
+        return Err(Failure::failed(format!("the session log could not be closed: {reason}")));
+    }
+    match outcome.ending {
+        EndingKind::Finish => Ok(()),
+        ending => Err(Failure::failed(format!(
+            "{ending}: {}; the data so far is in {}",
+            outcome.reason,
+            view.folder.display()
+        ))),
+    }
+}
+
+fn run_text(report: &RunReport) -> String {
+    let mut lines = vec![format!(
+        "{}: {} after {:.1} s, {} samples in {}",
+        report.plan,
+        report.ending,
+        report.duration_s,
+        report.samples,
+        report.session.display()
+    )];
+    if let (Some(at), Some(error)) = (report.contact_mm, report.contact_std_error_mm) {
+        lines.push(format!("contact at {at:.3} ± {error:.3} mm from home"));
+    }
+    if let Some(peak) = report.force_peak_n {
+        lines.push(format!("peak force {peak:.3} N"));
+    }
+    if let Some(live) = &report.live {
+        lines.push("live fit:".into());
+        lines.extend(live.parameters.iter().map(super::fit::parameter_line));
+    }
+    lines.join("\n")
+}
+
+fn preview_text(preview: &Preview) -> String {
+    let mut lines: Vec<String> = preview
+        .steps
+        .iter()
+        .map(|step| format!("{:<10} {:>8.1} s, at most {:.1} s", step.phase.name(), step.expected.0, step.longest.0))
+        .collect();
+    lines.push(format!(
+        "total      {:>8.1} s, at most {:.1} s; peak force {:.1} to {:.1}; up to {:.1} MB",
+        preview.expected.0,
+        preview.longest.0,
+        preview.force_band[0],
+        preview.force_band[1],
+        preview.storage_bytes as f64 * 1e-6
+    ));
+    lines.extend(preview.refusals.iter().map(|line| format!("refused: {line}")));
+    lines.extend(preview.acknowledgements.iter().map(|line| format!("to acknowledge: {line}")));
+    lines.extend(preview.notes.iter().map(|line| format!("note: {line}")));
+    lines.join("\n")
+}
