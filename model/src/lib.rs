@@ -10,6 +10,7 @@
 
 pub mod calibration;
 pub mod fit;
+mod linalg;
 pub mod rig;
 pub mod signal;
 pub mod time;

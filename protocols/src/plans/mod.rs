@@ -91,15 +91,15 @@ pub struct FindContact {
 
 impl Default for FindContact {
     /// 1.5 mm/s stays under the 2-3 mm/s above which published testers trigger late;
-    /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is five times
-    /// slower and goes on to 0.15 N, a third of the 0.5 N that contact finding may ever exert.
+    /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is ten times
+    /// slower and goes on to 0.1 N, a fifth of the 0.5 N that contact finding may ever exert.
     fn default() -> Self {
         Self {
             approach_speed: MmPerS(1.5),
             criterion: Newtons(0.03),
             retreat_mm: 3.0,
-            pass_speed: MmPerS(0.3),
-            pass_force: Newtons(0.15),
+            pass_speed: MmPerS(0.15),
+            pass_force: Newtons(0.1),
             recovery: Seconds(10.0),
             std_error_mm_max: 0.1,
         }
