@@ -1,0 +1,250 @@
+//! The channels of a session log and the schemas that let other programs read it.
+//!
+//! Schemas follow the MCAP registry (<https://mcap.dev/spec/registry>): a serialised
+//! `FileDescriptorSet` for Protocol Buffers, a JSON Schema for JSON.
+
+use crate::record::EntryKind;
+use prost::Message;
+use prost_types::field_descriptor_proto::{Label, Type};
+use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use std::collections::BTreeMap;
+
+/// A channel of a session log.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Channel {
+    Manifest,
+    Daq,
+    Derived,
+    Input,
+    Decision,
+    Fit,
+    End,
+}
+
+impl Channel {
+    pub const ALL: [Self; 7] = [
+        Self::Manifest,
+        Self::Daq,
+        Self::Derived,
+        Self::Input,
+        Self::Decision,
+        Self::Fit,
+        Self::End,
+    ];
+
+    pub fn topic(self) -> &'static str {
+        match self {
+            Self::Manifest => "/manifest",
+            Self::Daq => "/daq/block",
+            Self::Derived => "/derived/block",
+            Self::Input => "/input",
+            Self::Decision => "/decision",
+            Self::Fit => "/fit",
+            Self::End => "/end",
+        }
+    }
+
+    pub fn from_topic(topic: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|one| one.topic() == topic)
+    }
+
+    pub fn of_entry(kind: EntryKind) -> Self {
+        match kind {
+            EntryKind::Input => Self::Input,
+            EntryKind::Decision => Self::Decision,
+            EntryKind::Fit => Self::Fit,
+        }
+    }
+
+    /// The encoding of messages, and so of the schema: `protobuf` or `json`.
+    pub fn message_encoding(self) -> &'static str {
+        match self {
+            Self::Daq | Self::Derived => "protobuf",
+            _ => "json",
+        }
+    }
+
+    pub fn schema_encoding(self) -> &'static str {
+        match self {
+            Self::Daq | Self::Derived => "protobuf",
+            _ => "jsonschema",
+        }
+    }
+
+    pub fn schema_name(self) -> &'static str {
+        match self {
+            Self::Manifest => "palpate.Manifest",
+            Self::Daq => "palpate.DaqBlock",
+            Self::Derived => "palpate.DerivedBlock",
+            Self::Input | Self::Decision | Self::Fit => "palpate.Entry",
+            Self::End => "palpate.EndRecord",
+        }
+    }
+
+    pub fn schema(self) -> Vec<u8> {
+        match self {
+            Self::Daq => descriptor_set("DaqBlock", DAQ_FIELDS),
+            Self::Derived => descriptor_set("DerivedBlock", DERIVED_FIELDS),
+            Self::Manifest => MANIFEST_SCHEMA.into(),
+            Self::Input | Self::Decision | Self::Fit => ENTRY_SCHEMA.into(),
+            Self::End => END_SCHEMA.into(),
+        }
+    }
+
+    /// Units of the channel's fields.
+    pub fn metadata(self) -> BTreeMap<String, String> {
+        let units: &[(&str, &str)] = match self {
+            Self::Daq => &[
+                ("tick_delta", "controller clock counts"),
+                ("host_delta_ns", "ns"),
+                ("counts", "1"),
+                ("volts", "V"),
+                ("pulses_delta", "pulses"),
+                ("status", "bits"),
+            ],
+            Self::Derived => &[
+                ("force_newtons", "N"),
+                ("depth_mm", "mm"),
+                ("validity", "bits: 1 force, 2 depth"),
+                ("phase", "code"),
+                ("cycle", "1"),
+            ],
+            Self::Input | Self::Decision | Self::Fit => &[("now_ns", "ns since session start")],
+            Self::End => &[("ended_at", "ns since session start"), ("time_use", "s")],
+            Self::Manifest => &[],
+        };
+        units
+            .iter()
+            .map(|(field, unit)| (format!("unit.{field}"), (*unit).to_owned()))
+            .collect()
+    }
+}
+
+type Field = (&'static str, i32, Label, Type);
+
+const DAQ_FIELDS: &[Field] = &[
+    ("first_sample", 1, Label::Optional, Type::Uint64),
+    ("tick_delta", 2, Label::Repeated, Type::Sint64),
+    ("host_delta_ns", 3, Label::Repeated, Type::Sint64),
+    ("counts", 4, Label::Repeated, Type::Sint32),
+    ("volts", 5, Label::Repeated, Type::Double),
+    ("pulses_delta", 6, Label::Repeated, Type::Sint64),
+    ("status", 7, Label::Repeated, Type::Uint32),
+];
+
+const DERIVED_FIELDS: &[Field] = &[
+    ("first_sample", 1, Label::Optional, Type::Uint64),
+    ("force_newtons", 2, Label::Repeated, Type::Double),
+    ("depth_mm", 3, Label::Repeated, Type::Double),
+    ("validity", 4, Label::Repeated, Type::Uint32),
+    ("phase", 5, Label::Repeated, Type::Uint32),
+    ("cycle", 6, Label::Repeated, Type::Uint32),
+];
+
+fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
+    let field = |&(name, number, label, kind): &Field| FieldDescriptorProto {
+        name: Some(name.into()),
+        number: Some(number),
+        label: Some(label.into()),
+        r#type: Some(kind.into()),
+        json_name: Some(name.into()),
+        ..Default::default()
+    };
+    let file = FileDescriptorProto {
+        name: Some(format!("palpate/{message}.proto")),
+        package: Some("palpate".into()),
+        syntax: Some("proto3".into()),
+        message_type: vec![DescriptorProto {
+            name: Some(message.into()),
+            field: fields.iter().map(field).collect(),
+            ..Default::default()
+        }],
+        ..Default::default()
+    };
+    FileDescriptorSet { file: vec![file] }.encode_to_vec()
+}
+
+const MANIFEST_SCHEMA: &str = r#"{"type":"object","properties":{"record_version":{"type":"integer"},"session_id":{"type":"string"},"software_version":{"type":"string"},"engine_version":{"type":"integer"},"started_at":{"type":"string","format":"date-time"},"operator":{"type":"string"},"specimen":{"type":"string"},"indenter":{"type":"string"},"rig":{"type":"object"},"limits":{"type":"object"},"calibration":{},"plan":{},"settings":{},"acknowledgements":{"type":"array","items":{"type":"string"}}},"required":["record_version","session_id","software_version","started_at","rig"]}"#;
+
+const ENTRY_SCHEMA: &str = r#"{"type":"object","properties":{"order":{"type":"integer"},"after_sample":{"type":"integer"},"now_ns":{"type":"integer"},"body":{}},"required":["order","after_sample","now_ns","body"]}"#;
+
+const END_SCHEMA: &str = r#"{"type":"object","properties":{"outcome":{"type":"string"},"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"},"ended_at":{"type":"integer"},"time_use":{"type":"array","items":{"type":"array"}}},"required":["outcome","reason","samples","entries","ended_at"]}"#;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::record::{DaqBlock, DerivedBlock};
+    use prost::encoding::{WireType, decode_key, decode_varint};
+
+    /// The (number, wire type) pairs of an encoded message, in order.
+    fn wire_fields(mut bytes: &[u8]) -> Vec<(u32, WireType)> {
+        let mut fields = Vec::new();
+        while !bytes.is_empty() {
+            let (number, wire) = decode_key(&mut bytes).unwrap();
+            let value = decode_varint(&mut bytes).unwrap();
+            if wire == WireType::LengthDelimited {
+                bytes = &bytes[value as usize..];
+            }
+            fields.push((number, wire));
+        }
+        fields
+    }
+
+    /// What a descriptor promises on the wire: packed arrays and plain varints.
+    fn promised(fields: &[Field]) -> Vec<(u32, WireType)> {
+        fields
+            .iter()
+            .map(|&(_, number, label, _)| match label {
+                Label::Repeated => (number as u32, WireType::LengthDelimited),
+                _ => (number as u32, WireType::Varint),
+            })
+            .collect()
+    }
+
+    #[test]
+    fn descriptors_describe_what_is_written() {
+        let daq = DaqBlock {
+            first_sample: 1,
+            tick_delta: vec![1],
+            host_delta_ns: vec![1],
+            counts: vec![1],
+            volts: vec![1.0],
+            pulses_delta: vec![1],
+            status: vec![1],
+        };
+        assert_eq!(wire_fields(&daq.encode_to_vec()), promised(DAQ_FIELDS));
+        let derived = DerivedBlock {
+            first_sample: 1,
+            force_newtons: vec![1.0],
+            depth_mm: vec![1.0],
+            validity: vec![1],
+            phase: vec![1],
+            cycle: vec![1],
+        };
+        assert_eq!(
+            wire_fields(&derived.encode_to_vec()),
+            promised(DERIVED_FIELDS)
+        );
+        // The names of the fields, as the derive macro sees them, are the names described.
+        let shown = format!("{daq:?} {derived:?}");
+        for (name, ..) in DAQ_FIELDS.iter().chain(DERIVED_FIELDS) {
+            assert!(shown.contains(&format!("{name}:")), "{name}");
+        }
+    }
+
+    #[test]
+    fn schemas_are_what_they_claim_to_be() {
+        for channel in Channel::ALL {
+            assert_eq!(Channel::from_topic(channel.topic()), Some(channel));
+            let schema = channel.schema();
+            if channel.schema_encoding() == "protobuf" {
+                let set = FileDescriptorSet::decode(schema.as_slice()).unwrap();
+                let name = format!("palpate.{}", set.file[0].message_type[0].name());
+                assert_eq!(name, channel.schema_name());
+            } else {
+                let value: serde_json::Value = serde_json::from_slice(&schema).unwrap();
+                assert_eq!(value["type"], "object");
+            }
+        }
+    }
+}
