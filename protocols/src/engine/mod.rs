@@ -15,6 +15,8 @@ mod stats;
 mod step;
 mod stop;
 mod tare;
+#[cfg(test)]
+mod tests;
 
 pub use input::{Effect, EndingKind, Input, Operator, Outcome, Record};
 pub use interlock::Interlock;

@@ -1,0 +1,314 @@
+//! Engine tables: given a state and an input, the phase and the effects.
+
+use super::*;
+use crate::plans::{Plan, Step};
+use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{
+    Ack, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
+};
+use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
+use std::sync::Arc;
+
+/// A rig of straight lines: 0.15 V/N from 1.28 V, one sample a millisecond.
+struct Bench {
+    state: Option<State>,
+    now: Nanos,
+    tick: u64,
+    pulses: i64,
+    status: AxisStatus,
+}
+
+const ZERO: f64 = 1.28;
+
+fn volts(newtons: f64) -> f64 {
+    ZERO + 0.15 * newtons
+}
+
+fn rig() -> RigDescription {
+    RigDescription {
+        name: "bench".into(),
+        identity: "table".into(),
+        settings: Default::default(),
+        mm_per_pulse: 0.015,
+        travel: Position(150.0),
+        tick_nanos: 1_000_000,
+        speed_quantum: MmPerS(0.03),
+        speed_max: MmPerS(20.0),
+        acceleration: MmPerS2(61.44),
+        adc: None,
+        noise_expected: Volts(0.001),
+    }
+}
+
+impl Bench {
+    fn new(steps: Vec<Step>) -> Self {
+        let calibration = Calibration::linear("line", Volts(ZERO), 0.15, Newtons(50.0));
+        let config = Config {
+            rig: rig(),
+            limits: Limits::for_travel(Position(150.0)),
+            curve: calibration.curve().unwrap(),
+            plan: Plan { name: "table".into(), version: 1, steps },
+            is_homed: true,
+        };
+        let state = Some(State::new(Arc::new(config)));
+        Self { state, now: Nanos::ZERO, tick: 0, pulses: 0, status: AxisStatus::MOTOR_ON }
+    }
+
+    /// Self-tested, tared and inside a hold of `hold` seconds.
+    fn holding(hold: f64) -> Self {
+        let mut bench = Self::new(vec![
+            Step::SelfTest { duration: Seconds(0.1) },
+            Step::Tare { duration: Seconds(0.1) },
+            Step::Hold { duration: Seconds(hold) },
+        ]);
+        bench.give(Input::Operator { choice: Operator::Start });
+        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
+            bench.give(Input::Ack(Ack { command }));
+        }
+        for _ in 0..1000 {
+            if bench.state().phase() == Phase::Hold {
+                return bench;
+            }
+            bench.sample(volts(0.0));
+        }
+        panic!("no hold: {:?}", bench.state());
+    }
+
+    fn state(&self) -> &State {
+        self.state.as_ref().unwrap()
+    }
+
+    fn give(&mut self, input: Input) -> Vec<Effect> {
+        let (state, effects) = step(self.state.take().unwrap(), self.now, input);
+        self.state = Some(state);
+        effects
+    }
+
+    /// The next millisecond's sample, with a little alternating noise so that the cell lives.
+    fn sample(&mut self, volts: f64) -> Vec<Effect> {
+        self.tick += 1;
+        self.now = self.now + Nanos::from_millis(1);
+        let noise = if self.tick.is_multiple_of(2) { 1e-4 } else { -1e-4 };
+        self.give(Input::Reading(Reading {
+            tick: self.tick,
+            counts: None,
+            volts: Volts(volts + noise),
+            pulses: self.pulses,
+            status: self.status,
+        }))
+    }
+
+    /// Acknowledges stops until the run holds or has ended.
+    fn settle(&mut self) {
+        for _ in 0..100 {
+            self.give(Input::Ack(Ack { command: RigCommand::Stop }));
+            self.sample(volts(0.0));
+            if self.state().holding().is_some() {
+                return;
+            }
+        }
+        panic!("does not settle: {:?}", self.state());
+    }
+}
+
+fn tripped(effects: &[Effect]) -> Option<Interlock> {
+    effects.iter().find_map(|effect| match effect {
+        Effect::Record(Record::InterlockTripped { interlock, .. }) => Some(*interlock),
+        _ => None,
+    })
+}
+
+fn commands(effects: &[Effect]) -> Vec<RigCommand> {
+    let of = |effect: &Effect| match effect {
+        Effect::Command(command) => Some(*command),
+        _ => None,
+    };
+    effects.iter().filter_map(of).collect()
+}
+
+#[test]
+fn a_plan_runs_to_its_end() {
+    let mut bench = Bench::holding(0.05);
+    for _ in 0..49 {
+        bench.sample(volts(0.0));
+        assert_eq!(bench.state().phase(), Phase::Hold);
+    }
+    let effects = bench.sample(volts(0.0));
+    let outcome = bench.state().outcome().unwrap();
+    assert_eq!(outcome.ending, EndingKind::Finish);
+    assert!(effects.contains(&Effect::Finished(outcome.clone())));
+    assert_eq!(bench.state().power(), Power::Stopped);
+}
+
+#[test]
+fn interlocks_come_before_the_plan() {
+    // The sample that would complete the hold, and with it the run, is above the force limit.
+    let mut bench = Bench::holding(0.05);
+    (0..49).for_each(|_| drop(bench.sample(volts(0.0))));
+    let effects = bench.sample(volts(9.5));
+    assert_eq!(tripped(&effects), Some(Interlock::Force));
+    assert_eq!(commands(&effects), [RigCommand::Stop]);
+    assert_eq!(bench.state().outcome(), None, "the plan must not have seen the sample");
+    bench.settle();
+    assert_eq!(bench.state().holding().unwrap().ending, EndingKind::Interlock);
+}
+
+#[test]
+fn the_first_interlock_in_order_is_the_reason() {
+    let check = |volts: f64, status: AxisStatus, late_ms: u64, expected: Interlock| {
+        let mut bench = Bench::holding(10.0);
+        bench.status = AxisStatus::MOTOR_ON | status;
+        bench.now = bench.now + Nanos::from_millis(late_ms);
+        assert_eq!(tripped(&bench.sample(volts)), Some(expected), "{volts} {status:?} {late_ms}");
+    };
+    let limit = AxisStatus::FORWARD_LIMIT;
+    // Everything at once, then one fault less each time.
+    check(f64::NAN, limit, 500, Interlock::Signal);
+    check(volts(30.0), limit, 500, Interlock::Travel);
+    check(volts(30.0), AxisStatus::default(), 500, Interlock::Force);
+    check(volts(8.0), AxisStatus::default(), 500, Interlock::ForceRate);
+    check(volts(0.0), AxisStatus::default(), 500, Interlock::SampleAge);
+    check(volts(-2.0), AxisStatus::default(), 0, Interlock::Force);
+}
+
+#[test]
+fn raw_volts_trip_whatever_the_calibration_says() {
+    // A cell whose calibration claims 2.85 V is 3 N: only the raw limit sees it.
+    let mut bench = Bench::holding(10.0);
+    let mut config = bench.state().config().clone();
+    let calibration = Calibration::linear("soft", Volts(ZERO), 0.5, Newtons(50.0));
+    config.curve = calibration.curve().unwrap();
+    bench.state.as_mut().unwrap().config = Arc::new(config);
+    let effects = bench.sample(2.85);
+    assert_eq!(tripped(&effects), Some(Interlock::Volts));
+}
+
+#[test]
+fn silence_trips_by_the_speed() {
+    let mut bench = Bench::holding(10.0);
+    bench.now = bench.now + Nanos::from_millis(250);
+    assert_eq!(tripped(&bench.give(Input::Tick)), None);
+    bench.now = bench.now + Nanos::from_millis(1);
+    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(Limits::sample_age_max(MmPerS(0.75)), Seconds(0.1 / 0.75));
+    assert_eq!(Limits::sample_age_max(MmPerS(20.0)), Seconds(0.020));
+}
+
+#[test]
+fn every_ending_stops_the_axis_and_says_why() {
+    for (choice, ending, command) in [
+        (Operator::Stop, EndingKind::Stop, RigCommand::Stop),
+        (Operator::Abort, EndingKind::Abort, RigCommand::Stop),
+        (Operator::Halt, EndingKind::Halt, RigCommand::Halt),
+    ] {
+        let mut bench = Bench::holding(10.0);
+        let effects = bench.give(Input::Operator { choice });
+        assert_eq!(commands(&effects), [command]);
+        bench.give(Input::Ack(Ack { command }));
+        bench.sample(volts(0.0));
+        assert_eq!(bench.state().holding().unwrap().ending, ending);
+        assert_eq!(bench.state().is_homed(), choice != Operator::Halt, "a halt may lose steps");
+        let effects = bench.give(Input::Operator { choice: Operator::Close });
+        assert!(matches!(&effects[..], [.., Effect::Finished(outcome)] if outcome.ending == ending));
+    }
+}
+
+#[test]
+fn faults_end_the_run_and_unhome_where_position_is_lost() {
+    for (fault, ending, is_homed) in [
+        (Fault::LinkLost { detail: "gone".into() }, EndingKind::Interlock, false),
+        (Fault::ControllerReset, EndingKind::Interlock, false),
+        (Fault::CommandRefused { detail: "no".into() }, EndingKind::Abort, true),
+        (Fault::LogFailed { detail: "full".into() }, EndingKind::Abort, true),
+    ] {
+        let mut bench = Bench::holding(10.0);
+        let effects = bench.give(Input::Fault(fault.clone()));
+        assert_eq!(commands(&effects), [RigCommand::Stop], "{fault:?}");
+        bench.now = bench.now + Nanos::from_millis(2_001);
+        bench.give(Input::Tick);
+        assert_eq!(bench.state().holding().unwrap().ending, ending, "{fault:?}");
+        assert_eq!(bench.state().is_homed(), is_homed, "{fault:?}");
+    }
+}
+
+#[test]
+fn a_clock_that_runs_back_is_a_reset_controller() {
+    let mut bench = Bench::holding(10.0);
+    bench.tick = 0;
+    assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Link));
+    assert!(!bench.state().is_homed());
+}
+
+#[test]
+fn a_command_without_acknowledgement_is_a_lost_link() {
+    let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }]);
+    bench.give(Input::Operator { choice: Operator::Start });
+    let trip = (0..1100).find_map(|_| tripped(&bench.sample(volts(0.0))));
+    assert_eq!(trip, Some(Interlock::Link));
+}
+
+#[test]
+fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
+    let unhomed = |step: Step| {
+        let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }, step]);
+        let mut config = bench.state().config().clone();
+        config.is_homed = false;
+        bench.state = Some(State::new(Arc::new(config)));
+        bench.give(Input::Operator { choice: Operator::Start });
+        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
+            bench.give(Input::Ack(Ack { command }));
+        }
+        let sent: Vec<_> = (0..150).flat_map(|_| commands(&bench.sample(volts(0.0)))).collect();
+        sent
+    };
+    let ramp = Step::Ramp { speed: MmPerS(0.75), depth: palpate_model::Depth(1.0) };
+    assert_eq!(unhomed(ramp), [RigCommand::Stop]);
+    let jog = Step::Jog { distance_mm: 1.5, speed: MmPerS(0.75) };
+    assert!(matches!(unhomed(jog)[..], [RigCommand::MoveTo(command)] if command.target_pulses == 100));
+}
+
+#[test]
+fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
+    let reason = |signal: fn(u64) -> f64| {
+        let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }]);
+        bench.give(Input::Operator { choice: Operator::Start });
+        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
+            bench.give(Input::Ack(Ack { command }));
+        }
+        for _ in 0..120 {
+            bench.tick += 1;
+            bench.now = bench.now + Nanos::from_millis(1);
+            let (tick, volts) = (bench.tick, Volts(signal(bench.tick)));
+            let status = AxisStatus::MOTOR_ON;
+            let reading = Reading { tick, counts: None, volts, pulses: 0, status };
+            let effects = bench.give(Input::Reading(reading));
+            if let Some(Effect::Record(Record::EndingStarted { reason, .. })) = effects.first() {
+                return reason.clone();
+            }
+        }
+        String::new()
+    };
+    assert!(reason(|_| ZERO).contains("does not change"));
+    assert!(reason(|tick| ZERO + if tick % 2 == 0 { 0.01 } else { -0.01 }).contains("noise"));
+    assert!(reason(|tick| volts(2.0) + (tick % 2) as f64 * 1e-3).contains("before anything touches"));
+}
+
+#[test]
+fn steps_are_pure() {
+    let mut bench = Bench::holding(10.0);
+    let state = bench.state().clone();
+    let reading = Reading {
+        tick: bench.tick + 1,
+        counts: None,
+        volts: Volts(volts(1.0)),
+        pulses: 0,
+        status: AxisStatus::MOTOR_ON,
+    };
+    let (a, b) = (
+        step(state.clone(), bench.now, Input::Reading(reading)),
+        step(state, bench.now, Input::Reading(reading)),
+    );
+    assert_eq!(a, b);
+    bench.sample(volts(0.0));
+}
