@@ -1,0 +1,137 @@
+//! The exact response of first-order filters to depth that moves straight between samples.
+//!
+//! Over one interval of length `h` let `x(s) = x0 + d s / h`. The filtered power
+//! `f_k + tau f_k' = x^k` and the filtered viscous drive `G + tau G' = x x'` then obey
+//!
+//! ```text
+//! f_k(+) = f_k + sum_j C(k,j) x0^(k-j) d^j psi_j(r) - psi_0(r) f_k        r = h / tau
+//! G(+)   = G + (d / h) (x0 psi_0(r) + d psi_1(r)) - psi_0(r) G
+//! ```
+//!
+//! with no time-step error. The increment form matters: `exp(-r) f + w` rounds `exp(-r)`, which
+//! shifts tau by about `eps tau / h`, a relative 1e-10 in the identified parameters at 1 kHz and
+//! tau of 100 s. Neither depth nor force is ever differentiated.
+
+use super::psi::{PSI_COUNT, psi_all};
+
+/// A running sum with its rounding error carried along (Knuth's two-sum).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Compensated {
+    /// The sum.
+    pub value: f64,
+    carry: f64,
+}
+
+impl Compensated {
+    /// A sum that starts at `value`.
+    pub const fn new(value: f64) -> Self {
+        Self { value, carry: 0.0 }
+    }
+
+    /// Adds one increment.
+    #[inline]
+    pub fn add(&mut self, increment: f64) {
+        let increment = increment + self.carry;
+        let sum = self.value + increment;
+        let part = sum - self.value;
+        self.carry = (self.value - (sum - part)) + (increment - part);
+        self.value = sum;
+    }
+
+    /// One filter step, towards a forcing already weighted by psi.
+    #[inline]
+    pub fn relax(&mut self, weighted: f64, psi_0: f64) {
+        self.add(weighted - psi_0 * self.value);
+    }
+}
+
+/// The psi functions of one step length at one relaxation time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct StepWeights {
+    /// Step length in s.
+    pub dt: f64,
+    /// `dt / tau`.
+    pub r: f64,
+    /// `psi_0 ..= psi_4`.
+    pub psi: [f64; PSI_COUNT],
+}
+
+impl StepWeights {
+    /// Weights of a step of `dt > 0` seconds at `tau >= 0` seconds.
+    pub fn new(dt: f64, tau: f64) -> Self {
+        let r = dt / tau;
+        Self {
+            dt,
+            r,
+            psi: psi_all(r),
+        }
+    }
+}
+
+/// The weighted forcing of `f_1, f_2, f_3` over a straight piece from `x0` to `x0 + d`, by any
+/// functions in the place of psi (psi itself, or its derivative).
+#[inline]
+pub(crate) fn forcing(x0: f64, d: f64, psi: &[f64]) -> [f64; 3] {
+    let linear = x0 * psi[0] + d * psi[1];
+    let square = x0 * x0 * psi[0] + d * (2.0 * x0 * psi[1] + d * psi[2]);
+    let cube =
+        x0 * x0 * x0 * psi[0] + d * (3.0 * x0 * x0 * psi[1] + d * (3.0 * x0 * psi[2] + d * psi[3]));
+    [linear, square, cube]
+}
+
+/// A straight piece of depth, cut where it crosses the surface: at most one part in contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Pieces {
+    /// In contact all the way.
+    Inside,
+    /// Out of contact all the way.
+    Outside,
+    /// Out of contact, then in contact; the share of the step spent outside.
+    Entering(f64),
+    /// In contact, then out; the share of the step spent inside.
+    Leaving(f64),
+}
+
+impl Pieces {
+    /// Where a straight move from depth `from` to depth `to` touches; depth 0 is the surface.
+    pub fn of(from: f64, to: f64) -> Self {
+        match (from >= 0.0, to >= 0.0) {
+            (true, true) => Self::Inside,
+            (false, false) => Self::Outside,
+            (false, true) => Self::Entering(from / (from - to)),
+            (true, false) => Self::Leaving(from / (from - to)),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn compensation_keeps_what_plain_sums_lose() {
+        let mut sum = Compensated::new(1.0);
+        for _ in 0..1_000_000 {
+            sum.add(1e-17);
+        }
+        assert!((sum.value - (1.0 + 1e-11)).abs() < 1e-15);
+    }
+
+    #[test]
+    fn forcing_of_a_still_probe_is_the_power_itself() {
+        let weights = StepWeights::new(0.7, 0.3);
+        let force = forcing(3.0, 0.0, &weights.psi);
+        for (k, value) in force.iter().enumerate() {
+            let exact = 3f64.powi(k as i32 + 1) * weights.psi[0];
+            assert!((value - exact).abs() < 1e-14 * exact);
+        }
+    }
+
+    #[test]
+    fn crossings_are_cut_at_the_surface() {
+        assert_eq!(Pieces::of(0.0, 0.0), Pieces::Inside);
+        assert_eq!(Pieces::of(-2.0, -0.1), Pieces::Outside);
+        assert_eq!(Pieces::of(-1.0, 3.0), Pieces::Entering(0.25));
+        assert_eq!(Pieces::of(3.0, -1.0), Pieces::Leaving(0.75));
+    }
+}
