@@ -2,8 +2,14 @@
 //!
 //! This crate turns commands into bytes and bytes into readings. It never decides: what to do
 //! with a reading is the engine's business, and nothing here starts a move by itself.
-//! Start reading at [`rig`], the trait every rig implements.
+//! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
+//! no hardware. [`doubles`] is for tests only.
 
+pub mod doubles;
+pub mod open;
 pub mod rig;
+pub mod serial;
+pub mod sim;
 
+pub use open::open;
 pub use rig::{Rig, RigError, RigEvent, RigEventBody};

@@ -1,0 +1,9 @@
+//! Faulty stand-ins for tests: they take a rig's commands and give its reports, and fail as told.
+//!
+//! For tests only. No runtime code names this module.
+
+mod faulty_rig;
+mod script;
+
+pub use faulty_rig::FaultyRig;
+pub use script::{FaultKind, Rail, ScriptedFault};

@@ -1,0 +1,257 @@
+//! The simulated rig: a slider, a load cell and a specimen to plan, train and demonstrate on.
+//!
+//! It takes the same commands and reports the same readings as a rig on wires, in simulated time:
+//! the controller samples once per tick, commands reach it half a millisecond after they are sent
+//! and act at the next tick, reports reach the host 1.0 to 1.5 ms after their tick. Nothing
+//! is simulated beyond the event that is handed out, so an answer to that event acts when it
+//! would on wires. Equal settings and equal commands at equal events give equal events, bit for bit.
+
+mod clock;
+mod load_cell;
+mod random;
+mod settings;
+mod slider;
+mod tissue;
+
+pub use load_cell::calibration;
+pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
+pub(crate) use random::{Cause, Random};
+pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
+
+use crate::rig::{Rig, RigEvent, RigEventBody};
+use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
+use load_cell::LoadCell;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{Fault, Reading, RigCommand, RigDescription};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_model::{MmPerS, MmPerS2, Nanos, Newtons, Position, Seconds};
+use slider::{ACCELERATION_QUANTUM, Slider};
+use std::collections::VecDeque;
+use tissue::Tissue;
+
+/// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
+const MM_PER_PULSE: f64 = 0.015;
+/// Stroke of the slide.
+const TRAVEL: Position = Position(150.0);
+/// 2 counts/s, the resolution of `SP` at a nominal millisecond in Galil's DMC command reference.
+const SPEED_QUANTUM: MmPerS = MmPerS(2.0 * MM_PER_PULSE);
+/// Faster than any published indentation of soft tissue with such a slide.
+const SPEED_MAX: MmPerS = MmPerS(20.0);
+/// Four acceleration quanta: the thesis's 0.75 mm/s is reached within 13 ms and 5 um.
+const ACCELERATION: MmPerS2 = MmPerS2(4.0 * ACCELERATION_QUANTUM.0);
+/// Commands on their way; a controller's input buffer holds no more.
+const COMMANDS_MAX: usize = 64;
+/// Changes whenever equal settings no longer give equal events.
+const SIMULATOR_VERSION: u32 = 1;
+
+/// What is really so on a simulated rig, for demonstrations and tests. No decision of a run may
+/// use it: a rig on wires has no such thing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Truth {
+    /// Tick the other values belong to.
+    pub tick: u64,
+    /// Probe, in mm from the edge of the home switch.
+    pub position: Position,
+    /// Tissue surface, in mm from the edge of the home switch.
+    pub surface: Position,
+    /// Where the pulse counter reads zero, in mm from the edge of the home switch.
+    pub counter_zero: Position,
+    /// The specimen.
+    pub body: ModifiedKelvin,
+    /// Force on the probe.
+    pub force: Newtons,
+}
+
+impl Truth {
+    /// The probe's position on the scale of the pulse counter, as a host sees it.
+    #[must_use]
+    pub fn position_counted(&self) -> Position {
+        Position(self.position.distance_from(self.counter_zero))
+    }
+
+    /// The surface's position on the scale of the pulse counter, as a host sees it.
+    #[must_use]
+    pub fn surface_counted(&self) -> Position {
+        Position(self.surface.distance_from(self.counter_zero))
+    }
+}
+
+/// The simulated rig.
+#[derive(Clone, Debug)]
+pub struct SimRig {
+    description: RigDescription,
+    settings: SimSettings,
+    tick: Seconds,
+    clock: TickClock,
+    link: ReportLink,
+    slider: Slider,
+    tissue: Tissue,
+    load_cell: LoadCell,
+    truth: Truth,
+    /// Time of the newest event handed out: the host's present.
+    now: Nanos,
+    /// Commands under way, with their arrival at the controller.
+    commands: VecDeque<(Nanos, RigCommand)>,
+    /// A command found the controller's buffer full.
+    is_overrun: bool,
+    /// Reports of the newest tick that have not been handed out.
+    reports: VecDeque<RigEvent>,
+}
+
+impl SimRig {
+    /// A rig just powered up, called `sim`.
+    #[must_use]
+    pub fn new(settings: SimSettings) -> Self {
+        Self::named("sim", settings)
+    }
+
+    /// A rig just powered up, with a name of its own.
+    #[must_use]
+    pub fn named(name: &str, settings: SimSettings) -> Self {
+        let description = describe(name, &settings);
+        let tick = description.tick();
+        let mut machine = Random::new(settings.seed, Cause::Machine);
+        let slider = Slider::new(&description, &mut machine);
+        let tissue = Tissue::new(&mut Random::new(settings.seed, Cause::Tissue));
+        // The controller was switched on up to a minute and a half before the host looked.
+        let tick_count = machine.between(1.0, 1e5) as u64;
+        let truth = Truth {
+            tick: tick_count,
+            position: slider.counter_zero(),
+            surface: tissue.surface(),
+            counter_zero: slider.counter_zero(),
+            body: tissue.body(),
+            force: Newtons(0.0),
+        };
+        Self {
+            tick,
+            clock: TickClock::new(tick_count, description.tick_nanos),
+            link: ReportLink::new(settings.seed),
+            load_cell: LoadCell::new(&settings, tick),
+            slider,
+            tissue,
+            truth,
+            description,
+            settings,
+            now: Nanos::ZERO,
+            commands: VecDeque::new(),
+            is_overrun: false,
+            reports: VecDeque::new(),
+        }
+    }
+
+    /// The settings that rebuild this rig.
+    #[must_use]
+    pub fn settings(&self) -> SimSettings {
+        self.settings
+    }
+
+    /// What the laboratory's calibration of this rig's load cell says.
+    #[must_use]
+    pub fn calibration(&self) -> Calibration {
+        calibration(self.settings.profile)
+    }
+
+    /// What is really so at the tick of the newest event; see [`Truth`].
+    #[must_use]
+    pub fn truth(&self) -> Truth {
+        self.truth
+    }
+
+    /// One tick of the controller: commands that have arrived, motion, tissue, sample.
+    fn simulate_tick(&mut self) {
+        let (tick, at) = self.clock.advance();
+        self.slider.begin_tick(tick);
+        if std::mem::take(&mut self.is_overrun) {
+            let detail = format!("input buffer full, keep below {COMMANDS_MAX} commands at once");
+            self.report(at, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        }
+        while let Some(&(arrival, command)) = self.commands.front() {
+            if arrival > at {
+                break;
+            }
+            self.commands.pop_front();
+            let answer = match self.slider.execute(tick, command) {
+                Ok(ack) => RigEventBody::Ack(ack),
+                Err(fault) => RigEventBody::Fault(fault),
+            };
+            self.report(at, answer);
+        }
+        let axis = self.slider.end_tick(tick);
+        let force = self.tissue.advance(axis.position, self.tick);
+        let (counts, volts) = self.load_cell.read(force);
+        self.truth = Truth {
+            tick,
+            position: axis.position,
+            counter_zero: self.slider.counter_zero(),
+            force: self.tissue.force(),
+            ..self.truth
+        };
+        let reading = Reading {
+            tick,
+            counts,
+            volts,
+            pulses: axis.pulses,
+            status: axis.status,
+        };
+        self.report(at, RigEventBody::Reading(reading));
+    }
+
+    fn report(&mut self, sent: Nanos, body: RigEventBody) {
+        let at = self.link.arrival(sent);
+        self.reports.push_back(RigEvent { at, body });
+    }
+}
+
+impl Rig for SimRig {
+    fn description(&self) -> &RigDescription {
+        &self.description
+    }
+
+    fn send(&mut self, command: RigCommand) {
+        if self.commands.len() >= COMMANDS_MAX {
+            self.is_overrun = true;
+        } else {
+            self.commands
+                .push_back((self.now + COMMAND_LATENCY, command));
+        }
+    }
+
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
+        // A tick is simulated only when all its predecessors have been handed out and it can be
+        // seen by `until`. A command sent after it arrives half a millisecond after the newest event
+        // and so after the tick, which lies at least one millisecond before that event.
+        if self.reports.is_empty() && self.clock.next_at() + REPORT_LATENCY <= until {
+            self.simulate_tick();
+        }
+        if self.reports.front()?.at > until {
+            return None;
+        }
+        let event = self.reports.pop_front()?;
+        self.now = event.at;
+        Some(event)
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
+fn describe(name: &str, settings: &SimSettings) -> RigDescription {
+    RigDescription {
+        name: name.to_owned(),
+        identity: format!(
+            "Simulated slider, load cell and specimen, {} profile, simulator {SIMULATOR_VERSION}",
+            settings.profile
+        ),
+        settings: settings.to_map(),
+        mm_per_pulse: MM_PER_PULSE,
+        travel: TRAVEL,
+        tick_nanos: settings.clock.tick_nanos(),
+        speed_quantum: SPEED_QUANTUM,
+        speed_max: SPEED_MAX,
+        acceleration: ACCELERATION,
+        adc: load_cell::adc(settings.profile),
+        noise_expected: load_cell::noise_expected(settings.profile),
+    }
+}

@@ -1,0 +1,104 @@
+//! Random numbers: one recorded seed, one independent generator per cause.
+//!
+//! Separate generators keep causes apart: a longer run draws more noise but meets the same
+//! tissue, and a change to one cause leaves the recorded numbers of the others as they were.
+
+use rand_distr::{Distribution, StandardNormal, StandardUniform};
+use rand_pcg::Pcg64;
+
+/// What a generator is used for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Cause {
+    /// Where the slider stands at power-on, and the controller's count.
+    Machine = 1,
+    /// Surface and stiffness of the tissue.
+    Tissue = 2,
+    /// White noise of the load cell.
+    Noise = 3,
+    /// Slow drift of the load cell.
+    Drift = 4,
+    /// Jitter of the link to the host.
+    Link = 5,
+    /// Noise added by a faulty stand-in.
+    Fault = 6,
+}
+
+/// The generator of one cause.
+#[derive(Clone, Debug)]
+pub struct Random(Pcg64);
+
+impl Random {
+    /// The generator of `cause` under `seed`.
+    pub fn new(seed: u64, cause: Cause) -> Self {
+        let cause = cause as u64;
+        let high = scrambled(seed ^ scrambled(cause));
+        let low = scrambled(high);
+        Self(Pcg64::new(
+            (u128::from(high) << 64) | u128::from(low),
+            u128::from(cause),
+        ))
+    }
+
+    /// Uniform in 0..1, 1 excluded.
+    pub fn unit(&mut self) -> f64 {
+        StandardUniform.sample(&mut self.0)
+    }
+
+    /// Uniform between two numbers.
+    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+        low + (high - low) * self.unit()
+    }
+
+    /// Normal with mean 0 and standard deviation 1.
+    #[inline]
+    pub fn normal(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+
+    /// 1 plus a normal spread, cut off at three standard deviations so that a rare seed does not
+    /// make an impossible specimen.
+    pub fn around_one(&mut self, spread: f64) -> f64 {
+        1.0 + spread * self.normal().clamp(-3.0, 3.0)
+    }
+}
+
+/// The finaliser of SplitMix64 (Steele, Lea & Flood, OOPSLA 2014): neighbouring seeds become
+/// unrelated states.
+fn scrambled(seed: u64) -> u64 {
+    let mut z = seed.wrapping_add(0x9e37_79b9_7f4a_7c15);
+    z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+    z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+    z ^ (z >> 31)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_scrambler_is_splitmix64() {
+        // First two outputs of SplitMix64 from state 0 (the reference program's test values).
+        assert_eq!(scrambled(0), 0xe220_a839_7b1d_cdaf);
+        assert_eq!(scrambled(0x9e37_79b9_7f4a_7c15), 0x6e78_9e6a_a1b9_65f4);
+    }
+
+    #[test]
+    fn causes_and_seeds_are_unrelated() {
+        let draw = |seed, cause| -> Vec<f64> {
+            let mut random = Random::new(seed, cause);
+            (0..4000).map(|_| random.normal()).collect()
+        };
+        let base = draw(7, Cause::Noise);
+        assert_eq!(base, draw(7, Cause::Noise));
+        for other in [
+            draw(8, Cause::Noise),
+            draw(7, Cause::Drift),
+            draw(7, Cause::Link),
+        ] {
+            let correlation: f64 =
+                base.iter().zip(&other).map(|(a, b)| a * b).sum::<f64>() / base.len() as f64;
+            // Five standard errors of 1 / sqrt(4000).
+            assert!(correlation.abs() < 0.08, "{correlation}");
+        }
+    }
+}

@@ -1,0 +1,168 @@
+//! What makes one simulated rig differ from another; with these three values it can be rebuilt.
+
+use std::collections::BTreeMap;
+use std::fmt;
+use std::str::FromStr;
+use thiserror::Error;
+
+/// How much of a laboratory the simulated load cell shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SimProfile {
+    /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
+    #[default]
+    Lab,
+    /// A straight cell without drift or converter, and 0.02 N rms of white noise.
+    Ideal,
+}
+
+/// The controller's sample clock.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum SimClock {
+    /// 1000 us per tick.
+    #[default]
+    Nominal,
+    /// 976 us per tick: what a Galil controller makes of its nominal millisecond (`TM 1000`).
+    Galil,
+}
+
+impl SimClock {
+    /// True length of one tick in nanoseconds.
+    #[must_use]
+    pub const fn tick_nanos(self) -> u64 {
+        match self {
+            Self::Nominal => 1_000_000,
+            Self::Galil => 976_000,
+        }
+    }
+}
+
+/// Everything that determines a simulated rig.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SimSettings {
+    /// How real the load cell is.
+    pub profile: SimProfile,
+    /// Seed of every random number the rig uses.
+    pub seed: u64,
+    /// The controller's sample clock.
+    pub clock: SimClock,
+}
+
+/// A setting of the simulated rig cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("the simulated rig's {setting} cannot be '{value}'; give {choices}")]
+pub struct SimSettingError {
+    /// Which setting.
+    pub setting: &'static str,
+    /// What was given.
+    pub value: String,
+    /// What is accepted.
+    pub choices: &'static str,
+}
+
+impl SimSettingError {
+    fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
+        Self {
+            setting,
+            value: value.to_owned(),
+            choices,
+        }
+    }
+}
+
+impl SimSettings {
+    /// The settings as a rig's description carries them: `profile`, `seed`, `clock`.
+    #[must_use]
+    pub fn to_map(&self) -> BTreeMap<String, String> {
+        BTreeMap::from([
+            ("profile".to_owned(), self.profile.to_string()),
+            ("seed".to_owned(), self.seed.to_string()),
+            ("clock".to_owned(), self.clock.to_string()),
+        ])
+    }
+
+    /// The inverse of [`SimSettings::to_map`]; all three values must be there, others are ignored.
+    pub fn from_map(map: &BTreeMap<String, String>) -> Result<Self, SimSettingError> {
+        let text = |name: &str| map.get(name).map_or("", String::as_str);
+        let seed = text("seed");
+        Ok(Self {
+            profile: text("profile").parse()?,
+            seed: seed
+                .parse()
+                .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
+            clock: text("clock").parse()?,
+        })
+    }
+}
+
+impl fmt::Display for SimProfile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Lab => "lab",
+            Self::Ideal => "ideal",
+        })
+    }
+}
+
+impl FromStr for SimProfile {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "lab" => Ok(Self::Lab),
+            "ideal" => Ok(Self::Ideal),
+            _ => Err(SimSettingError::new("profile", text, "'lab' or 'ideal'")),
+        }
+    }
+}
+
+impl fmt::Display for SimClock {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Nominal => "nominal",
+            Self::Galil => "galil",
+        })
+    }
+}
+
+impl FromStr for SimClock {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        match text {
+            "nominal" => Ok(Self::Nominal),
+            "galil" => Ok(Self::Galil),
+            _ => Err(SimSettingError::new("clock", text, "'nominal' or 'galil'")),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn settings_survive_their_map() {
+        for profile in [SimProfile::Lab, SimProfile::Ideal] {
+            for clock in [SimClock::Nominal, SimClock::Galil] {
+                let settings = SimSettings {
+                    profile,
+                    seed: u64::MAX - 3,
+                    clock,
+                };
+                assert_eq!(SimSettings::from_map(&settings.to_map()), Ok(settings));
+            }
+        }
+    }
+
+    #[test]
+    fn a_wrong_word_is_named_with_the_right_ones() {
+        let err = "Lab".parse::<SimProfile>().unwrap_err();
+        assert_eq!(
+            err.to_string(),
+            "the simulated rig's profile cannot be 'Lab'; give 'lab' or 'ideal'"
+        );
+        let mut map = SimSettings::default().to_map();
+        map.insert("seed".to_owned(), "-1".to_owned());
+        assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");
+        map.remove("seed");
+        assert_eq!(SimSettings::from_map(&map).unwrap_err().value, "");
+    }
+}
