@@ -31,7 +31,9 @@ pub enum SourceError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// The session ended before there was anything to fit.
-    #[error("the session has no ramp and hold with known force and depth, so there is nothing to fit")]
+    #[error(
+        "the session has no ramp and hold with known force and depth, so there is nothing to fit"
+    )]
     Empty,
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
@@ -43,14 +45,23 @@ pub enum SourceError {
 
 /// Reads a session folder, a session file or a table.
 pub fn read(path: &Path) -> Result<FitSource, SourceError> {
-    let is_session = path.is_dir() || path.extension().is_some_and(|extension| extension == "mcap");
+    let is_session = path.is_dir()
+        || path
+            .extension()
+            .is_some_and(|extension| extension == "mcap");
     if !is_session && path.exists() {
         let table = read_table(path)?;
-        return Ok(FitSource { samples: samples_of_table(&table), notes: table.notes });
+        return Ok(FitSource {
+            samples: samples_of_table(&table),
+            notes: table.notes,
+        });
     }
     let session = Session::open(path)?;
     let samples = samples_of(&session)?;
-    Ok(FitSource { samples, notes: session.notes })
+    Ok(FitSource {
+        samples,
+        notes: session.notes,
+    })
 }
 
 /// The ramp and hold of a session, each force weighted by what the signal's noise and the
@@ -62,7 +73,10 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let curve = calibration.curve().map_err(|err| bad(err.to_string()))?;
     let noise = noise_of(session).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;
-    let rows = session.rows.iter().filter(|row| matches!(row.phase, Phase::Ramp | Phase::Hold));
+    let rows = session
+        .rows
+        .iter()
+        .filter(|row| matches!(row.phase, Phase::Ramp | Phase::Hold));
     let mut first_tick = None;
     let samples: Vec<FitSample> = rows
         .filter_map(|row| {
@@ -76,7 +90,11 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
             })
         })
         .collect();
-    if samples.is_empty() { Err(SourceError::Empty) } else { Ok(samples) }
+    if samples.is_empty() {
+        Err(SourceError::Empty)
+    } else {
+        Ok(samples)
+    }
 }
 
 /// The signal's noise as the tare found it.

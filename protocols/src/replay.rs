@@ -103,9 +103,16 @@ pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     let Some(text) = palpate_sessions::folder::read_if_present(&path)? else {
         return Ok(Vec::new());
     };
-    let blessings: Vec<Blessing> = serde_json::from_str(&text)
-        .map_err(|err| format!("the blessings cannot be understood ({err}): {}", path.display()))?;
-    match blessings.iter().find(|blessing| blessing.reason.trim().is_empty()) {
+    let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {
+        format!(
+            "the blessings cannot be understood ({err}): {}",
+            path.display()
+        )
+    })?;
+    match blessings
+        .iter()
+        .find(|blessing| blessing.reason.trim().is_empty())
+    {
         Some(blessing) => Err(format!(
             "decision {} is blessed without a reason; write it down: {}",
             blessing.decision,

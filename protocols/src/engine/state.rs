@@ -95,6 +95,8 @@ pub(super) enum Active {
 pub(super) enum Activity {
     /// Not started.
     Waiting,
+    /// Started; the plan begins with the first sample, which tells clock and position.
+    Starting,
     /// Running the plan.
     Step(Active),
     /// Decelerating because of `ending`.
@@ -219,7 +221,10 @@ impl State {
     pub fn is_motion_possible(&self) -> bool {
         matches!(
             self.activity,
-            Activity::Step(_) | Activity::Braking { .. } | Activity::Retracting { .. }
+            Activity::Starting
+                | Activity::Step(_)
+                | Activity::Braking { .. }
+                | Activity::Retracting { .. }
         )
     }
 

@@ -46,6 +46,9 @@ fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
     if let Some(trip) = trip.or_else(|| acknowledgement_trip(cx)) {
         return on_trip(cx, trip);
     }
+    if cx.state.activity == Activity::Starting {
+        return begin_step(cx, 0);
+    }
     match cx.state.activity.take_step() {
         Some(active) => run_step(cx, active, reading),
         None => stop::on_time(cx),
@@ -266,7 +269,7 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
     match choice {
         Operator::Start if cx.state.activity == Activity::Waiting => {
             cx.state.watch.start(cx.now);
-            begin_step(cx, 0);
+            cx.state.activity = Activity::Starting;
         }
         Operator::Start => {}
         Operator::Stop => stop::begin(cx, EndingKind::Stop, "the operator stopped the run".into()),

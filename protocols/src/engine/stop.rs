@@ -27,7 +27,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         Activity::Braking { ending, .. }
         | Activity::Holding { ending }
         | Activity::Retracting { ending } => ending.clone(),
-        Activity::Waiting | Activity::Step(_) => {
+        Activity::Waiting | Activity::Starting | Activity::Step(_) => {
             cx.record(Record::EndingStarted {
                 ending,
                 reason: reason.clone(),

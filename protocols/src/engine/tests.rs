@@ -48,24 +48,37 @@ impl Bench {
             rig: rig(),
             limits: Limits::for_travel(Position(150.0)),
             curve: calibration.curve().unwrap(),
-            plan: Plan { name: "table".into(), version: 1, steps },
+            plan: Plan {
+                name: "table".into(),
+                version: 1,
+                steps,
+            },
             is_homed: true,
         };
         let state = Some(State::new(Arc::new(config)));
-        Self { state, now: Nanos::ZERO, tick: 0, pulses: 0, status: AxisStatus::MOTOR_ON }
+        Self {
+            state,
+            now: Nanos::ZERO,
+            tick: 0,
+            pulses: 0,
+            status: AxisStatus::MOTOR_ON,
+        }
     }
 
     /// Self-tested, tared and inside a hold of `hold` seconds.
     fn holding(hold: f64) -> Self {
         let mut bench = Self::new(vec![
-            Step::SelfTest { duration: Seconds(0.1) },
-            Step::Tare { duration: Seconds(0.1) },
-            Step::Hold { duration: Seconds(hold) },
+            Step::SelfTest {
+                duration: Seconds(0.1),
+            },
+            Step::Tare {
+                duration: Seconds(0.1),
+            },
+            Step::Hold {
+                duration: Seconds(hold),
+            },
         ]);
-        bench.give(Input::Operator { choice: Operator::Start });
-        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
-            bench.give(Input::Ack(Ack { command }));
-        }
+        bench.start();
         for _ in 0..1000 {
             if bench.state().phase() == Phase::Hold {
                 return bench;
@@ -85,11 +98,26 @@ impl Bench {
         effects
     }
 
+    /// Starts the plan and acknowledges what the self-test sends.
+    fn start(&mut self) {
+        self.give(Input::Operator {
+            choice: Operator::Start,
+        });
+        self.sample(volts(0.0));
+        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
+            self.give(Input::Ack(Ack { command }));
+        }
+    }
+
     /// The next millisecond's sample, with a little alternating noise so that the cell lives.
     fn sample(&mut self, volts: f64) -> Vec<Effect> {
         self.tick += 1;
         self.now = self.now + Nanos::from_millis(1);
-        let noise = if self.tick.is_multiple_of(2) { 1e-4 } else { -1e-4 };
+        let noise = if self.tick.is_multiple_of(2) {
+            1e-4
+        } else {
+            -1e-4
+        };
         self.give(Input::Reading(Reading {
             tick: self.tick,
             counts: None,
@@ -102,7 +130,9 @@ impl Bench {
     /// Acknowledges stops until the run holds or has ended.
     fn settle(&mut self) {
         for _ in 0..100 {
-            self.give(Input::Ack(Ack { command: RigCommand::Stop }));
+            self.give(Input::Ack(Ack {
+                command: RigCommand::Stop,
+            }));
             self.sample(volts(0.0));
             if self.state().holding().is_some() {
                 return;
@@ -149,9 +179,16 @@ fn interlocks_come_before_the_plan() {
     let effects = bench.sample(volts(9.5));
     assert_eq!(tripped(&effects), Some(Interlock::Force));
     assert_eq!(commands(&effects), [RigCommand::Stop]);
-    assert_eq!(bench.state().outcome(), None, "the plan must not have seen the sample");
+    assert_eq!(
+        bench.state().outcome(),
+        None,
+        "the plan must not have seen the sample"
+    );
     bench.settle();
-    assert_eq!(bench.state().holding().unwrap().ending, EndingKind::Interlock);
+    assert_eq!(
+        bench.state().holding().unwrap().ending,
+        EndingKind::Interlock
+    );
 }
 
 #[test]
@@ -160,7 +197,11 @@ fn the_first_interlock_in_order_is_the_reason() {
         let mut bench = Bench::holding(10.0);
         bench.status = AxisStatus::MOTOR_ON | status;
         bench.now = bench.now + Nanos::from_millis(late_ms);
-        assert_eq!(tripped(&bench.sample(volts)), Some(expected), "{volts} {status:?} {late_ms}");
+        assert_eq!(
+            tripped(&bench.sample(volts)),
+            Some(expected),
+            "{volts} {status:?} {late_ms}"
+        );
     };
     let limit = AxisStatus::FORWARD_LIMIT;
     // Everything at once, then one fault less each time.
@@ -190,7 +231,10 @@ fn silence_trips_by_the_speed() {
     bench.now = bench.now + Nanos::from_millis(250);
     assert_eq!(tripped(&bench.give(Input::Tick)), None);
     bench.now = bench.now + Nanos::from_millis(1);
-    assert_eq!(tripped(&bench.give(Input::Tick)), Some(Interlock::SampleAge));
+    assert_eq!(
+        tripped(&bench.give(Input::Tick)),
+        Some(Interlock::SampleAge)
+    );
     assert_eq!(Limits::sample_age_max(MmPerS(0.75)), Seconds(0.1 / 0.75));
     assert_eq!(Limits::sample_age_max(MmPerS(20.0)), Seconds(0.020));
 }
@@ -208,19 +252,45 @@ fn every_ending_stops_the_axis_and_says_why() {
         bench.give(Input::Ack(Ack { command }));
         bench.sample(volts(0.0));
         assert_eq!(bench.state().holding().unwrap().ending, ending);
-        assert_eq!(bench.state().is_homed(), choice != Operator::Halt, "a halt may lose steps");
-        let effects = bench.give(Input::Operator { choice: Operator::Close });
-        assert!(matches!(&effects[..], [.., Effect::Finished(outcome)] if outcome.ending == ending));
+        assert_eq!(
+            bench.state().is_homed(),
+            choice != Operator::Halt,
+            "a halt may lose steps"
+        );
+        let effects = bench.give(Input::Operator {
+            choice: Operator::Close,
+        });
+        assert!(
+            matches!(&effects[..], [.., Effect::Finished(outcome)] if outcome.ending == ending)
+        );
     }
 }
 
 #[test]
 fn faults_end_the_run_and_unhome_where_position_is_lost() {
     for (fault, ending, is_homed) in [
-        (Fault::LinkLost { detail: "gone".into() }, EndingKind::Interlock, false),
+        (
+            Fault::LinkLost {
+                detail: "gone".into(),
+            },
+            EndingKind::Interlock,
+            false,
+        ),
         (Fault::ControllerReset, EndingKind::Interlock, false),
-        (Fault::CommandRefused { detail: "no".into() }, EndingKind::Abort, true),
-        (Fault::LogFailed { detail: "full".into() }, EndingKind::Abort, true),
+        (
+            Fault::CommandRefused {
+                detail: "no".into(),
+            },
+            EndingKind::Abort,
+            true,
+        ),
+        (
+            Fault::LogFailed {
+                detail: "full".into(),
+            },
+            EndingKind::Abort,
+            true,
+        ),
     ] {
         let mut bench = Bench::holding(10.0);
         let effects = bench.give(Input::Fault(fault.clone()));
@@ -242,8 +312,12 @@ fn a_clock_that_runs_back_is_a_reset_controller() {
 
 #[test]
 fn a_command_without_acknowledgement_is_a_lost_link() {
-    let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }]);
-    bench.give(Input::Operator { choice: Operator::Start });
+    let mut bench = Bench::new(vec![Step::SelfTest {
+        duration: Seconds(0.1),
+    }]);
+    bench.give(Input::Operator {
+        choice: Operator::Start,
+    });
     let trip = (0..1100).find_map(|_| tripped(&bench.sample(volts(0.0))));
     assert_eq!(trip, Some(Interlock::Link));
 }
@@ -251,37 +325,54 @@ fn a_command_without_acknowledgement_is_a_lost_link() {
 #[test]
 fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
     let unhomed = |step: Step| {
-        let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }, step]);
+        let mut bench = Bench::new(vec![
+            Step::SelfTest {
+                duration: Seconds(0.1),
+            },
+            step,
+        ]);
         let mut config = bench.state().config().clone();
         config.is_homed = false;
         bench.state = Some(State::new(Arc::new(config)));
-        bench.give(Input::Operator { choice: Operator::Start });
-        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
-            bench.give(Input::Ack(Ack { command }));
-        }
-        let sent: Vec<_> = (0..150).flat_map(|_| commands(&bench.sample(volts(0.0)))).collect();
+        bench.start();
+        let sent: Vec<_> = (0..150)
+            .flat_map(|_| commands(&bench.sample(volts(0.0))))
+            .collect();
         sent
     };
-    let ramp = Step::Ramp { speed: MmPerS(0.75), depth: palpate_model::Depth(1.0) };
+    let ramp = Step::Ramp {
+        speed: MmPerS(0.75),
+        depth: palpate_model::Depth(1.0),
+    };
     assert_eq!(unhomed(ramp), [RigCommand::Stop]);
-    let jog = Step::Jog { distance_mm: 1.5, speed: MmPerS(0.75) };
-    assert!(matches!(unhomed(jog)[..], [RigCommand::MoveTo(command)] if command.target_pulses == 100));
+    let jog = Step::Jog {
+        distance_mm: 1.5,
+        speed: MmPerS(0.75),
+    };
+    assert!(
+        matches!(unhomed(jog)[..], [RigCommand::MoveTo(command)] if command.target_pulses == 100)
+    );
 }
 
 #[test]
 fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
     let reason = |signal: fn(u64) -> f64| {
-        let mut bench = Bench::new(vec![Step::SelfTest { duration: Seconds(0.1) }]);
-        bench.give(Input::Operator { choice: Operator::Start });
-        for command in [RigCommand::EnableMotor, RigCommand::Stop] {
-            bench.give(Input::Ack(Ack { command }));
-        }
+        let mut bench = Bench::new(vec![Step::SelfTest {
+            duration: Seconds(0.1),
+        }]);
+        bench.start();
         for _ in 0..120 {
             bench.tick += 1;
             bench.now = bench.now + Nanos::from_millis(1);
             let (tick, volts) = (bench.tick, Volts(signal(bench.tick)));
             let status = AxisStatus::MOTOR_ON;
-            let reading = Reading { tick, counts: None, volts, pulses: 0, status };
+            let reading = Reading {
+                tick,
+                counts: None,
+                volts,
+                pulses: 0,
+                status,
+            };
             let effects = bench.give(Input::Reading(reading));
             if let Some(Effect::Record(Record::EndingStarted { reason, .. })) = effects.first() {
                 return reason.clone();
@@ -291,7 +382,9 @@ fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
     };
     assert!(reason(|_| ZERO).contains("does not change"));
     assert!(reason(|tick| ZERO + if tick % 2 == 0 { 0.01 } else { -0.01 }).contains("noise"));
-    assert!(reason(|tick| volts(2.0) + (tick % 2) as f64 * 1e-3).contains("before anything touches"));
+    assert!(
+        reason(|tick| volts(2.0) + (tick % 2) as f64 * 1e-3).contains("before anything touches")
+    );
 }
 
 #[test]
