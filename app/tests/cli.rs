@@ -1,0 +1,287 @@
+//! The command line as a user meets it: whole commands, their exit codes and their sentences.
+
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use std::process::{Command, Output, Stdio};
+
+fn palpate(folder: &Path, args: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(args)
+        .current_dir(folder)
+        .env("PALPATE_HOME", folder.join("library"))
+        .stdin(Stdio::null())
+        .output()
+        .expect("palpate starts")
+}
+
+fn json(output: &Output) -> Value {
+    let text = String::from_utf8_lossy(&output.stdout);
+    serde_json::from_str(&text).unwrap_or_else(|err| panic!("{err}: {text}{}", stderr(output)))
+}
+
+fn stderr(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stderr).into_owned()
+}
+
+fn succeeded(output: &Output) {
+    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+}
+
+/// A run short enough for a test: about 90 s of session time, most of it finding contact.
+const SHORT: [&str; 8] = ["run", "ramp-hold", "--speed", "3", "--depth", "6", "--hold", "1"];
+
+fn short_run(folder: &Path, out: &str, more: &[&str]) -> Output {
+    let mut args = SHORT.to_vec();
+    args.extend(["--time-scale", "max", "--out", out]);
+    args.extend(more);
+    palpate(folder, &args)
+}
+
+#[test]
+fn the_main_job_works_as_the_readme_writes_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = palpate(at, &["run", "ramp-hold", "--time-scale", "max", "--out", "demo", "--json"]);
+    succeeded(&run);
+    let run = json(&run);
+    assert_eq!((run["ending"].as_str(), run["command"].as_str()), (Some("finish"), Some("run")));
+
+    let fit = palpate(at, &["fit", "demo", "--json"]);
+    succeeded(&fit);
+    let fit = json(&fit);
+    let parameters = fit["parameters"].as_array().unwrap();
+    let value = |name: &str| {
+        let one = parameters.iter().find(|one| one["name"] == name);
+        one.and_then(|one| one["value"].as_f64()).unwrap_or_else(|| panic!("{name} in {fit}"))
+    };
+    // The simulated specimen varies by some percent around the thesis body.
+    for (name, thesis) in [("tau_eps", 1.023), ("mu3", 0.000_434_5), ("tau_sig", 0.06)] {
+        assert!((value(name) / thesis - 1.0).abs() < 0.25, "{name} = {}", value(name));
+    }
+    assert!(fit["r2"].as_f64().unwrap() > 0.999);
+    assert_eq!(fit["samples"].as_u64().unwrap() / 1000, 90);
+
+    let replay = palpate(at, &["replay", "demo", "--json"]);
+    succeeded(&replay);
+    let replay = json(&replay);
+    assert_eq!(replay["differing"], 0);
+    assert!(replay["sessions"][0]["decisions"].as_u64().unwrap() > 30);
+    assert_eq!(replay["sessions"][0]["force_difference_n"], 0.0);
+
+    succeeded(&palpate(at, &["export", "demo", "--format", "parquet"]));
+    succeeded(&palpate(at, &["export", "demo", "--format", "csv", "--to", "."]));
+    assert!(at.join("demo.parquet").metadata().unwrap().len() > 100_000);
+
+    // The exported table gives the fit of the session, within what equal weights change.
+    let table = palpate(at, &["fit", "demo.csv", "--json"]);
+    succeeded(&table);
+    assert_eq!(json(&table)["samples"], fit["samples"]);
+
+    let info = palpate(at, &["info", "demo", "--json"]);
+    succeeded(&info);
+    assert_eq!(json(&info)["ending"], "finish");
+}
+
+#[test]
+fn one_seed_gives_one_session_at_any_pace() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "max", &["--seed", "7"]));
+    let mut paced = SHORT.to_vec();
+    paced.extend(["--time-scale", "300", "--out", "paced", "--seed", "7"]);
+    succeeded(&palpate(at, &paced));
+    succeeded(&short_run(at, "other", &["--seed", "8"]));
+    let open = |name: &str| palpate_sessions::log::Session::open(&at.join(name)).unwrap();
+    let (max, paced, other) = (open("max"), open("paced"), open("other"));
+    assert_eq!(max.manifest.rig.settings["seed"], "7");
+    assert_eq!(max.rows, paced.rows);
+    assert_eq!(max.entries, paced.entries);
+    assert_ne!(max.rows, other.rows);
+    // The recorded seed rebuilds the rig: run again with what the manifest says.
+    let recorded = &max.manifest.rig.settings;
+    succeeded(&short_run(
+        at,
+        "again",
+        &["--seed", &recorded["seed"], "--profile", &recorded["profile"], "--clock", &recorded["clock"]],
+    ));
+    assert_eq!(open("again").rows, max.rows);
+}
+
+#[test]
+fn wrong_use_gets_one_sentence_and_exit_code_two() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("full")).unwrap();
+    std::fs::write(at.join("full/notes.txt"), "mine").unwrap();
+    std::fs::write(at.join("noforce.csv"), "t_s,depth_mm\n0,0\n1,1\n").unwrap();
+    std::fs::write(at.join("words.csv"), "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n").unwrap();
+    std::fs::write(at.join("nounits.csv"), "time,depth,force\n0,0,0\n1,1,1\n").unwrap();
+    std::fs::write(at.join("random.mcap"), "this is no session").unwrap();
+    std::fs::write(at.join("a-file"), "").unwrap();
+    let run = |more: &[&'static str]| {
+        let mut args = vec!["run", "ramp-hold", "--time-scale", "max"];
+        args.extend(more);
+        args
+    };
+    let cases: &[(Vec<&str>, &str)] = &[
+        (run(&["--depth", "200", "--out", "x"]), "beyond the travel"),
+        (run(&["--depth", "-3", "--out", "x"]), "above 0 mm"),
+        (run(&["--depth", "nan", "--out", "x"]), "not a finite number"),
+        (run(&["--speed", "inf", "--out", "x"]), "not a finite number"),
+        (run(&["--speed", "500", "--out", "x"]), "outside what rig sim makes"),
+        (run(&["--speed", "0.76", "--out", "x"]), "the nearest are 0.7500 and 0.7800 mm/s"),
+        (run(&["--hold", "-1", "--out", "x"]), "is not possible"),
+        (run(&["--time-scale", "fast", "--out", "x"]), "is not a time scale"),
+        (run(&["--profile", "perfect", "--out", "x"]), "perfect"),
+        (run(&["--rig", "robot", "--out", "x"]), "no rig is called 'robot'"),
+        (run(&["--depth", "45", "--out", "x"]), "calibrated only up to"),
+        (run(&["--out", "full"]), "not empty"),
+        (run(&["--out", "a-file/x"]), "a-file"),
+        (run(&["--out", "/proc/x"]), "/proc/x"),
+        (vec!["fit", "nowhere"], "nowhere"),
+        (vec!["fit", "noforce.csv"], "force"),
+        (vec!["fit", "words.csv"], "line 3"),
+        (vec!["fit", "nounits.csv"], "unit"),
+        (vec!["fit", "random.mcap"], "random.mcap"),
+        (vec!["fit", "noforce.csv", "--fixed", "f_offset"], "NAME=VALUE"),
+        (vec!["fit", "noforce.csv", "--fixed", "gravity=9.8"], "gravity"),
+        (vec!["replay", "full"], "full"),
+        (vec!["export", "full", "--format", "csv"], "full"),
+        (vec!["info", "nowhere"], "nowhere"),
+        (vec!["dance"], "dance"),
+    ];
+    for (args, expected) in cases {
+        let output = palpate(at, args);
+        let said = stderr(&output);
+        assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+        assert!(said.contains(expected), "{args:?} said: {said}");
+        assert!(!said.contains("panicked"), "{args:?}: {said}");
+    }
+    assert!(!at.join("x").exists(), "a refused run must not leave a folder");
+}
+
+#[test]
+fn errors_reach_machines_as_one_object() {
+    let folder = tempfile::tempdir().unwrap();
+    let output = palpate(folder.path(), &["fit", "nowhere", "--json"]);
+    let object = json(&output);
+    assert_eq!(object["exit"], 2);
+    assert!(object["error"].as_str().unwrap().contains("nowhere"));
+}
+
+#[test]
+fn an_acknowledged_force_band_is_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let output = palpate(
+        at,
+        &["run", "ramp-hold", "--depth", "45", "--speed", "6", "--hold", "1", "--acknowledge", "--time-scale", "max", "--out", "deep"],
+    );
+    // The specimen is stiffer than the interlock allows at that depth: the run ends, data kept.
+    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+    assert!(stderr(&output).contains("interlock"), "{}", stderr(&output));
+    let info = json(&palpate(at, &["info", "deep", "--json"]));
+    assert_eq!(info["ending"], "interlock");
+    assert!(info["acknowledgements"][0].as_str().unwrap().contains("calibrated only up to"));
+    succeeded(&palpate(at, &["replay", "deep"]));
+}
+
+#[test]
+fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "whole", &[]));
+    let log = log_file(&at.join("whole"));
+    let bytes = std::fs::read(&log).unwrap();
+
+    let truncated = at.join("truncated.mcap");
+    std::fs::write(&truncated, &bytes[..bytes.len() * 2 / 3]).unwrap();
+    let info = palpate(at, &["info", "truncated.mcap", "--json"]);
+    succeeded(&info);
+    let info = json(&info);
+    assert_eq!(info["is_complete"], false);
+    assert!(info["notes"][0].as_str().unwrap().contains("no end record"));
+
+    let mut damaged = bytes.clone();
+    damaged[bytes.len() / 2] ^= 0x10;
+    std::fs::write(at.join("damaged.mcap"), damaged).unwrap();
+    for command in [vec!["info", "damaged.mcap"], vec!["fit", "damaged.mcap"], vec!["replay", "damaged.mcap"]] {
+        let output = palpate(at, &command);
+        assert_eq!(output.status.code(), Some(1), "{command:?}: {}", stderr(&output));
+        assert!(stderr(&output).contains("damaged"), "{}", stderr(&output));
+    }
+}
+
+fn log_file(session: &Path) -> PathBuf {
+    std::fs::read_dir(session)
+        .unwrap()
+        .map(|entry| entry.unwrap().path())
+        .find(|path| path.extension().is_some_and(|extension| extension == "mcap"))
+        .expect("a log")
+}
+
+#[test]
+fn a_held_session_and_a_held_rig_name_their_holder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut holder = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "ramp-hold", "--rig", "sim:bench", "--out", "held"])
+        .current_dir(at)
+        .env("PALPATE_HOME", at.join("library"))
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let lock = at.join("held/lock");
+    let is_up = (0..500).any(|_| {
+        std::thread::sleep(std::time::Duration::from_millis(20));
+        std::fs::read_to_string(&lock).is_ok_and(|text| !text.is_empty())
+    });
+    assert!(is_up, "the holder does not start");
+    let pid = holder.id().to_string();
+    for args in [
+        vec!["run", "ramp-hold", "--rig", "sim:bench", "--out", "other"],
+        vec!["run", "ramp-hold", "--out", "held"],
+    ] {
+        let output = palpate(at, &args);
+        assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+        assert!(stderr(&output).contains(&pid), "{pid} in: {}", stderr(&output));
+    }
+    // Asked to end, the holder stops the slider, closes the session and reports failure.
+    let killed = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+    assert!(killed.success());
+    assert_eq!(holder.wait().unwrap().code(), Some(1));
+    let info = json(&palpate(at, &["info", "held", "--json"]));
+    assert_eq!(info["ending"], "stop");
+}
+
+#[test]
+fn a_killed_run_leaves_a_session_that_opens() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (i, millis) in [30, 60, 90, 130, 180, 250, 400].into_iter().enumerate() {
+        let name = format!("killed{i}");
+        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+            .args(["run", "ramp-hold", "--time-scale", "100", "--out", &name])
+            .current_dir(at)
+            .stdout(Stdio::null())
+            .stderr(Stdio::null())
+            .spawn()
+            .unwrap();
+        std::thread::sleep(std::time::Duration::from_millis(millis));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let Ok(entries) = std::fs::read_dir(at.join(&name)) else { continue };
+        let has_log = entries.flatten().any(|entry| {
+            entry.path().extension().is_some_and(|extension| extension == "mcap")
+                && entry.metadata().is_ok_and(|meta| meta.len() > 0)
+        });
+        if !has_log {
+            continue; // killed before the manifest was durable, so before any motion
+        }
+        let output = palpate(at, &["info", &name, "--json"]);
+        succeeded(&output);
+        assert_eq!(json(&output)["is_complete"], false);
+        succeeded(&palpate(at, &["replay", &name]));
+    }
+}

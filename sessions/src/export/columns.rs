@@ -1,0 +1,48 @@
+//! The canonical columns of every export.
+
+use crate::log::Session;
+use polars::prelude::{Column, DataFrame, NamedFrom, PolarsResult, Series};
+
+/// Name and unit of every column, in order. `1` is a plain count.
+pub const COLUMNS: [(&str, &str); 8] = [
+    ("t_s", "s"),
+    ("depth_mm", "mm"),
+    ("force_N", "N"),
+    ("signal_V", "V"),
+    ("counts", "1"),
+    ("pulses", "1"),
+    ("phase", ""),
+    ("cycle", "1"),
+];
+
+/// The samples as a frame: `t_s` is controller time since the first sample in true seconds, depth
+/// is null before contact is known, force before tare, counts on a rig without a converter.
+pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
+    let rows = &session.rows;
+    let first_tick = rows.first().map_or(0, |row| row.tick);
+    let tick_secs = session.manifest.rig.tick().0;
+    let t: Vec<f64> = rows.iter().map(|row| (row.tick - first_tick) as f64 * tick_secs).collect();
+    let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
+    let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();
+    let signal: Vec<f64> = rows.iter().map(|row| row.volts).collect();
+    let counts: Vec<Option<i32>> = rows.iter().map(|row| row.counts).collect();
+    let pulses: Vec<i64> = rows.iter().map(|row| row.pulses).collect();
+    let phase: Vec<&str> = rows.iter().map(|row| row.phase.name()).collect();
+    let cycle: Vec<u32> = rows.iter().map(|row| row.cycle).collect();
+    let [n_t, n_depth, n_force, n_signal, n_counts, n_pulses, n_phase, n_cycle] =
+        COLUMNS.map(|(name, _)| name.into());
+    let columns: Vec<Column> = [
+        Series::new(n_t, t),
+        Series::new(n_depth, depth),
+        Series::new(n_force, force),
+        Series::new(n_signal, signal),
+        Series::new(n_counts, counts),
+        Series::new(n_pulses, pulses),
+        Series::new(n_phase, phase),
+        Series::new(n_cycle, cycle),
+    ]
+    .into_iter()
+    .map(Column::from)
+    .collect();
+    DataFrame::new(rows.len(), columns)
+}

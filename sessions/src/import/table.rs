@@ -1,0 +1,226 @@
+//! A delimited text with a header that names time, depth and force. What it cannot tell it
+//! refuses with a reason; nothing is guessed and nothing repaired.
+
+use super::header::{Meaning, Quantity, meaning};
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Largest table read, in bytes: ten million rows of three columns.
+const BYTES_MAX: u64 = 1 << 30;
+
+/// Time, depth and force of a table, one element per row.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table {
+    /// Time in s.
+    pub t: Vec<f64>,
+    /// Depth in mm.
+    pub depth: Vec<f64>,
+    /// Force in N.
+    pub force: Vec<f64>,
+    /// What a reader should know.
+    pub notes: Vec<String>,
+}
+
+/// A table could not be understood.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TableError {
+    /// The file cannot be read.
+    #[error("cannot read the table {} ({source})", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// The file is too large or is not text.
+    #[error("{} is not a text table ({reason}); give a delimited text with a header", path.display())]
+    NotText {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The text is not a table of time, depth and force.
+    #[error("{}: {reason}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        reason: String,
+    },
+}
+
+/// Reads a table from a file.
+pub fn read_table(path: &Path) -> Result<Table, TableError> {
+    let io_error = |source: io::Error| TableError::Io { path: path.to_owned(), source };
+    let not_text = |reason: &str| TableError::NotText { path: path.to_owned(), reason: reason.into() };
+    let size = std::fs::metadata(path).map_err(io_error)?.len();
+    if size > BYTES_MAX {
+        return Err(not_text("it is larger than 1 GiB"));
+    }
+    let bytes = std::fs::read(path).map_err(io_error)?;
+    let text = String::from_utf8(bytes).map_err(|_| not_text("it is not UTF-8"))?;
+    if text.contains('\0') {
+        return Err(not_text("it holds binary data"));
+    }
+    parse_table(&text).map_err(|reason| TableError::Content { path: path.to_owned(), reason })
+}
+
+/// Parses a table; the error is one sentence.
+pub fn parse_table(text: &str) -> Result<Table, String> {
+    let text = text.strip_prefix('\u{feff}').unwrap_or(text);
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(i, line)| (i + 1, line))
+        .filter(|(_, line)| !line.trim().is_empty());
+    let (_, header) = lines.next().ok_or("the table is empty")?;
+    let delimiter = delimiter_of(header)?;
+    let cells: Vec<String> = split(header, delimiter);
+    let layout = Layout::of(&cells, delimiter)?;
+    let mut table = Table::default();
+    let mut left_out = 0usize;
+    for (number, line) in lines {
+        let cells = split(line, delimiter);
+        if cells.len() != layout.width {
+            return Err(format!(
+                "line {number} has {} cells where the header has {}; mend the line",
+                cells.len(),
+                layout.width
+            ));
+        }
+        if let Some(phase) = layout.phase
+            && !matches!(cells[phase].as_str(), "ramp" | "hold")
+        {
+            left_out += 1;
+            continue;
+        }
+        let [t, depth, force] = layout.values(&cells, number)?;
+        table.t.push(t);
+        table.depth.push(depth);
+        table.force.push(force);
+    }
+    if table.t.is_empty() {
+        return Err("the table has no rows to fit".into());
+    }
+    if left_out > 0 {
+        table.notes.push(format!("{left_out} rows outside ramp and hold are left out"));
+    }
+    Ok(table)
+}
+
+fn delimiter_of(header: &str) -> Result<char, String> {
+    ['\t', ';', ',']
+        .into_iter()
+        .find(|delimiter| header.contains(*delimiter))
+        .ok_or_else(|| "the first line names no columns; separate them by comma, semicolon or tab".into())
+}
+
+fn split(line: &str, delimiter: char) -> Vec<String> {
+    line.split(delimiter).map(|cell| cell.trim().trim_matches('"').to_owned()).collect()
+}
+
+/// Where the three quantities are.
+struct Layout {
+    width: usize,
+    /// Column and factor of time, depth and force.
+    places: [(usize, f64); 3],
+    phase: Option<usize>,
+    has_decimal_comma: bool,
+}
+
+impl Layout {
+    fn of(cells: &[String], delimiter: char) -> Result<Self, String> {
+        if cells.iter().all(|cell| cell.parse::<f64>().is_ok()) {
+            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N".into());
+        }
+        let place = |quantity: Quantity| -> Result<(usize, f64), String> {
+            let found: Vec<(usize, Option<f64>)> = cells
+                .iter()
+                .enumerate()
+                .filter_map(|(i, cell)| match meaning(cell) {
+                    Meaning::Known(q, factor) if q == quantity => Some((i, Some(factor))),
+                    Meaning::Unitless(q) if q == quantity => Some((i, None)),
+                    _ => None,
+                })
+                .collect();
+            let (name, example) = (quantity.name(), quantity.example());
+            match found[..] {
+                [(i, Some(factor))] => Ok((i, factor)),
+                [(i, None)] => Err(format!(
+                    "column '{}' has no unit that is known; name it like {example}",
+                    cells[i]
+                )),
+                [] => Err(format!("no column is a {name}; name one like {example}")),
+                [(i, _), (j, _), ..] => Err(format!(
+                    "columns '{}' and '{}' could both be the {name}; rename one of them",
+                    cells[i], cells[j]
+                )),
+            }
+        };
+        Ok(Self {
+            width: cells.len(),
+            places: [place(Quantity::Time)?, place(Quantity::Depth)?, place(Quantity::Force)?],
+            phase: cells.iter().position(|cell| cell == "phase"),
+            has_decimal_comma: delimiter != ',',
+        })
+    }
+
+    fn values(&self, cells: &[String], number: usize) -> Result<[f64; 3], String> {
+        let mut values = [0.0; 3];
+        for (value, ((column, factor), quantity)) in
+            values.iter_mut().zip(self.places.iter().zip(Quantity::ALL))
+        {
+            let cell = &cells[*column];
+            let plain =
+                if self.has_decimal_comma { cell.replace(',', ".") } else { cell.clone() };
+            let read = plain.parse::<f64>().ok().filter(|read| read.is_finite());
+            *value = factor
+                * read.ok_or_else(|| {
+                    format!("line {number}: the {} '{cell}' is not a number; mend or remove the line", quantity.name())
+                })?;
+        }
+        Ok(values)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn reads_units_order_and_foreign_columns() {
+        let table = parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n").unwrap();
+        assert_eq!(table.t, [0.0, 0.1]);
+        assert_eq!(table.depth, [0.0, 0.25]);
+        assert_eq!(table.force, [0.0015, -0.002]);
+    }
+
+    #[test]
+    fn our_own_export_keeps_ramp_and_hold_only() {
+        let text = "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,retract\n";
+        let table = parse_table(text).unwrap();
+        assert_eq!(table.t, [1.0, 2.0]);
+        assert!(table.notes[0].contains("2 rows"));
+    }
+
+    #[test]
+    fn what_it_cannot_tell_it_refuses() {
+        let check = |text: &str, expected: &str| {
+            let reason = parse_table(text).unwrap_err();
+            assert!(reason.contains(expected), "{text:?}: {reason}");
+        };
+        check("", "empty");
+        check("0,0,0\n1,1,1\n", "no header");
+        check("t_s depth_mm force_N\n", "names no columns");
+        check("t_s,depth_mm\n0,0\n", "no column is a force");
+        check("t_s,depth_mm,force\n0,0,0\n", "'force' has no unit");
+        check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "both be the depth");
+        check("t_s,depth_mm,force_N\n0,0,0\n1,one,1\n", "line 3: the depth 'one'");
+        check("t_s,depth_mm,force_N\n0,0,nan\n", "line 2: the force 'nan'");
+        check("t_s,depth_mm,force_N\n0,0\n", "line 2 has 2 cells");
+        check("t_s,depth_mm,force_N\n", "no rows");
+    }
+}
