@@ -22,7 +22,7 @@ pub const ACCELERATION_QUANTUM: MmPerS2 = MmPerS2(1024.0 * 0.015);
 pub const SWITCH_MARGIN_MM: f64 = 2.0;
 
 /// Targets and counts fit the controller's 32-bit position register.
-const PULSES_MAX: i64 = 1 << 31;
+const PULSES_MAX: u64 = 1 << 31;
 
 /// A profile under way.
 #[derive(Clone, Copy, Debug)]
@@ -164,7 +164,7 @@ impl Slider {
                 "begin not valid while the axis moves, wait until it reports rest",
             ));
         }
-        if wanted.target_pulses.abs() > PULSES_MAX {
+        if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
             return Err(refused(&format!(
                 "target {} pulses is out of range, stay within {PULSES_MAX}",
                 wanted.target_pulses
@@ -242,7 +242,7 @@ impl Slider {
                 "position cannot be defined while the axis moves, stop it first",
             ));
         }
-        if pulses.abs() > PULSES_MAX {
+        if pulses.unsigned_abs() > PULSES_MAX {
             return Err(refused(&format!(
                 "position {pulses} pulses is out of range, stay within {PULSES_MAX}"
             )));
