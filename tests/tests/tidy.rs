@@ -1,0 +1,148 @@
+//! The rules of ARCHITECTURE.md that a machine can check.
+
+use palpate_tests::{files_below, workspace};
+use std::collections::BTreeSet;
+use std::fs;
+
+const CRATES: [&str; 6] = ["app", "drivers", "model", "protocols", "sessions", "tests"];
+
+fn read(path: &str) -> String {
+    fs::read_to_string(workspace().join(path)).unwrap_or_else(|err| panic!("{path}: {err}"))
+}
+
+/// Names under `[dependencies]` of a package, without the tests' own.
+fn dependencies(package: &str) -> BTreeSet<String> {
+    read(&format!("{package}/Cargo.toml"))
+        .lines()
+        .skip_while(|line| line.trim() != "[dependencies]")
+        .skip(1)
+        .take_while(|line| !line.starts_with('['))
+        .filter_map(|line| line.split(['.', ' ', '=']).next().map(str::to_owned))
+        .filter(|name| !name.is_empty())
+        .collect()
+}
+
+#[test]
+fn crates_only_use_what_is_below_them() {
+    let ours = |package: &str| -> Vec<String> {
+        dependencies(package).into_iter().filter(|name| name.starts_with("palpate-")).collect()
+    };
+    assert!(ours("model").is_empty());
+    assert_eq!(ours("drivers"), ["palpate-model"]);
+    assert_eq!(ours("sessions"), ["palpate-model"]);
+    assert_eq!(ours("protocols"), ["palpate-drivers", "palpate-model", "palpate-sessions"]);
+    for package in CRATES.iter().filter(|package| **package != "tests") {
+        assert!(!dependencies(package).contains("palpate-tests"), "{package} uses the tests");
+    }
+}
+
+#[test]
+fn crates_do_not_use_what_is_forbidden_to_them() {
+    let allowed_in_model = BTreeSet::from(["argmin", "serde", "thiserror"].map(String::from));
+    assert!(dependencies("model").is_subset(&allowed_in_model), "{:?}", dependencies("model"));
+    for (package, forbidden) in [
+        ("drivers", &["eframe", "egui_plot", "polars", "mcap", "rfd"][..]),
+        ("sessions", &["eframe", "egui_plot", "serialport", "rfd"]),
+        ("protocols", &["eframe", "egui_plot", "serialport", "polars", "rfd", "mcap"]),
+        ("app", &["serialport", "polars", "mcap"]),
+    ] {
+        for name in forbidden {
+            assert!(!dependencies(package).contains(*name), "{package} uses {name}");
+        }
+    }
+}
+
+#[test]
+fn engine_and_plans_import_nothing_but_the_model() {
+    for folder in ["protocols/src/engine", "protocols/src/plans"] {
+        let files = files_below(&workspace().join(folder), "rs");
+        assert!(!files.is_empty());
+        for file in files {
+            let text = fs::read_to_string(&file).unwrap();
+            for forbidden in ["palpate_drivers", "palpate_sessions", "std::fs", "std::thread", "std::time", "std::io"] {
+                assert!(!text.contains(forbidden), "{} uses {forbidden}", file.display());
+            }
+        }
+    }
+}
+
+#[test]
+fn only_the_runner_sends_commands_to_a_rig() {
+    for package in ["app", "protocols"] {
+        for file in files_below(&workspace().join(package).join("src"), "rs") {
+            let text = fs::read_to_string(&file).unwrap();
+            let is_runner = file.ends_with("runner/main_loop.rs");
+            assert!(is_runner || !text.contains("rig.send("), "{}", file.display());
+        }
+    }
+}
+
+#[test]
+fn colours_live_in_the_tokens() {
+    for file in files_below(&workspace().join("app/src"), "rs") {
+        if file.ends_with("theme/tokens.rs") {
+            continue;
+        }
+        let text = fs::read_to_string(&file).unwrap();
+        for literal in ["Color32::from_rgb", "Color32::from_gray", "Color32::RED", "Color32::from_hex", "Rgba::from"] {
+            assert!(!text.contains(literal), "{} has a colour of its own: {literal}", file.display());
+        }
+    }
+}
+
+#[test]
+fn doubles_are_for_tests_only() {
+    for package in ["app", "protocols", "sessions"] {
+        for file in files_below(&workspace().join(package).join("src"), "rs") {
+            let text = fs::read_to_string(&file).unwrap();
+            assert!(!text.contains("doubles"), "{} names a test double", file.display());
+        }
+    }
+}
+
+#[test]
+fn files_stay_readable() {
+    for package in CRATES {
+        for file in files_below(&workspace().join(package), "rs") {
+            let lines = fs::read_to_string(&file).unwrap().lines().count();
+            assert!(lines <= 800, "{} has {lines} lines; split it or write a decision page", file.display());
+        }
+    }
+}
+
+#[test]
+fn every_package_takes_the_workspace_lints_and_explains_itself() {
+    for package in CRATES {
+        assert!(read(&format!("{package}/Cargo.toml")).contains("[lints]\nworkspace = true"), "{package}");
+        assert!(read(&format!("{package}/src/lib.rs")).starts_with("//! "), "{package}");
+    }
+    for page in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+        assert!(!read(page).is_empty());
+    }
+    assert!(read("README.md").contains("docs/pictures/window.png"), "the README shows the window");
+    assert!(workspace().join("docs/pictures/window.png").exists());
+}
+
+#[test]
+fn every_dependency_has_its_reason() {
+    let reasons = read("ARCHITECTURE.md");
+    for package in CRATES {
+        for name in dependencies(package).iter().filter(|name| !name.starts_with("palpate-")) {
+            assert!(reasons.contains(name.as_str()), "{name}, used by {package}, has no reason in ARCHITECTURE.md");
+        }
+    }
+}
+
+#[test]
+fn no_test_is_ignored_and_no_page_is_unsafe() {
+    // Written in two halves so that this file does not find itself.
+    let banned = [["#[ign", "ore"].concat(), ["unsafe", " {"].concat(), ["to", "do!("].concat()];
+    for package in CRATES {
+        for file in files_below(&workspace().join(package), "rs") {
+            let text = fs::read_to_string(&file).unwrap();
+            for word in &banned {
+                assert!(!text.contains(word.as_str()), "{} has {word}", file.display());
+            }
+        }
+    }
+}
