@@ -7,11 +7,24 @@
 //! caller's; only the writer thread looks at a clock, to pace its disk synchronisation.
 //!
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
-//! itself.
+//! itself, then [`log::SessionWriter`] and [`log::Session`].
 
+pub mod export;
+pub mod folder;
+pub mod import;
+mod lock;
+pub mod log;
 pub mod manifest;
 pub mod record;
 mod schema;
+pub mod text;
 
+pub use export::{ExportError, export_csv, export_parquet};
+pub use folder::{
+    FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,
+    library_folder, new_session_folder,
+};
+pub use import::{Table, TableError, parse_table, read_table};
+pub use log::{FileSink, LogError, LogWriter, Pace, ReadError, Session, SessionWriter, Sink};
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use record::{EndRecord, Entry, EntryKind, Row};

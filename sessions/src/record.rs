@@ -98,8 +98,17 @@ pub struct EndRecord {
     pub time_use: Vec<(String, f64)>,
 }
 
-/// An [`Entry`] as JSON; its kind is the channel it is on.
-#[derive(Serialize, Deserialize)]
+/// An [`Entry`] to be written as JSON; its kind is the channel it is on.
+#[derive(Serialize)]
+pub(crate) struct EntryMessageRef<'a> {
+    pub order: u64,
+    pub after_sample: u64,
+    pub now_ns: u64,
+    pub body: &'a serde_json::Value,
+}
+
+/// An [`Entry`] as it is read back.
+#[derive(Deserialize)]
 pub(crate) struct EntryMessage {
     pub order: u64,
     pub after_sample: u64,
@@ -250,8 +259,8 @@ mod tests {
             volts: 0.1 + tick as f64 * 1e-17,
             pulses: i64::MIN + tick as i64,
             status: u32::MAX,
-            force: (tick % 2 == 0).then_some(-0.0),
-            depth: (tick % 3 == 0).then_some(f64::MIN_POSITIVE),
+            force: tick.is_multiple_of(2).then_some(-0.0),
+            depth: tick.is_multiple_of(3).then_some(f64::MIN_POSITIVE),
             phase: Phase::Hold,
             cycle: 3,
         }
@@ -284,8 +293,8 @@ mod tests {
         type Edit = fn(&mut DaqBlock, &mut DerivedBlock);
         let edits: [(Edit, &str); 6] = [
             (|_, derived| derived.phase[1] = 99, "phase code 99"),
-            (|_, derived| drop(derived.cycle.pop()), "length"),
-            (|daq, _| drop(daq.counts.pop()), "length"),
+            (|_, derived| derived.cycle.clear(), "length"),
+            (|daq, _| daq.counts.truncate(1), "length"),
             (|daq, _| daq.volts[0] = f64::NAN, "signal"),
             (|_, derived| derived.validity[0] = 4, "validity"),
             (|_, derived| derived.first_sample = 1, "numbered"),

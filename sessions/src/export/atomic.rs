@@ -12,16 +12,24 @@ pub(super) fn write(
     fill: impl FnOnce(&mut BufWriter<File>) -> Result<(), PolarsError>,
 ) -> Result<(), ExportError> {
     if path.exists() {
-        return Err(ExportError::Exists { path: path.to_owned() });
+        return Err(ExportError::Exists {
+            path: path.to_owned(),
+        });
     }
-    let io_error = |source: io::Error| ExportError::Io { path: path.to_owned(), source };
+    let io_error = |source: io::Error| ExportError::Io {
+        path: path.to_owned(),
+        source,
+    };
     let name = path
         .file_name()
         .ok_or_else(|| io_error(io::Error::from(io::ErrorKind::InvalidInput)))?;
     let hidden = path.with_file_name(format!(".{}.tmp", name.to_string_lossy()));
     let mut file = BufWriter::new(File::create(&hidden).map_err(io_error)?);
     let result = fill(&mut file)
-        .map_err(|source| ExportError::Table { path: path.to_owned(), source })
+        .map_err(|source| ExportError::Table {
+            path: path.to_owned(),
+            source,
+        })
         .and_then(|()| file.flush().map_err(io_error))
         .and_then(|()| file.get_ref().sync_all().map_err(io_error))
         .and_then(|()| fs::rename(&hidden, path).map_err(io_error));

@@ -21,7 +21,10 @@ pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
     let rows = &session.rows;
     let first_tick = rows.first().map_or(0, |row| row.tick);
     let tick_secs = session.manifest.rig.tick().0;
-    let t: Vec<f64> = rows.iter().map(|row| (row.tick - first_tick) as f64 * tick_secs).collect();
+    let t: Vec<f64> = rows
+        .iter()
+        .map(|row| (row.tick - first_tick) as f64 * tick_secs)
+        .collect();
     let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
     let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();
     let signal: Vec<f64> = rows.iter().map(|row| row.volts).collect();
@@ -29,8 +32,16 @@ pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
     let pulses: Vec<i64> = rows.iter().map(|row| row.pulses).collect();
     let phase: Vec<&str> = rows.iter().map(|row| row.phase.name()).collect();
     let cycle: Vec<u32> = rows.iter().map(|row| row.cycle).collect();
-    let [n_t, n_depth, n_force, n_signal, n_counts, n_pulses, n_phase, n_cycle] =
-        COLUMNS.map(|(name, _)| name.into());
+    let [
+        n_t,
+        n_depth,
+        n_force,
+        n_signal,
+        n_counts,
+        n_pulses,
+        n_phase,
+        n_cycle,
+    ] = COLUMNS.map(|(name, _)| name.into());
     let columns: Vec<Column> = [
         Series::new(n_t, t),
         Series::new(n_depth, depth),

@@ -46,21 +46,34 @@ pub enum ExportError {
 /// mark, shortest digits that read back to the same number, empty cells for missing values.
 pub fn export_csv(session: &Session, path: &Path) -> Result<(), ExportError> {
     let mut frame = frame(session, path)?;
-    atomic::write(path, |file| CsvWriter::new(file).include_header(true).finish(&mut frame))
+    atomic::write(path, |file| {
+        CsvWriter::new(file).include_header(true).finish(&mut frame)
+    })
 }
 
 /// Writes the samples as Parquet. The file's metadata carries the units (`palpate.columns`, JSON
 /// from column to unit) and where the numbers come from.
 pub fn export_parquet(session: &Session, path: &Path) -> Result<(), ExportError> {
     let mut frame = frame(session, path)?;
-    let units: serde_json::Map<String, serde_json::Value> =
-        COLUMNS.iter().map(|(name, unit)| ((*name).to_owned(), (*unit).into())).collect();
+    let units: serde_json::Map<String, serde_json::Value> = COLUMNS
+        .iter()
+        .map(|(name, unit)| ((*name).to_owned(), (*unit).into()))
+        .collect();
     let manifest = &session.manifest;
     let metadata = KeyValueMetadata::from_static(vec![
-        ("palpate.columns".to_owned(), serde_json::Value::Object(units).to_string()),
+        (
+            "palpate.columns".to_owned(),
+            serde_json::Value::Object(units).to_string(),
+        ),
         ("palpate.session".to_owned(), manifest.session_id.clone()),
-        ("palpate.software".to_owned(), manifest.software_version.clone()),
-        ("palpate.record_version".to_owned(), RECORD_VERSION.to_string()),
+        (
+            "palpate.software".to_owned(),
+            manifest.software_version.clone(),
+        ),
+        (
+            "palpate.record_version".to_owned(),
+            RECORD_VERSION.to_string(),
+        ),
     ]);
     atomic::write(path, |file| {
         ParquetWriter::new(file)
@@ -71,6 +84,8 @@ pub fn export_parquet(session: &Session, path: &Path) -> Result<(), ExportError>
 }
 
 fn frame(session: &Session, path: &Path) -> Result<DataFrame, ExportError> {
-    columns::frame(session)
-        .map_err(|source| ExportError::Table { path: path.to_owned(), source })
+    columns::frame(session).map_err(|source| ExportError::Table {
+        path: path.to_owned(),
+        source,
+    })
 }

@@ -71,16 +71,22 @@ pub(super) fn meaning(cell: &str) -> Meaning {
         .split(|c: char| c == '_' || c.is_whitespace() || "()[]/,:".contains(c))
         .filter(|word| !word.is_empty())
         .collect();
-    let Some((name, rest)) = words.split_first() else { return Meaning::Other };
+    let Some((name, rest)) = words.split_first() else {
+        return Meaning::Other;
+    };
     let name = name.to_lowercase();
-    let Some(quantity) = Quantity::ALL.into_iter().find(|q| q.words().contains(&name.as_str()))
+    let Some(quantity) = Quantity::ALL
+        .into_iter()
+        .find(|q| q.words().contains(&name.as_str()))
     else {
         return Meaning::Other;
     };
     match rest {
         [unit] => quantity
             .factor(unit)
-            .map_or(Meaning::Unitless(quantity), |factor| Meaning::Known(quantity, factor)),
+            .map_or(Meaning::Unitless(quantity), |factor| {
+                Meaning::Known(quantity, factor)
+            }),
         _ => Meaning::Unitless(quantity),
     }
 }
@@ -91,7 +97,9 @@ mod tests {
 
     #[test]
     fn names_with_units_are_understood() {
-        let check = |cell: &str, quantity, factor| assert_eq!(meaning(cell), Meaning::Known(quantity, factor), "{cell}");
+        let check = |cell: &str, quantity, factor| {
+            assert_eq!(meaning(cell), Meaning::Known(quantity, factor), "{cell}")
+        };
         check("t_s", Quantity::Time, 1.0);
         check("Time (ms)", Quantity::Time, 1e-3);
         check("depth_mm", Quantity::Depth, 1.0);

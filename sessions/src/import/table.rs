@@ -54,8 +54,14 @@ pub enum TableError {
 
 /// Reads a table from a file.
 pub fn read_table(path: &Path) -> Result<Table, TableError> {
-    let io_error = |source: io::Error| TableError::Io { path: path.to_owned(), source };
-    let not_text = |reason: &str| TableError::NotText { path: path.to_owned(), reason: reason.into() };
+    let io_error = |source: io::Error| TableError::Io {
+        path: path.to_owned(),
+        source,
+    };
+    let not_text = |reason: &str| TableError::NotText {
+        path: path.to_owned(),
+        reason: reason.into(),
+    };
     let size = std::fs::metadata(path).map_err(io_error)?.len();
     if size > BYTES_MAX {
         return Err(not_text("it is larger than 1 GiB"));
@@ -65,7 +71,10 @@ pub fn read_table(path: &Path) -> Result<Table, TableError> {
     if text.contains('\0') {
         return Err(not_text("it holds binary data"));
     }
-    parse_table(&text).map_err(|reason| TableError::Content { path: path.to_owned(), reason })
+    parse_table(&text).map_err(|reason| TableError::Content {
+        path: path.to_owned(),
+        reason,
+    })
 }
 
 /// Parses a table; the error is one sentence.
@@ -106,7 +115,9 @@ pub fn parse_table(text: &str) -> Result<Table, String> {
         return Err("the table has no rows to fit".into());
     }
     if left_out > 0 {
-        table.notes.push(format!("{left_out} rows outside ramp and hold are left out"));
+        table.notes.push(format!(
+            "{left_out} rows outside ramp and hold are left out"
+        ));
     }
     Ok(table)
 }
@@ -115,11 +126,15 @@ fn delimiter_of(header: &str) -> Result<char, String> {
     ['\t', ';', ',']
         .into_iter()
         .find(|delimiter| header.contains(*delimiter))
-        .ok_or_else(|| "the first line names no columns; separate them by comma, semicolon or tab".into())
+        .ok_or_else(|| {
+            "the first line names no columns; separate them by comma, semicolon or tab".into()
+        })
 }
 
 fn split(line: &str, delimiter: char) -> Vec<String> {
-    line.split(delimiter).map(|cell| cell.trim().trim_matches('"').to_owned()).collect()
+    line.split(delimiter)
+        .map(|cell| cell.trim().trim_matches('"').to_owned())
+        .collect()
 }
 
 /// Where the three quantities are.
@@ -162,7 +177,11 @@ impl Layout {
         };
         Ok(Self {
             width: cells.len(),
-            places: [place(Quantity::Time)?, place(Quantity::Depth)?, place(Quantity::Force)?],
+            places: [
+                place(Quantity::Time)?,
+                place(Quantity::Depth)?,
+                place(Quantity::Force)?,
+            ],
             phase: cells.iter().position(|cell| cell == "phase"),
             has_decimal_comma: delimiter != ',',
         })
@@ -174,12 +193,18 @@ impl Layout {
             values.iter_mut().zip(self.places.iter().zip(Quantity::ALL))
         {
             let cell = &cells[*column];
-            let plain =
-                if self.has_decimal_comma { cell.replace(',', ".") } else { cell.clone() };
+            let plain = if self.has_decimal_comma {
+                cell.replace(',', ".")
+            } else {
+                cell.clone()
+            };
             let read = plain.parse::<f64>().ok().filter(|read| read.is_finite());
             *value = factor
                 * read.ok_or_else(|| {
-                    format!("line {number}: the {} '{cell}' is not a number; mend or remove the line", quantity.name())
+                    format!(
+                        "line {number}: the {} '{cell}' is not a number; mend or remove the line",
+                        quantity.name()
+                    )
                 })?;
         }
         Ok(values)
@@ -192,7 +217,9 @@ mod tests {
 
     #[test]
     fn reads_units_order_and_foreign_columns() {
-        let table = parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n").unwrap();
+        let table =
+            parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n")
+                .unwrap();
         assert_eq!(table.t, [0.0, 0.1]);
         assert_eq!(table.depth, [0.0, 0.25]);
         assert_eq!(table.force, [0.0015, -0.002]);
@@ -200,7 +227,8 @@ mod tests {
 
     #[test]
     fn our_own_export_keeps_ramp_and_hold_only() {
-        let text = "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,retract\n";
+        let text =
+            "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,retract\n";
         let table = parse_table(text).unwrap();
         assert_eq!(table.t, [1.0, 2.0]);
         assert!(table.notes[0].contains("2 rows"));
@@ -218,7 +246,10 @@ mod tests {
         check("t_s,depth_mm\n0,0\n", "no column is a force");
         check("t_s,depth_mm,force\n0,0,0\n", "'force' has no unit");
         check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "both be the depth");
-        check("t_s,depth_mm,force_N\n0,0,0\n1,one,1\n", "line 3: the depth 'one'");
+        check(
+            "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n",
+            "line 3: the depth 'one'",
+        );
         check("t_s,depth_mm,force_N\n0,0,nan\n", "line 2: the force 'nan'");
         check("t_s,depth_mm,force_N\n0,0\n", "line 2 has 2 cells");
         check("t_s,depth_mm,force_N\n", "no rows");

@@ -1,0 +1,229 @@
+//! Where sessions live: the library, the folder of one session, and room on its disk.
+
+pub use crate::lock::{HolderLock, LockError};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Name of the log in a session folder.
+pub const LOG_FILE: &str = "session.mcap";
+/// Name of the lock in a session folder.
+pub const LOCK_FILE: &str = "lock";
+
+/// A session folder could not be had.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum FolderError {
+    /// Something is in the folder already.
+    #[error("{} is not empty; choose a new folder", path.display())]
+    NotEmpty {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// The path is taken by something that is no folder.
+    #[error("{} is a file, not a folder; choose a new folder", path.display())]
+    NotAFolder {
+        /// The path.
+        path: PathBuf,
+    },
+    /// The folder cannot be made or read.
+    #[error("cannot make the session folder {} ({source}); choose a folder that may be written", path.display())]
+    Io {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another process uses the folder, or its lock cannot be made.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// The disk has no room for the session.
+    #[error(
+        "the disk of {} has {} free but the session needs {} twice over; free some space or choose another disk",
+        path.display(), megabytes(*free_bytes), megabytes(*needed_bytes)
+    )]
+    NoSpace {
+        /// The folder.
+        path: PathBuf,
+        /// Bytes free to this user.
+        free_bytes: u64,
+        /// Bytes the session is expected to take.
+        needed_bytes: u64,
+    },
+    /// Neither `PALPATE_HOME` nor a home folder is set.
+    #[error("no place for sessions is known; set PALPATE_HOME to a folder")]
+    NoLibrary,
+}
+
+fn megabytes(bytes: u64) -> String {
+    format!("{:.1} MB", bytes as f64 * 1e-6)
+}
+
+/// An empty, locked folder that is about to hold a session.
+#[derive(Debug)]
+pub struct SessionFolder {
+    path: PathBuf,
+    _lock: HolderLock,
+}
+
+impl SessionFolder {
+    /// Makes the folder and its parents and locks it. Refuses a folder that holds anything.
+    pub fn create(path: &Path) -> Result<Self, FolderError> {
+        let failed = |source| FolderError::Io {
+            path: path.into(),
+            source,
+        };
+        if path.exists() && !path.is_dir() {
+            return Err(FolderError::NotAFolder { path: path.into() });
+        }
+        fs::create_dir_all(path).map_err(failed)?;
+        let lock_path = path.join(LOCK_FILE);
+        let had_lock = lock_path.exists();
+        if !had_lock && holds_more_than_lock(path).map_err(failed)? {
+            return Err(FolderError::NotEmpty { path: path.into() });
+        }
+        // A held lock is reported before a non-empty folder: its holder is the better reason.
+        let lock = HolderLock::acquire(&lock_path)?;
+        // Looked at again under the lock: between the two, another process may have recorded.
+        if holds_more_than_lock(path).map_err(failed)? {
+            return Err(FolderError::NotEmpty { path: path.into() });
+        }
+        Ok(Self {
+            path: path.into(),
+            _lock: lock,
+        })
+    }
+
+    /// The folder.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The log in the folder.
+    #[must_use]
+    pub fn log_path(&self) -> PathBuf {
+        self.path.join(LOG_FILE)
+    }
+}
+
+fn holds_more_than_lock(path: &Path) -> io::Result<bool> {
+    for item in fs::read_dir(path)? {
+        if item?.file_name() != LOCK_FILE {
+            return Ok(true);
+        }
+    }
+    Ok(false)
+}
+
+/// The folder of all sessions: `PALPATE_HOME`, or `palpate` in the user's home.
+pub fn library_folder() -> Result<PathBuf, FolderError> {
+    library_from(std::env::var_os("PALPATE_HOME"), std::env::home_dir())
+}
+
+fn library_from(
+    chosen: Option<std::ffi::OsString>,
+    home: Option<PathBuf>,
+) -> Result<PathBuf, FolderError> {
+    match (chosen.filter(|path| !path.is_empty()), home) {
+        (Some(path), _) => Ok(path.into()),
+        (None, Some(home)) if !home.as_os_str().is_empty() => Ok(home.join("palpate")),
+        _ => Err(FolderError::NoLibrary),
+    }
+}
+
+/// The folder a new session gets in a library.
+#[must_use]
+pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
+    library.join("sessions").join(session_id)
+}
+
+/// Refuses a disk with less than twice the room a session needs.
+///
+/// `path` may not exist yet; its nearest existing parent is asked (`statvfs`, POSIX.1-2001).
+pub fn check_free_space(path: &Path, needed_bytes: u64) -> Result<(), FolderError> {
+    let existing = path
+        .ancestors()
+        .find(|one| !one.as_os_str().is_empty() && one.exists())
+        .unwrap_or(Path::new("."));
+    let disk = rustix::fs::statvfs(existing).map_err(|errno| FolderError::Io {
+        path: existing.into(),
+        source: errno.into(),
+    })?;
+    let free_bytes = disk.f_bavail.saturating_mul(disk.f_frsize);
+    if free_bytes < needed_bytes.saturating_mul(2) {
+        return Err(FolderError::NoSpace {
+            path: existing.into(),
+            free_bytes,
+            needed_bytes,
+        });
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_library_is_chosen_or_in_the_home_folder() {
+        let home = Some(PathBuf::from("/home/ada"));
+        let chosen = library_from(Some("/data/lab".into()), home.clone()).unwrap();
+        assert_eq!(chosen, Path::new("/data/lab"));
+        let default = library_from(Some("".into()), home).unwrap();
+        assert_eq!(default, Path::new("/home/ada/palpate"));
+        assert!(library_from(None, None).is_err());
+    }
+
+    #[test]
+    fn a_full_disk_is_refused_with_both_numbers() {
+        let folder = tempfile::tempdir().unwrap();
+        let deep = folder.path().join("not/yet/there");
+        check_free_space(&deep, 1).unwrap();
+        let refusal = check_free_space(&deep, u64::MAX / 4).unwrap_err();
+        let FolderError::NoSpace { free_bytes, .. } = &refusal else {
+            panic!("{refusal}");
+        };
+        let text = refusal.to_string();
+        assert!(text.contains(&megabytes(*free_bytes)), "{text}");
+        assert!(text.contains(&megabytes(u64::MAX / 4)), "{text}");
+    }
+
+    #[test]
+    fn a_held_folder_names_its_holder() {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("a/b/session");
+        let held = SessionFolder::create(&path).unwrap();
+        let refusal = SessionFolder::create(&path).unwrap_err().to_string();
+        let holder = format!("in use by process {};", std::process::id());
+        assert!(refusal.contains(&holder), "{refusal}");
+        // A session that never wrote anything leaves a folder that can be used again.
+        drop(held);
+        SessionFolder::create(&path).unwrap();
+    }
+
+    #[test]
+    fn a_folder_with_anything_in_it_is_refused_and_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("thesis.doc"), "irreplaceable").unwrap();
+        let refusal = SessionFolder::create(folder.path()).unwrap_err();
+        let text = refusal.to_string();
+        assert!(
+            text.ends_with("is not empty; choose a new folder"),
+            "{text}"
+        );
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_file_in_the_way_is_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("session");
+        fs::write(&file, "").unwrap();
+        let refusal = SessionFolder::create(&file).unwrap_err().to_string();
+        assert!(refusal.contains("is a file, not a folder"), "{refusal}");
+        let below = SessionFolder::create(&file.join("more")).unwrap_err();
+        assert!(below.to_string().starts_with("cannot make"), "{below}");
+    }
+}

@@ -1,0 +1,100 @@
+//! One holder at a time, across processes: a lock file that names who holds it.
+
+use std::fs::{File, OpenOptions, TryLockError};
+use std::io::{Read, Seek, SeekFrom, Write};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A lock could not be taken.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LockError {
+    /// Another process, or another part of this one, holds it.
+    #[error("{} is in use by process {holder}; wait for it to end, or close it", path.display())]
+    Held {
+        /// The lock file.
+        path: PathBuf,
+        /// Process number of the holder, `unknown` if it has not written it yet.
+        holder: String,
+    },
+    /// The lock file cannot be made or written.
+    #[error("cannot lock {} ({source}); choose a folder that may be written", path.display())]
+    Io {
+        /// The lock file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}
+
+/// Holds a lock file until dropped. The system releases it when the process dies.
+#[derive(Debug)]
+pub struct HolderLock {
+    // Closing the file releases the lock.
+    _file: File,
+    path: PathBuf,
+}
+
+impl HolderLock {
+    /// Takes the lock at `path`, making the file and its folder if needed, and writes our process
+    /// number in it.
+    pub fn acquire(path: &Path) -> Result<Self, LockError> {
+        let failed = |source| LockError::Io {
+            path: path.into(),
+            source,
+        };
+        if let Some(parent) = path.parent() {
+            std::fs::create_dir_all(parent).map_err(failed)?;
+        }
+        let mut file = OpenOptions::new()
+            .read(true)
+            .write(true)
+            .create(true)
+            // Another holder's number must not be erased before the lock is ours.
+            .truncate(false)
+            .open(path)
+            .map_err(failed)?;
+        match file.try_lock() {
+            Ok(()) => {}
+            Err(TryLockError::WouldBlock) => {
+                return Err(LockError::Held {
+                    path: path.into(),
+                    holder: read_holder(&file),
+                });
+            }
+            Err(TryLockError::Error(source)) => return Err(failed(source)),
+        }
+        let text = format!("{}\n", std::process::id());
+        file.set_len(0)
+            .and_then(|()| file.seek(SeekFrom::Start(0)))
+            .and_then(|_| file.write_all(text.as_bytes()))
+            .map_err(failed)?;
+        Ok(Self {
+            _file: file,
+            path: path.into(),
+        })
+    }
+
+    /// The lock file.
+    #[must_use]
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+}
+
+/// The process number in a lock file; digits only, whatever else the file may hold.
+fn read_holder(file: &File) -> String {
+    let mut bytes = Vec::new();
+    // A process number has at most 10 digits.
+    let has_read = file.take(16).read_to_end(&mut bytes).is_ok();
+    let digits: String = bytes
+        .iter()
+        .map(|&byte| char::from(byte))
+        .take_while(char::is_ascii_digit)
+        .collect();
+    if has_read && !digits.is_empty() {
+        digits
+    } else {
+        "unknown".into()
+    }
+}

@@ -1,0 +1,56 @@
+//! The one door to the disk: appending bytes and making them durable.
+
+use std::fs::{File, OpenOptions};
+use std::io::{self, Write};
+use std::path::Path;
+
+/// Takes bytes in order. After an error it is not used again.
+pub trait Sink: Send {
+    /// Writes all bytes at the end.
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()>;
+
+    /// Returns once everything appended survives a power cut.
+    fn sync(&mut self) -> io::Result<()>;
+}
+
+/// A new file that is only ever appended to.
+#[derive(Debug)]
+pub struct FileSink {
+    file: File,
+    /// The file's folder, until its entry for the file is known to be on disk.
+    folder: Option<File>,
+}
+
+impl FileSink {
+    /// Makes a file. An existing one is never touched.
+    pub fn create(path: &Path) -> io::Result<Self> {
+        let file = OpenOptions::new()
+            .append(true)
+            .create_new(true)
+            .open(path)?;
+        let folder = match path.parent() {
+            Some(parent) if !parent.as_os_str().is_empty() => File::open(parent)?,
+            _ => File::open(".")?,
+        };
+        Ok(Self {
+            file,
+            folder: Some(folder),
+        })
+    }
+}
+
+impl Sink for FileSink {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.file.write_all(bytes)
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        self.file.sync_data()?;
+        // A new file is only found after a power cut if its folder was synced too (fsync(2)).
+        if let Some(folder) = &self.folder {
+            folder.sync_all()?;
+            self.folder = None;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,337 @@
+//! The session writer: collects samples on the caller's thread, writes on its own.
+//!
+//! A batch is 100 ms of session time. At virtual pace a batch is only handed over when the one
+//! before it is on its way to the disk, so a killed process loses at most two batches. At real
+//! pace handing over never waits: 30 s of batches fit in a bounded queue, and a queue that is
+//! full is a failure the caller sees, never a silent gap.
+
+use super::sink::{FileSink, Sink};
+use super::writer::{LogError, LogWriter, check_order};
+use crate::folder::SessionFolder;
+use crate::manifest::Manifest;
+use crate::record::{EndRecord, Entry, Row};
+use palpate_model::Nanos;
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+/// Session time in one batch.
+const BATCH: Nanos = Nanos::from_millis(100);
+/// Samples in one batch, however little time they take.
+const BATCH_ROWS_MAX: usize = 1 << 16;
+/// Session time that fits in the queue at real pace, in s.
+const QUEUE_SECONDS: u64 = 30;
+/// Batches in the queue at real pace.
+const QUEUE_BATCHES: usize = (QUEUE_SECONDS * 1_000_000_000 / BATCH.0) as usize;
+/// Wall time between two synchronisations with the disk.
+const SYNC_EVERY: Duration = Duration::from_secs(1);
+
+/// How session time passes against wall time.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Pace {
+    /// As fast as it is computed: the caller waits for the disk.
+    Virtual,
+    /// With the wall clock: the caller never waits.
+    Real,
+}
+
+#[derive(Default)]
+struct Batch {
+    rows: Vec<Row>,
+    entries: Vec<Entry>,
+    /// Newest time in the batch.
+    through: Nanos,
+    end: Option<EndRecord>,
+}
+
+/// What the writer thread tells the caller.
+#[derive(Default)]
+struct Shared {
+    has_failed: AtomicBool,
+    failure: Mutex<Option<LogError>>,
+    saved_through_ns: AtomicU64,
+    queued: AtomicUsize,
+}
+
+impl Shared {
+    fn fail(&self, err: LogError) {
+        let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        // The first reason is the cause, later ones its consequences.
+        failure.get_or_insert(err);
+        self.has_failed.store(true, Ordering::Release);
+    }
+
+    fn check(&self) -> Result<(), LogError> {
+        if !self.has_failed.load(Ordering::Acquire) {
+            return Ok(());
+        }
+        let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
+        Err(failure.clone().unwrap_or(LogError::Closed))
+    }
+}
+
+/// Records one session on the thread `session-writer`.
+///
+/// Dropped without [`close`](Self::close), it saves what it was given but writes no end record,
+/// so that the session is seen to be incomplete.
+pub struct SessionWriter {
+    batch: Batch,
+    /// Time of the first item of the batch.
+    batch_start: Option<Nanos>,
+    last_order: Option<u64>,
+    pace: Pace,
+    path: String,
+    sender: Option<SyncSender<Batch>>,
+    shared: Arc<Shared>,
+    thread: Option<JoinHandle<()>>,
+    // Held until the log is closed.
+    _folder: Option<SessionFolder>,
+}
+
+impl SessionWriter {
+    /// Starts a session in a folder. When this returns, the manifest survives a power cut.
+    pub fn start(folder: SessionFolder, manifest: &Manifest, pace: Pace) -> Result<Self, LogError> {
+        let path = folder.log_path();
+        let sink = FileSink::create(&path).map_err(|err| LogError::Disk {
+            reason: err.to_string(),
+            path: path.display().to_string(),
+        })?;
+        let mut writer = Self::start_on(sink, &path.display().to_string(), manifest, pace)?;
+        writer._folder = Some(folder);
+        Ok(writer)
+    }
+
+    /// Starts a session on any sink; `path` is only shown in errors.
+    pub fn start_on<S: Sink + 'static>(
+        sink: S,
+        path: &str,
+        manifest: &Manifest,
+        pace: Pace,
+    ) -> Result<Self, LogError> {
+        let log = LogWriter::begin(sink, path, manifest)?;
+        // A queue of none makes handing over wait until the thread is free.
+        let (sender, receiver) = sync_channel(match pace {
+            Pace::Virtual => 0,
+            Pace::Real => QUEUE_BATCHES,
+        });
+        let shared = Arc::new(Shared::default());
+        let thread_shared = Arc::clone(&shared);
+        let thread = std::thread::Builder::new()
+            .name("session-writer".into())
+            .spawn(move || write_batches(log, &receiver, &thread_shared))
+            .map_err(|err| LogError::Disk {
+                reason: format!("no thread to write on: {err}"),
+                path: path.into(),
+            })?;
+        Ok(Self {
+            batch: Batch::default(),
+            batch_start: None,
+            last_order: None,
+            pace,
+            path: path.into(),
+            sender: Some(sender),
+            shared,
+            thread: Some(thread),
+            _folder: None,
+        })
+    }
+
+    /// Records one sample. Costs well under a microsecond unless a batch is handed over.
+    pub fn push_row(&mut self, row: Row) -> Result<(), LogError> {
+        self.shared.check()?;
+        if let Some(what) = row.non_finite() {
+            return Err(LogError::NotFinite {
+                what: format!("{what} of a sample"),
+            });
+        }
+        self.make_room(row.host)?;
+        self.batch.rows.push(row);
+        Ok(())
+    }
+
+    /// Records one entry; its order must be above that of the entry before.
+    pub fn push_entry(&mut self, entry: Entry) -> Result<(), LogError> {
+        self.shared.check()?;
+        check_order(entry.order, self.last_order)?;
+        self.make_room(entry.now)?;
+        self.last_order = Some(entry.order);
+        self.batch.entries.push(entry);
+        Ok(())
+    }
+
+    /// Hands over a batch that is old enough, for callers that go without samples for long.
+    pub fn on_tick(&mut self, now: Nanos) -> Result<(), LogError> {
+        self.shared.check()?;
+        if self.is_due(now) {
+            self.hand_over()?;
+        }
+        Ok(())
+    }
+
+    /// Why nothing more is saved; `None` while all is well.
+    #[must_use]
+    pub fn failure(&self) -> Option<String> {
+        self.shared.check().err().map(|err| err.to_string())
+    }
+
+    /// Session time up to which everything is handed to the system, and so survives the death
+    /// of this process.
+    #[must_use]
+    pub fn saved_through(&self) -> Nanos {
+        Nanos(self.shared.saved_through_ns.load(Ordering::Acquire))
+    }
+
+    /// Whether half of the queue is in use: the disk is slower than the session.
+    #[must_use]
+    pub fn is_falling_behind(&self) -> bool {
+        self.pace == Pace::Real && self.shared.queued.load(Ordering::Acquire) >= QUEUE_BATCHES / 2
+    }
+
+    /// Writes the end record, waits until it is on the disk and ends the thread.
+    pub fn close(mut self, end: EndRecord) -> Result<(), LogError> {
+        let outcome = self.shared.check().and_then(|()| {
+            let mut batch = std::mem::take(&mut self.batch);
+            batch.through = batch.through.max(end.ended_at);
+            batch.end = Some(end);
+            self.send_waiting(batch)
+        });
+        self.join();
+        outcome.and_then(|()| self.shared.check())
+    }
+
+    fn is_due(&self, now: Nanos) -> bool {
+        let is_old = |start| now.since(start).0 >= BATCH.0;
+        self.batch_start.is_some_and(is_old) || self.batch.rows.len() >= BATCH_ROWS_MAX
+    }
+
+    fn make_room(&mut self, now: Nanos) -> Result<(), LogError> {
+        if self.is_due(now) {
+            self.hand_over()?;
+        }
+        self.batch_start.get_or_insert(now);
+        self.batch.through = self.batch.through.max(now);
+        Ok(())
+    }
+
+    fn hand_over(&mut self) -> Result<(), LogError> {
+        let next = Batch {
+            rows: Vec::with_capacity(self.batch.rows.len()),
+            through: self.batch.through,
+            ..Batch::default()
+        };
+        let batch = std::mem::replace(&mut self.batch, next);
+        self.batch_start = None;
+        match self.pace {
+            Pace::Virtual => self.send_waiting(batch),
+            Pace::Real => self.send_at_once(batch),
+        }
+    }
+
+    fn send_waiting(&mut self, batch: Batch) -> Result<(), LogError> {
+        let Some(sender) = &self.sender else {
+            return Err(LogError::Closed);
+        };
+        self.shared.queued.fetch_add(1, Ordering::AcqRel);
+        // The thread only goes away after it has failed, and then has said why.
+        sender
+            .send(batch)
+            .or_else(|_| self.shared.check().and(Err(LogError::Closed)))
+    }
+
+    fn send_at_once(&mut self, batch: Batch) -> Result<(), LogError> {
+        let Some(sender) = &self.sender else {
+            return Err(LogError::Closed);
+        };
+        self.shared.queued.fetch_add(1, Ordering::AcqRel);
+        match sender.try_send(batch) {
+            Ok(()) => Ok(()),
+            Err(TrySendError::Full(_)) => {
+                self.shared.fail(LogError::TooSlow {
+                    seconds: QUEUE_SECONDS,
+                    path: self.path.clone(),
+                });
+                self.shared.check()
+            }
+            Err(TrySendError::Disconnected(_)) => self.shared.check().and(Err(LogError::Closed)),
+        }
+    }
+
+    fn join(&mut self) {
+        // Without a sender the thread ends once its queue is empty.
+        self.sender = None;
+        if let Some(thread) = self.thread.take()
+            && thread.join().is_err()
+        {
+            self.shared.fail(LogError::Disk {
+                reason: "the writer stopped unexpectedly".into(),
+                path: self.path.clone(),
+            });
+        }
+    }
+}
+
+impl Drop for SessionWriter {
+    fn drop(&mut self) {
+        let has_rest = !self.batch.rows.is_empty() || !self.batch.entries.is_empty();
+        if self.thread.is_some() && has_rest && self.shared.check().is_ok() {
+            let batch = std::mem::take(&mut self.batch);
+            // There is nobody left to tell: the failure shows as a missing end record.
+            let _ = self.send_waiting(batch);
+        }
+        self.join();
+    }
+}
+
+/// The thread: writes batches until there are no more, syncing once per second of wall time.
+fn write_batches<S: Sink>(mut log: LogWriter<S>, receiver: &Receiver<Batch>, shared: &Shared) {
+    let mut last_sync = monotonic_now();
+    let mut is_dirty = false;
+    loop {
+        let batch = match receiver.recv_timeout(SYNC_EVERY) {
+            Ok(batch) => Some(batch),
+            Err(RecvTimeoutError::Timeout) => None,
+            Err(RecvTimeoutError::Disconnected) => break,
+        };
+        if let Some(batch) = batch {
+            let outcome = log.append(&batch.rows, &batch.entries);
+            shared.queued.fetch_sub(1, Ordering::AcqRel);
+            if let Err(err) = outcome {
+                return shared.fail(err);
+            }
+            is_dirty = true;
+            if let Some(end) = batch.end {
+                match log.finish(end) {
+                    Ok(()) => shared
+                        .saved_through_ns
+                        .store(batch.through.0, Ordering::Release),
+                    Err(err) => shared.fail(err),
+                }
+                return;
+            }
+            shared
+                .saved_through_ns
+                .store(batch.through.0, Ordering::Release);
+        }
+        if is_dirty && monotonic_now().duration_since(last_sync) >= SYNC_EVERY {
+            if let Err(err) = log.sync() {
+                return shared.fail(err);
+            }
+            is_dirty = false;
+            last_sync = monotonic_now();
+        }
+    }
+    // No end record was asked for; what was written is still made durable.
+    if let Err(err) = log.sync() {
+        shared.fail(err);
+    }
+}
+
+#[expect(
+    clippy::disallowed_methods,
+    reason = "syncing once per second of wall time is about the disk, not about the session"
+)]
+fn monotonic_now() -> Instant {
+    Instant::now()
+}
