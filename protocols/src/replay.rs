@@ -100,7 +100,8 @@ pub struct ReplayReport {
 /// The blessings of a session, from `blessed.json` in its folder; none if there is no such file.
 pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     let path = folder.join("blessed.json");
-    let Some(text) = palpate_sessions::folder::read_if_present(&path)? else {
+    let Some(text) = palpate_sessions::text::read_if_present(&path)
+        .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))? else {
         return Ok(Vec::new());
     };
     let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {

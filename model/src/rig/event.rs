@@ -27,6 +27,11 @@ pub enum Fault {
     },
     /// The controller restarted: position and settings are no longer known.
     ControllerReset,
+    /// The load cell's signal is not a number.
+    SignalInvalid {
+        /// Controller tick of the sample.
+        tick: u64,
+    },
     /// The session log cannot be written.
     LogFailed {
         /// What the disk said.
@@ -40,6 +45,9 @@ impl fmt::Display for Fault {
             Self::LinkLost { detail } => write!(f, "the link to the rig is lost ({detail})"),
             Self::CommandRefused { detail } => write!(f, "the rig refused a command ({detail})"),
             Self::ControllerReset => write!(f, "the controller restarted; home the axis again"),
+            Self::SignalInvalid { .. } => {
+                write!(f, "the load cell's signal is not a number; check its wiring")
+            }
             Self::LogFailed { detail } => write!(f, "the session log cannot be written ({detail})"),
         }
     }

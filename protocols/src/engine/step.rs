@@ -230,6 +230,13 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
                 },
             );
         }
+        Fault::SignalInvalid { .. } => on_trip(
+            cx,
+            Trip {
+                interlock: Interlock::Signal,
+                reason,
+            },
+        ),
         Fault::CommandRefused { .. } => {
             cx.state.unacknowledged.clear();
             stop::begin(cx, EndingKind::Abort, reason);

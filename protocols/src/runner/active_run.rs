@@ -9,7 +9,7 @@ use palpate_model::fit::LiveFit;
 use palpate_model::rig::{Fault, Phase, Reading, RigCommand};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
-use palpate_sessions::log::SessionWriter;
+use palpate_sessions::{LogError, SessionWriter};
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
@@ -38,6 +38,8 @@ pub(super) struct ActiveRun {
     events: VecDeque<LogLine>,
     phases: Arc<Vec<(f64, Phase)>>,
     time_use: BTreeMap<&'static str, u64>,
+    /// Why the log failed, and whether the engine knows.
+    log_failure: Option<String>,
     is_log_failure_told: bool,
     outcome: Option<Outcome>,
     log_error: Option<String>,
@@ -69,6 +71,7 @@ impl ActiveRun {
             events: VecDeque::new(),
             phases: Arc::new(Vec::new()),
             time_use: BTreeMap::new(),
+            log_failure: None,
             is_log_failure_told: false,
             outcome: None,
             log_error: None,
@@ -135,8 +138,7 @@ impl ActiveRun {
     /// What the runner owes the engine after each input: news of a failed log, and the choice of
     /// an operator who is not there.
     fn after_feed(&mut self, now: Nanos, commands: &mut Vec<RigCommand>) {
-        let failure = self.writer.as_ref().and_then(SessionWriter::failure);
-        if let (Some(detail), false) = (failure, self.is_log_failure_told) {
+        if let (Some(detail), false) = (self.log_failure.clone(), self.is_log_failure_told) {
             self.is_log_failure_told = true;
             self.feed_one(now, Input::Fault(Fault::LogFailed { detail }), commands);
         }
@@ -177,9 +179,8 @@ impl ActiveRun {
             phase: state.phase(),
             cycle: state.cycle(),
         };
-        if let Some(writer) = &mut self.writer {
-            writer.push_row(row);
-        }
+        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_row(row));
+        self.note_log(result);
     }
 
     fn log(&mut self, now: Nanos, kind: EntryKind, body: serde_json::Value) {
@@ -191,8 +192,13 @@ impl ActiveRun {
             body,
         };
         self.order += 1;
-        if let Some(writer) = &mut self.writer {
-            writer.push_entry(entry);
+        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_entry(entry));
+        self.note_log(result);
+    }
+
+    fn note_log(&mut self, result: Result<(), LogError>) {
+        if let Err(err) = result {
+            self.log_failure.get_or_insert_with(|| err.to_string());
         }
     }
 

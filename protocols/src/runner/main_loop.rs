@@ -233,6 +233,11 @@ impl MainLoop {
 
     fn on_event(&mut self, body: RigEventBody) {
         match body {
+            // What is not a number goes no further: not to a plot, a fit or a file.
+            RigEventBody::Reading(reading) if !reading.volts.is_finite() => {
+                let tick = reading.tick;
+                self.feed(Input::Fault(Fault::SignalInvalid { tick }));
+            }
             RigEventBody::Reading(reading) => {
                 self.is_sample_seen = true;
                 self.reading = Some(reading);

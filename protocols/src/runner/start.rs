@@ -8,11 +8,10 @@ use crate::preview::preview;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
-use palpate_sessions::folder::{
-    SessionFolder, check_free_space, library_folder, new_session_folder,
+use palpate_sessions::{
+    Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space, library_folder,
+    new_session_folder, new_session_id,
 };
-use palpate_sessions::log::{Pace, SessionWriter};
-use palpate_sessions::manifest::{Manifest, RECORD_VERSION, new_session_id};
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -94,7 +93,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     preview.verdict(request.is_acknowledged).map_err(refused)?;
 
     let started_at = wall_now();
-    let session_id = new_session_id(started_at);
+    let session_id = new_session_id(started_at.into());
     let path = match &request.out {
         Some(path) => path.clone(),
         None => {
@@ -119,7 +118,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         session_id,
         software_version: env!("CARGO_PKG_VERSION").into(),
         engine_version: ENGINE_VERSION,
-        started_at: palpate_sessions::manifest::rfc3339(started_at),
+        started_at: started_at.into(),
         operator: request.labels.operator.clone(),
         specimen: request.labels.specimen.clone(),
         indenter: request.labels.indenter.clone(),
@@ -135,7 +134,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     } else {
         Pace::Real
     };
-    let writer = SessionWriter::start(folder, manifest, pace)
+    let writer = SessionWriter::start(folder, &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {
         rig: bench.rig.as_ref().clone(),
