@@ -4,4 +4,13 @@
 //! [`palpate_protocols::runner`] and contains no experiment logic.
 //! Start reading at [`cli`] for the headless commands.
 
+pub mod app;
 pub mod cli;
+pub mod command;
+pub mod plots;
+pub mod screens;
+pub mod shell;
+pub mod theme;
+pub mod widgets;
+pub mod window;
+pub mod workers;

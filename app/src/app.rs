@@ -1,0 +1,270 @@
+//! The workbench's window as an eframe app: `logic` reads keys and answers, `ui` draws a snapshot.
+
+use crate::command::{Command, Commands};
+use crate::plots::PlotCache;
+use crate::plots::force_time::TimeView;
+use crate::screens::form::{Bench, ProtocolForm};
+use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
+use crate::shell::event_log::EventLog;
+use crate::shell::frame_meter::FrameMeter;
+use crate::shell::keys::Keys;
+use crate::theme;
+use crate::window::WindowOptions;
+use crate::workers::folder_dialog::FolderDialog;
+use crate::workers::ports::Ports;
+use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use palpate_protocols::engine::Operator;
+use palpate_protocols::runner::{Request, Runner, Snapshot, StartError};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+use std::time::Duration;
+
+/// Between two frames while something moves: 30 a second is what an eye needs on a chart.
+const FRAME_RUNNING: Duration = Duration::from_millis(33);
+
+/// Between two frames at rest: live values must not look frozen.
+const FRAME_IDLE: Duration = Duration::from_millis(250);
+
+/// A start that was asked for.
+enum Start {
+    /// Not asked for.
+    None,
+    /// The runner has not answered yet.
+    Asked(Receiver<Result<(), StartError>>),
+    /// It has started, but the snapshot with this number does not show it yet.
+    Granted { seen: u64 },
+}
+
+/// The window's own state. The rig, the run and its data belong to the runner.
+pub struct WorkbenchApp {
+    pub(crate) runner: Runner,
+    pub(crate) snapshot: Arc<Snapshot>,
+    pub(crate) bench: Bench,
+    pub(crate) form: ProtocolForm,
+    pub(crate) library: Result<String, String>,
+    pub(crate) ports: Ports,
+    pub(crate) dialog: FolderDialog,
+    pub(crate) plots: PlotCache,
+    pub(crate) time_view: TimeView,
+    pub(crate) events: EventLog,
+    pub(crate) refusal: Option<String>,
+    start: Start,
+    is_closing: bool,
+    keys: Keys,
+    meter: FrameMeter,
+}
+
+impl WorkbenchApp {
+    /// Starts the runner on the rig of the options. Opens no window and reads nothing from disk.
+    pub fn new(options: WindowOptions, ctx: &Context) -> Result<Self, String> {
+        theme::apply(ctx);
+        let curve = options
+            .calibration
+            .curve()
+            .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
+        let wake = ctx.clone();
+        let runner = Runner::start(options.rig, options.scale, move || {
+            wake.request_repaint_after(FRAME_IDLE);
+        })
+        .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
+        let mut ports = Ports::default();
+        ports.refresh(ctx);
+        let mut form = ProtocolForm::default();
+        if let Some(folder) = options.sessions {
+            form.folder = folder.display().to_string();
+        }
+        Ok(Self {
+            snapshot: runner.snapshot(),
+            runner,
+            bench: Bench {
+                calibration: options.calibration,
+                curve,
+                limits: options.limits,
+            },
+            form,
+            library: palpate_sessions::folder::library_folder()
+                .map(|path| path.display().to_string())
+                .map_err(|err| err.to_string()),
+            ports,
+            dialog: FolderDialog::default(),
+            plots: PlotCache::default(),
+            time_view: TimeView::default(),
+            events: EventLog::default(),
+            refusal: None,
+            start: Start::None,
+            is_closing: false,
+            keys: Keys::default(),
+            meter: FrameMeter::from_environment(),
+        })
+    }
+
+    /// The newest snapshot taken for drawing.
+    #[must_use]
+    pub fn snapshot(&self) -> &Arc<Snapshot> {
+        &self.snapshot
+    }
+
+    /// What the window is in the middle of.
+    #[must_use]
+    pub fn intent(&self) -> Intent {
+        match (self.is_closing, &self.start) {
+            (true, _) => Intent::Closing,
+            (false, Start::None) => Intent::None,
+            (false, _) => Intent::Starting,
+        }
+    }
+
+    /// Whether the form may start a run now, or the reason why not.
+    pub(crate) fn start_verdict(&self) -> Result<(), String> {
+        if let Some(reason) = &self.snapshot.rig.link_error {
+            return Err(format!("the link to the rig is lost ({reason})"));
+        }
+        if self.is_closing {
+            return Err("the window is closing".into());
+        }
+        if !matches!(self.start, Start::None) {
+            return Err("starting".into());
+        }
+        match run_in_progress(&self.snapshot) {
+            Some(run) if run.holding.is_some() => {
+                Err("the stopped run waits: retract or close it first".into())
+            }
+            Some(_) => Err("a run is in progress".into()),
+            None => self.form.verdict(),
+        }
+    }
+
+    /// Does what was asked for.
+    fn act(&mut self, ctx: &Context, commands: &mut Commands) {
+        for command in commands.take() {
+            match command {
+                Command::Start => self.start(),
+                Command::Stop => self.operator(Operator::Stop),
+                Command::Retract => {
+                    if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
+                        self.operator(Operator::Retract);
+                    }
+                }
+                Command::CloseSession => self.operator(Operator::Close),
+                Command::ListPorts => self.ports.refresh(ctx),
+                Command::ChooseFolder => {
+                    if let Err(err) = self.dialog.open(ctx) {
+                        self.refusal = Some(format!("the folder dialog cannot be opened: {err}"));
+                    }
+                }
+                Command::SwitchTheme => ctx.set_theme(match ctx.theme() {
+                    Theme::Dark => Theme::Light,
+                    Theme::Light => Theme::Dark,
+                }),
+            }
+            ctx.request_repaint();
+        }
+    }
+
+    fn operator(&mut self, choice: Operator) {
+        if let Err(reason) = self.runner.operator(choice) {
+            self.refusal = Some(reason);
+        }
+    }
+
+    /// Asks the runner to start what stands in the form; the answer is polled, never awaited.
+    fn start(&mut self) {
+        if self.start_verdict().is_err() {
+            return;
+        }
+        let Some(request) = self.form.request(&self.bench) else {
+            return;
+        };
+        let (reply, answer) = sync_channel(1);
+        self.refusal = None;
+        match self.runner.request(Request::Run(Box::new(request), reply)) {
+            Ok(()) => self.start = Start::Asked(answer),
+            Err(reason) => self.refusal = Some(reason),
+        }
+    }
+
+    fn poll_start(&mut self) {
+        match &self.start {
+            Start::None => {}
+            Start::Asked(answer) => match answer.try_recv() {
+                Ok(Ok(())) => {
+                    self.start = Start::Granted {
+                        seen: self.snapshot.sequence,
+                    };
+                }
+                Ok(Err(reason)) => {
+                    self.refusal = Some(reason.to_string());
+                    self.start = Start::None;
+                }
+                Err(TryRecvError::Empty) => {}
+                Err(TryRecvError::Disconnected) => {
+                    self.refusal = Some("the runner ended; close palpate and check the rig".into());
+                    self.start = Start::None;
+                }
+            },
+            Start::Granted { seen } => {
+                if self.snapshot.sequence > *seen {
+                    self.start = Start::None;
+                }
+            }
+        }
+    }
+
+    /// Closing stops first: the window stays until the axis rests.
+    fn handle_close(&mut self, ctx: &Context) {
+        let is_safe = !is_motion_possible(&self.snapshot) && matches!(self.start, Start::None);
+        if ctx.input(|input| input.viewport().close_requested()) && !is_safe {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+            self.is_closing = true;
+            self.operator(Operator::Stop);
+        } else if self.is_closing && (is_safe || !self.runner.is_alive()) {
+            ctx.send_viewport_cmd(ViewportCommand::Close);
+        }
+    }
+}
+
+impl eframe::App for WorkbenchApp {
+    fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
+        self.meter.begin(frame.info().cpu_usage);
+        let mut commands = Commands::default();
+        self.keys.read(ctx, &mut commands);
+        self.snapshot = self.runner.snapshot();
+        self.poll_start();
+        self.ports.poll();
+        if let Some(folder) = self.dialog.poll() {
+            self.form.folder = folder.display().to_string();
+        }
+        let rig = &self.snapshot.rig;
+        self.form
+            .refresh(&rig.description, &self.bench, rig.is_homed);
+        self.plots.update(self.snapshot.run.as_ref());
+        self.act(ctx, &mut commands);
+        self.handle_close(ctx);
+        let is_quiet = run_in_progress(&self.snapshot).is_none()
+            && self.intent() == Intent::None
+            && !is_motion_possible(&self.snapshot);
+        ctx.request_repaint_after(if is_quiet { FRAME_IDLE } else { FRAME_RUNNING });
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let mut commands = Commands::default();
+        let activity = activity(&self.snapshot, self.intent());
+        self.draw(ui, &activity, &mut commands);
+        let rig = &self.snapshot.rig;
+        self.form
+            .refresh(&rig.description, &self.bench, rig.is_homed);
+        let ctx = ui.ctx().clone();
+        self.act(&ctx, &mut commands);
+        self.meter.end();
+    }
+
+    fn on_exit(&mut self) {
+        if let Err(err) = self.meter.write_report() {
+            // Nobody is left to read a screen; standard error is the last place to say it.
+            let _ = std::io::Write::write_all(
+                &mut std::io::stderr(),
+                format!("the frame report cannot be written: {err}\n").as_bytes(),
+            );
+        }
+    }
+}

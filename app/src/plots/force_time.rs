@@ -1,0 +1,78 @@
+//! Force over session time: phases shaded, the interlock's limit drawn.
+
+use super::points::{PlotCache, phase_spans};
+use crate::theme::Tokens;
+use eframe::egui::{Ui, Vec2b};
+use egui_plot::{HLine, LineStyle, Plot, Span};
+use palpate_model::rig::Phase;
+use palpate_model::units::Newtons;
+use palpate_protocols::runner::RunView;
+
+/// How much of the run is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum TimeView {
+    /// From the start.
+    #[default]
+    Whole,
+    /// From two seconds before the ramp, once it began.
+    FromRamp,
+}
+
+/// Draws the plot in the space there is.
+pub fn force_time_ui(
+    ui: &mut Ui,
+    run: Option<&RunView>,
+    cache: &PlotCache,
+    view: TimeView,
+    force_max: Newtons,
+) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let from = run
+        .filter(|_| view == TimeView::FromRamp)
+        .and_then(ramp_start);
+    let now = run.map_or(60.0, |run| run.now.seconds().0.max(1.0));
+    let plot = super::force_depth::quiet(Plot::new("force_time"))
+        .x_axis_label("session time (s)")
+        .y_axis_label("force above tare (N)")
+        .include_y(-0.5)
+        .include_x(now)
+        .auto_bounds(Vec2b::new(from.is_none(), true));
+    plot.show(ui, |plot_ui| {
+        if let Some(start) = from {
+            plot_ui.set_plot_bounds_x(start - 2.0..=now.max(start + 1.0));
+        }
+        if let Some(run) = run {
+            // A stretch of one colour has no name on it where it would not fit.
+            for (i, span) in phase_spans(run).enumerate() {
+                let fill = if i % 2 == 0 {
+                    tokens.phase_band
+                } else {
+                    tokens.canvas
+                };
+                plot_ui.span(
+                    Span::new(span.phase.name(), span.start..=span.end)
+                        .fill(fill)
+                        .border_color(tokens.line),
+                );
+            }
+        }
+        plot_ui.hline(
+            HLine::new("interlock", force_max.0)
+                .color(tokens.limit)
+                .width(1.5)
+                .style(LineStyle::dashed_dense())
+                .allow_hover(false),
+        );
+        for line in cache.force_time.lines("force") {
+            plot_ui.line(line.color(tokens.series));
+        }
+    });
+}
+
+/// Session time at which the ramp began.
+fn ramp_start(run: &RunView) -> Option<f64> {
+    run.phases
+        .iter()
+        .find(|(_, phase)| *phase == Phase::Ramp)
+        .map(|(start, _)| *start)
+}

@@ -1,0 +1,7 @@
+//! Plots of the run in progress, drawn from points converted once per snapshot.
+
+pub mod force_depth;
+pub mod force_time;
+mod points;
+
+pub use points::PlotCache;

@@ -1,0 +1,54 @@
+//! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
+
+use crate::command::{Command, Commands};
+use crate::shell::activity::is_planned;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::reason_button::reason_button;
+use eframe::egui::{Label, RichText, Ui, vec2};
+use palpate_protocols::engine::Outcome;
+use palpate_protocols::runner::RunView;
+
+/// Draws nothing while the run goes on as planned.
+pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+    if let Some(outcome) = &run.outcome {
+        section_ui(ui, "Run ended");
+        outcome_ui(ui, outcome);
+        log_ui(ui, run);
+    } else if let Some(ending) = &run.holding {
+        section_ui(ui, "Run stopped, axis holds");
+        outcome_ui(ui, ending);
+        let size = vec2(112.0, 28.0);
+        if reason_button(ui, "Retract  F8", size, &run.can_retract) {
+            commands.push(Command::Retract);
+        }
+        if reason_button(ui, "Close session", size, &Ok(())) {
+            commands.push(Command::CloseSession);
+        }
+    }
+}
+
+fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let ink = if is_planned(outcome.ending) {
+        tokens.text
+    } else {
+        tokens.alarm_text
+    };
+    let text = format!("{}: {}", outcome.ending, outcome.reason);
+    ui.add(Label::new(RichText::new(text).color(ink)).wrap());
+}
+
+fn log_ui(ui: &mut Ui, run: &RunView) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    match &run.log_error {
+        Some(reason) => {
+            let text = format!("The session could not be closed: {reason}");
+            ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
+        }
+        None => {
+            let text = format!("Session in {}", run.folder.display());
+            ui.add(Label::new(RichText::new(text).color(tokens.text_quiet)).wrap());
+        }
+    }
+}

@@ -1,0 +1,9 @@
+//! The panels around the plots: rig and protocol on the left, what is known on the right.
+
+pub mod after_stop;
+pub mod form;
+pub mod parameters;
+pub mod preview_view;
+pub mod protocol_panel;
+pub mod results_panel;
+pub mod rig_panel;

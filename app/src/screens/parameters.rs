@@ -1,0 +1,176 @@
+//! The force model's parameters as they become known, each with its uncertainty.
+
+use crate::theme::Tokens;
+use crate::widgets::uncertain::{plain, with_error};
+use eframe::egui::{Align, Layout, RichText, Ui, vec2};
+use palpate_model::fit::Parameter;
+use palpate_model::rig::Phase;
+use palpate_protocols::runner::RunView;
+
+/// The parameters shown, in this order, with their units where no fit names them yet.
+const SHOWN: [(&str, &str); 7] = [
+    ("tau_eps", "s"),
+    ("mu1", "N/mm"),
+    ("mu2", "N/mm^2"),
+    ("mu3", "N/mm^3"),
+    ("tau_sig", "N*s/mm^2"),
+    ("f0", "N"),
+    ("f_offset", "N"),
+];
+
+/// Draws one row per parameter.
+pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let live = run.and_then(|run| run.live.as_ref());
+    let find = |name: &str| {
+        live.and_then(|live| {
+            live.parameters
+                .iter()
+                .find(|parameter| parameter.name == name)
+        })
+    };
+    for (name, unit) in SHOWN {
+        let parameter = find(name);
+        row_ui(
+            ui,
+            name,
+            parameter.map_or(unit, |parameter| &parameter.unit),
+            parameter,
+        );
+    }
+    let remark = match (run, live) {
+        (None, _) => Some("parameters appear during the ramp".to_string()),
+        (Some(run), live) => remark(run.phase, live.map(|live| live.parameters.as_slice())),
+    };
+    if let Some(live) = live {
+        let text = format!(
+            "residual {:.1} mN rms, {} samples",
+            live.rmse_n * 1e3,
+            live.samples
+        );
+        ui.label(RichText::new(text).color(tokens.text_quiet).small());
+    }
+    if let Some(remark) = remark {
+        ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+    }
+}
+
+fn row_ui(ui: &mut Ui, name: &str, unit: &str, parameter: Option<&Parameter>) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.horizontal(|ui| {
+        cell(ui, 56.0, |ui| {
+            ui.label(RichText::new(name).color(tokens.text_quiet));
+        });
+        cell(ui, 148.0, |ui| {
+            let text = value_text(parameter);
+            let ink = if is_known(parameter) {
+                tokens.text
+            } else {
+                tokens.text_quiet
+            };
+            ui.label(RichText::new(text).monospace().color(ink));
+        });
+        ui.label(RichText::new(unit).color(tokens.text_quiet).small());
+    });
+}
+
+fn cell(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui)) {
+    let size = vec2(width, 18.0);
+    ui.allocate_ui_with_layout(size, Layout::left_to_right(Align::Center), |ui| {
+        ui.set_min_width(width);
+        content(ui);
+    });
+}
+
+fn is_known(parameter: Option<&Parameter>) -> bool {
+    parameter.is_some_and(|parameter| parameter.is_fixed || parameter.std_error.is_some())
+}
+
+fn value_text(parameter: Option<&Parameter>) -> String {
+    match parameter {
+        Some(parameter) if parameter.is_fixed => format!("{} fixed", plain(parameter.value)),
+        Some(Parameter {
+            value,
+            std_error: Some(error),
+            ..
+        }) => with_error(*value, *error),
+        _ => "not yet".into(),
+    }
+}
+
+/// Why something is not known yet, or never became known; `None` when all is known.
+fn remark(phase: Phase, parameters: Option<&[Parameter]>) -> Option<String> {
+    let missing: Vec<&str> = SHOWN
+        .iter()
+        .map(|(name, _)| *name)
+        .filter(|name| {
+            let found = parameters.unwrap_or(&[]);
+            !is_known(found.iter().find(|parameter| parameter.name == *name))
+        })
+        .collect();
+    if missing.is_empty() {
+        return None;
+    }
+    let names = if missing.len() == SHOWN.len() {
+        "none known".to_string()
+    } else {
+        format!("{} not yet", missing.join(", "))
+    };
+    let why = match phase {
+        Phase::Idle
+        | Phase::SelfTest
+        | Phase::Home
+        | Phase::Tare
+        | Phase::Contact
+        | Phase::Rest => "the probe has not indented",
+        Phase::Ramp => "more of the ramp is needed",
+        Phase::Hold => "more of the hold is needed",
+        Phase::Retract | Phase::Stopped | Phase::Ended | Phase::Jog => {
+            "the ramp and hold were too short"
+        }
+    };
+    Some(format!("{names}: {why}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(name: &str, std_error: Option<f64>) -> Parameter {
+        Parameter {
+            name: name.into(),
+            value: 1.5,
+            unit: "s".into(),
+            std_error,
+            ci95: None,
+            is_fixed: false,
+        }
+    }
+
+    #[test]
+    fn what_is_not_identified_is_never_shown_as_a_number() {
+        assert_eq!(value_text(None), "not yet");
+        assert_eq!(value_text(Some(&parameter("mu1", None))), "not yet");
+        assert_eq!(
+            value_text(Some(&parameter("mu1", Some(0.1)))),
+            "1.50 ± 0.10"
+        );
+    }
+
+    #[test]
+    fn the_remark_names_what_is_missing_and_why() {
+        let early = remark(Phase::Contact, None).unwrap();
+        assert!(early.contains("none known") && early.contains("not indented"));
+        let mut known: Vec<Parameter> = SHOWN
+            .iter()
+            .map(|(name, _)| parameter(name, Some(0.1)))
+            .collect();
+        assert_eq!(remark(Phase::Hold, Some(&known)), None);
+        known[4].std_error = None;
+        let text = remark(Phase::Ramp, Some(&known)).unwrap();
+        assert!(
+            text.contains("tau_sig not yet") && text.contains("ramp"),
+            "{text}"
+        );
+    }
+}

@@ -1,0 +1,68 @@
+//! What the plan will do, before anything moves.
+
+use super::form::ProtocolForm;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::fact_ui;
+use crate::widgets::uncertain::clock;
+use eframe::egui::{RichText, Ui};
+use palpate_protocols::preview::Preview;
+
+/// Draws durations, forces and storage, then refusals, the acknowledgement and notes.
+pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let Some(checked) = form.checked() else {
+        ui.label(
+            RichText::new("No preview until the fields above are right").color(tokens.text_quiet),
+        );
+        return;
+    };
+    let preview = checked.preview.clone();
+    numbers_ui(ui, &preview);
+    for refusal in &preview.refusals {
+        ui.label(RichText::new(format!("Refused: {refusal}")).color(tokens.alarm_text));
+    }
+    for note in &preview.notes {
+        ui.label(
+            RichText::new(format!("Note: {note}"))
+                .color(tokens.text_quiet)
+                .small(),
+        );
+    }
+    if !preview.acknowledgements.is_empty() {
+        for warning in &preview.acknowledgements {
+            ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
+        }
+        let mut is_acknowledged = form.is_acknowledged();
+        if ui
+            .checkbox(&mut is_acknowledged, "I accept this; it is recorded")
+            .changed()
+        {
+            form.acknowledge(is_acknowledged);
+        }
+    }
+}
+
+fn numbers_ui(ui: &mut Ui, preview: &Preview) {
+    fact_ui(
+        ui,
+        "duration",
+        format!(
+            "{} expected, {} at most",
+            clock(preview.expected.0),
+            clock(preview.longest.0)
+        ),
+    );
+    fact_ui(
+        ui,
+        "peak force",
+        format!(
+            "{:.1} to {:.1} expected",
+            preview.force_band[0], preview.force_band[1]
+        ),
+    );
+    fact_ui(
+        ui,
+        "storage",
+        format!("up to {:.1} MB", preview.storage_bytes as f64 * 1e-6),
+    );
+}

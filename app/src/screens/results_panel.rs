@@ -1,0 +1,67 @@
+//! What is known from the run: parameters, measured facts, the steps and how it ended.
+
+use super::after_stop::after_stop_ui;
+use super::parameters::parameters_ui;
+use crate::command::Commands;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::step_mark::{StepState, step_ui};
+use eframe::egui::{RichText, Ui};
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::runner::{RunView, Snapshot};
+
+/// Draws the panel.
+pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+    let run = snapshot.run.as_ref();
+    if let Some(run) = run {
+        after_stop_ui(ui, run, commands);
+    }
+    section_ui(ui, "Live parameters");
+    parameters_ui(ui, run);
+    section_ui(ui, "Measured");
+    match run {
+        Some(run) => facts_ui(ui, run),
+        None => {
+            let tokens = Tokens::of(ui.visuals().dark_mode);
+            ui.label(RichText::new("no run yet").color(tokens.text_quiet));
+        }
+    }
+    if let Some(run) = run {
+        section_ui(ui, "Steps");
+        steps_ui(ui, run);
+    }
+}
+
+fn facts_ui(ui: &mut Ui, run: &RunView) {
+    let not_yet = || "not yet".to_string();
+    let peak = run
+        .force_peak
+        .map_or_else(not_yet, |peak| format!("{peak:.3}"));
+    fact_ui(ui, "peak force", peak);
+    let contact = run.contact.map_or_else(not_yet, |contact| {
+        format!("{:.3} ± {:.3} mm", contact.position.0, contact.std_error_mm)
+    });
+    fact_ui(ui, "contact", contact);
+    let tare = run.tare.map_or_else(not_yet, |tare| {
+        format!("{:.4}, noise {:.2} mV", tare.volts, tare.noise.0 * 1e3)
+    });
+    fact_ui(ui, "tare", tare);
+    fact_ui(ui, "samples", run.samples.to_string());
+    fact_ui(
+        ui,
+        "saved",
+        format!("through {:.1} s", run.saved_through.seconds().0),
+    );
+}
+
+fn steps_ui(ui: &mut Ui, run: &RunView) {
+    let is_running = run.outcome.is_none() && run.holding.is_none();
+    let is_complete = run
+        .outcome
+        .as_ref()
+        .is_some_and(|outcome| outcome.ending == EndingKind::Finish);
+    for (i, step) in run.steps.iter().enumerate() {
+        let state = StepState::of(i, run.step_index, is_running, is_complete);
+        step_ui(ui, step.phase.name(), step.expected.0, state);
+    }
+}

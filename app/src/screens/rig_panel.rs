@@ -1,0 +1,132 @@
+//! The rig: what it is, what it says now, and the serial ports of this computer.
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::workers::ports::Ports;
+use eframe::egui::{Button, RichText, Ui};
+use palpate_model::rig::command::position_from_pulses;
+use palpate_model::rig::{AxisStatus, Reading};
+use palpate_protocols::runner::{RigView, Snapshot};
+
+/// Draws the panel.
+pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Commands) {
+    let rig = &snapshot.rig;
+    section_ui(ui, &format!("Rig {}", rig.description.name));
+    fact_ui(ui, "identity", &rig.description.identity);
+    let settings: Vec<String> = rig
+        .description
+        .settings
+        .iter()
+        .map(|(name, value)| format!("{name} {value}"))
+        .collect();
+    if !settings.is_empty() {
+        fact_ui(ui, "settings", settings.join(", "));
+    }
+    link_ui(ui, rig);
+    match rig.reading {
+        Some(reading) => reading_ui(ui, rig, &reading),
+        None => fact_ui(ui, "signal", "no sample yet"),
+    }
+    ports_ui(ui, ports, commands);
+}
+
+fn link_ui(ui: &mut Ui, rig: &RigView) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    match &rig.link_error {
+        Some(reason) => {
+            let text = format!("Link lost: {reason}");
+            ui.label(RichText::new(text).color(tokens.alarm_text));
+        }
+        None => fact_ui(ui, "link", "connected"),
+    }
+}
+
+fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {
+    let counts = reading
+        .counts
+        .map_or(String::new(), |counts| format!("  ({counts} counts)"));
+    fact_ui(ui, "signal", format!("{:.4}{counts}", reading.volts));
+    let position = position_from_pulses(reading.pulses, rig.description.mm_per_pulse);
+    let place = if rig.is_homed {
+        format!("{:.3} from home  ({} pulses)", position, reading.pulses)
+    } else {
+        format!("not homed  ({} pulses)", reading.pulses)
+    };
+    fact_ui(ui, "position", place);
+    fact_ui(ui, "axis", axis_words(reading.status));
+}
+
+/// The axis in words.
+fn axis_words(status: AxisStatus) -> String {
+    let motor = if status.has(AxisStatus::MOTOR_ON) {
+        "motor on"
+    } else {
+        "motor off"
+    };
+    let motion = match (
+        status.has(AxisStatus::MOVING),
+        status.has(AxisStatus::STOPPING),
+    ) {
+        (true, true) => "braking",
+        (true, false) => "moving",
+        _ => "at rest",
+    };
+    let mut words = vec![motor, motion];
+    for (bit, word) in [
+        (AxisStatus::HOME, "on the home switch"),
+        (AxisStatus::FORWARD_LIMIT, "at the far limit"),
+        (AxisStatus::REVERSE_LIMIT, "at the limit behind home"),
+    ] {
+        if status.has(bit) {
+            words.push(word);
+        }
+    }
+    words.join(", ")
+}
+
+fn ports_ui(ui: &mut Ui, ports: &Ports, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.add_space(2.0);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Serial ports found").color(tokens.text_quiet));
+        let button = Button::new("Refresh").small();
+        if ui.add_enabled(!ports.is_busy(), button).clicked() {
+            commands.push(Command::ListPorts);
+        }
+    });
+    match ports.found() {
+        None => {
+            ui.label("looking for them");
+        }
+        Some(Ok([])) => {
+            ui.label("none on this computer");
+        }
+        Some(Ok(found)) => {
+            for port in found {
+                ui.label(format!("{}  {}", port.name, port.description));
+            }
+        }
+        Some(Err(reason)) => {
+            ui.label(RichText::new(reason).color(tokens.alarm_text));
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_axis_speaks_words() {
+        assert_eq!(axis_words(AxisStatus::default()), "motor off, at rest");
+        assert_eq!(
+            axis_words(AxisStatus::MOTOR_ON | AxisStatus::MOVING | AxisStatus::STOPPING),
+            "motor on, braking"
+        );
+        assert_eq!(
+            axis_words(AxisStatus::MOTOR_ON | AxisStatus::HOME),
+            "motor on, at rest, on the home switch"
+        );
+    }
+}

@@ -1,0 +1,114 @@
+//! What the rig and the run are doing, as word, shape and tone. Never colour alone.
+
+use palpate_model::rig::AxisStatus;
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::runner::{RunView, Snapshot};
+
+/// Drawn beside the word, so that the state is read without colour.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Shape {
+    /// Nothing goes on.
+    Ring,
+    /// Something moves or may move.
+    Triangle,
+    /// Stopped.
+    Square,
+    /// Something is wrong.
+    Diamond,
+}
+
+/// How loud the state is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Tone {
+    /// Nothing to look at.
+    Quiet,
+    /// Under way as planned.
+    Active,
+    /// Waits for the operator.
+    Notice,
+    /// Something went wrong.
+    Alarm,
+}
+
+/// The state badge.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Activity {
+    /// One or two words.
+    pub word: String,
+    /// Its shape.
+    pub shape: Shape,
+    /// Its tone.
+    pub tone: Tone,
+}
+
+impl Activity {
+    fn new(word: impl Into<String>, shape: Shape, tone: Tone) -> Self {
+        Self {
+            word: word.into(),
+            shape,
+            tone,
+        }
+    }
+}
+
+/// What the window itself is in the middle of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Intent {
+    /// Nothing of its own.
+    None,
+    /// A start was asked for and not answered yet.
+    Starting,
+    /// The window closes as soon as the axis rests.
+    Closing,
+}
+
+/// The run in progress, if there is one.
+#[must_use]
+pub fn run_in_progress(snapshot: &Snapshot) -> Option<&RunView> {
+    snapshot.run.as_ref().filter(|run| run.outcome.is_none())
+}
+
+/// Whether the axis moves or may begin to, in a run or without one.
+#[must_use]
+pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
+    let is_axis_moving = snapshot
+        .rig
+        .reading
+        .is_some_and(|reading| reading.status.has(AxisStatus::MOVING));
+    is_axis_moving || run_in_progress(snapshot).is_some_and(|run| run.is_motion_possible)
+}
+
+/// What to show in the badge.
+#[must_use]
+pub fn activity(snapshot: &Snapshot, intent: Intent) -> Activity {
+    use palpate_model::rig::Phase;
+    if snapshot.rig.link_error.is_some() {
+        return Activity::new("LINK LOST", Shape::Diamond, Tone::Alarm);
+    }
+    if intent == Intent::Closing {
+        return Activity::new("CLOSING", Shape::Square, Tone::Notice);
+    }
+    let Some(run) = run_in_progress(snapshot) else {
+        return if intent == Intent::Starting {
+            Activity::new("STARTING", Shape::Triangle, Tone::Active)
+        } else if is_motion_possible(snapshot) {
+            Activity::new("MOVING", Shape::Triangle, Tone::Active)
+        } else {
+            Activity::new("IDLE", Shape::Ring, Tone::Quiet)
+        };
+    };
+    match (&run.holding, run.phase) {
+        (Some(ending), _) if is_planned(ending.ending) => {
+            Activity::new("STOPPED", Shape::Square, Tone::Notice)
+        }
+        (Some(_), _) => Activity::new("STOPPED", Shape::Diamond, Tone::Alarm),
+        (None, Phase::Stopped) => Activity::new("STOPPING", Shape::Square, Tone::Notice),
+        (None, phase) => Activity::new(phase.name().to_uppercase(), Shape::Triangle, Tone::Active),
+    }
+}
+
+/// Whether a run ended the way somebody wanted.
+#[must_use]
+pub fn is_planned(ending: EndingKind) -> bool {
+    matches!(ending, EndingKind::Finish | EndingKind::Stop)
+}

@@ -1,0 +1,111 @@
+//! What happened, newest last, with a filter and a copy of what is shown.
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
+use palpate_protocols::runner::{LogLine, Snapshot};
+
+/// The filter as typed.
+#[derive(Clone, Debug, Default)]
+pub struct EventLog {
+    filter: String,
+}
+
+impl EventLog {
+    /// Draws the log in the space there is.
+    pub fn ui(&mut self, ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+        let events = snapshot
+            .run
+            .as_ref()
+            .map_or(&[][..], |run| run.events.as_slice());
+        let shown: Vec<&LogLine> = events
+            .iter()
+            .filter(|line| is_shown(line, &self.filter))
+            .collect();
+        self.head_ui(ui, &shown, commands);
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        if shown.is_empty() {
+            let text = if events.is_empty() {
+                "nothing happened yet"
+            } else {
+                "no event matches the filter"
+            };
+            ui.label(RichText::new(text).color(tokens.text_quiet));
+            return;
+        }
+        let height = ui.text_style_height(&TextStyle::Monospace);
+        ScrollArea::vertical()
+            .id_salt("events")
+            .auto_shrink(false)
+            .stick_to_bottom(true)
+            .show_rows(ui, height, shown.len(), |ui, rows| {
+                for line in &shown[rows] {
+                    let ink = if line.is_alarm {
+                        tokens.alarm_text
+                    } else {
+                        tokens.text
+                    };
+                    let text = RichText::new(line_text(line)).monospace().color(ink);
+                    ui.add(Label::new(text).truncate());
+                }
+            });
+    }
+
+    fn head_ui(&mut self, ui: &mut Ui, shown: &[&LogLine], commands: &mut Commands) {
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Events").heading().strong());
+            ui.add_space(8.0);
+            let label = ui.label("filter");
+            ui.add(
+                TextEdit::singleline(&mut self.filter)
+                    .desired_width(160.0)
+                    .char_limit(100),
+            )
+            .labelled_by(label.id);
+            if ui.button("Copy").clicked() {
+                let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
+                ui.ctx().copy_text(lines.join("\n"));
+            }
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                let name = if ui.visuals().dark_mode {
+                    "Light screen"
+                } else {
+                    "Dark screen"
+                };
+                if ui.button(name).clicked() {
+                    commands.push(Command::SwitchTheme);
+                }
+            });
+        });
+    }
+}
+
+fn is_shown(line: &LogLine, filter: &str) -> bool {
+    let wanted = filter.trim().to_lowercase();
+    wanted.is_empty() || line_text(line).to_lowercase().contains(&wanted)
+}
+
+fn line_text(line: &LogLine) -> String {
+    let mark = if line.is_alarm { "ALARM  " } else { "" };
+    format!("{:>9.3} s  {mark}{}", line.at.seconds().0, line.text)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::Nanos;
+
+    #[test]
+    fn the_filter_finds_words_times_and_alarms() {
+        let line = |text: &str, is_alarm| LogLine {
+            at: Nanos::from_millis(12_345),
+            text: text.into(),
+            is_alarm,
+        };
+        let alarm = line("Force interlock: 9.1 N", true);
+        for filter in ["", "  ", "force", "FORCE INTER", "12.345", "alarm"] {
+            assert!(is_shown(&alarm, filter), "{filter}");
+        }
+        assert!(!is_shown(&line("contact at 41.2 mm", false), "alarm"));
+    }
+}

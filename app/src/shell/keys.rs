@@ -1,0 +1,45 @@
+//! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
+
+use crate::command::{Command, Commands};
+use eframe::egui::{Context, InputState, Key};
+
+/// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
+pub const KEYS: [(Key, Command); 4] = [
+    (Key::F12, Command::Stop),
+    (Key::Escape, Command::Stop),
+    (Key::F5, Command::Start),
+    (Key::F8, Command::Retract),
+];
+
+/// Reads the keys once per frame.
+#[derive(Debug, Default)]
+pub struct Keys {
+    frame_read: Option<u64>,
+}
+
+impl Keys {
+    /// Asks for what was pressed since the last frame.
+    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) {
+        // While the window is hidden the input is that of the last frame shown; pressing once
+        // must not act again and again.
+        let frame = ctx.cumulative_frame_nr();
+        if self.frame_read.replace(frame) == Some(frame) {
+            return;
+        }
+        ctx.input(|input| {
+            for (key, command) in KEYS {
+                if is_pressed(input, key) {
+                    commands.push(command);
+                }
+            }
+        });
+    }
+}
+
+/// Whether a key went down, not counting the repeats of a key held.
+fn is_pressed(input: &InputState, wanted: Key) -> bool {
+    use eframe::egui::Event;
+    input.events.iter().any(|event| {
+        matches!(event, Event::Key { key, pressed: true, repeat: false, .. } if *key == wanted)
+    })
+}

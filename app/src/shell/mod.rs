@@ -1,0 +1,7 @@
+//! What stands on every screen: the state, the numbers, the stop control, the event log.
+
+pub mod activity;
+pub mod event_log;
+pub mod frame_meter;
+pub mod keys;
+pub mod top_bar;

@@ -1,0 +1,166 @@
+//! The bar that stands on every screen: state, run, progress, the numbers, the stop control.
+
+use super::activity::{Activity, is_motion_possible, run_in_progress};
+use crate::command::{Command, Commands};
+use crate::theme::{Tokens, reading_style};
+use crate::widgets::state_badge::badge_ui;
+use crate::widgets::uncertain::clock;
+use eframe::egui::{Align, Button, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2};
+use palpate_model::rig::command::position_from_pulses;
+use palpate_protocols::runner::{RunView, Snapshot};
+
+/// Height of the bar's content in points.
+pub const HEIGHT: f32 = 52.0;
+
+/// Draws the bar. `specimen` is the one of the run in progress or of the form.
+pub fn top_bar_ui(
+    ui: &mut Ui,
+    snapshot: &Snapshot,
+    activity: &Activity,
+    specimen: &str,
+    commands: &mut Commands,
+) {
+    ui.horizontal(|ui| {
+        ui.set_height(HEIGHT);
+        badge_ui(ui, activity, vec2(152.0, HEIGHT));
+        ui.add_space(6.0);
+        run_ui(ui, snapshot.run.as_ref(), specimen);
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            stop_ui(ui, is_motion_possible(snapshot), commands);
+            ui.add_space(6.0);
+            numbers_ui(ui, snapshot);
+        });
+    });
+}
+
+fn stop_ui(ui: &mut Ui, is_motion_possible: bool, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let text = RichText::new("Stop motion  F12").size(17.0).strong();
+    // Grey while nothing can move, and always there: it also stops what we do not know of.
+    let button = if is_motion_possible {
+        Button::new(text.color(tokens.on_alarm)).fill(tokens.alarm_fill)
+    } else {
+        Button::new(text).fill(tokens.control)
+    };
+    let button = button
+        .stroke(Stroke::new(2.0, tokens.alarm_fill))
+        .min_size(vec2(180.0, HEIGHT));
+    if ui.add(button).clicked() {
+        commands.push(Command::Stop);
+    }
+}
+
+fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let size = vec2(270.0, HEIGHT);
+    ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
+        ui.set_width(270.0);
+        ui.spacing_mut().item_spacing.y = 2.0;
+        let specimen = if specimen.trim().is_empty() {
+            "no name"
+        } else {
+            specimen
+        };
+        ui.add(Label::new(format!("specimen {specimen}")).truncate());
+        let (line, fraction) = match run {
+            Some(run) => (run_line(run), run.fraction),
+            None => ("no run yet".into(), 0.0),
+        };
+        ui.add(Label::new(RichText::new(line).color(tokens.text_quiet)).truncate());
+        ui.add(
+            ProgressBar::new(fraction as f32)
+                .desired_height(10.0)
+                .corner_radius(2)
+                .fill(tokens.text_quiet),
+        );
+    });
+}
+
+/// Where the run is and how long it goes on.
+fn run_line(run: &RunView) -> String {
+    let step = format!(
+        "step {} of {}",
+        (run.step_index + 1).min(run.steps.len()),
+        run.steps.len()
+    );
+    match (&run.outcome, &run.holding) {
+        (Some(outcome), _) => format!("{} after {}", outcome.ending, clock(run.now.seconds().0)),
+        (None, Some(_)) => format!("{step}, waits for retract or close"),
+        (None, None) => format!("{step}, {}, {} left", run.phase, clock(run.time_left.0)),
+    }
+}
+
+/// Force, depth, position and velocity, right to left.
+fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
+    let derived = run_in_progress(snapshot).map(|run| run.derived);
+    let at_rest = snapshot
+        .rig
+        .reading
+        .filter(|_| snapshot.rig.is_homed)
+        .map(|reading| {
+            position_from_pulses(reading.pulses, snapshot.rig.description.mm_per_pulse).0
+        });
+    let position = match derived {
+        Some(derived) if snapshot.rig.is_homed => Some(derived.position.0),
+        _ => at_rest,
+    };
+    let depth = derived
+        .and_then(|derived| derived.depth)
+        .map(|depth| depth.0);
+    let force = derived
+        .and_then(|derived| derived.force)
+        .map(|force| force.0);
+    let velocity = derived.map(|derived| derived.velocity.0);
+    number_ui(ui, "velocity v", "mm/s", number(velocity, 2), 116.0);
+    number_ui(ui, "position x", "mm", number(position, 3), 130.0);
+    number_ui(ui, "depth", "mm", number(depth, 3), 116.0);
+    number_ui(ui, "force F", "N", number(force, 3), 112.0);
+}
+
+/// A number of fixed decimals, or dashes where there is none. Minus zero is zero.
+fn number(value: Option<f64>, decimals: usize) -> String {
+    match value {
+        Some(value) if value.is_finite() => {
+            let text = format!("{value:.decimals$}");
+            let is_zero = text
+                .trim_start_matches('-')
+                .chars()
+                .all(|c| matches!(c, '0' | '.'));
+            if is_zero {
+                format!("{:.decimals$}", 0.0)
+            } else {
+                text
+            }
+        }
+        _ => "--".into(),
+    }
+}
+
+fn number_ui(ui: &mut Ui, name: &str, unit: &str, text: String, width: f32) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.allocate_ui_with_layout(vec2(width, HEIGHT), Layout::top_down(Align::Max), |ui| {
+        ui.set_width(width);
+        ui.spacing_mut().item_spacing.y = 0.0;
+        let head = format!("{name} ({unit})");
+        ui.label(RichText::new(head).color(tokens.text_quiet).small());
+        ui.label(RichText::new(text).text_style(reading_style()));
+    });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_have_fixed_decimals_and_no_minus_zero() {
+        for (value, text) in [
+            (Some(5.591_4), "5.591"),
+            (Some(-0.000_2), "0.000"),
+            (Some(-1.0), "-1.000"),
+            (Some(f64::NAN), "--"),
+            (None, "--"),
+        ] {
+            assert_eq!(number(value, 3), text);
+        }
+    }
+}

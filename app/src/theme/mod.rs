@@ -1,0 +1,75 @@
+//! How the window looks: colour tokens and the type scale, applied once at the start.
+
+pub mod tokens;
+
+use eframe::egui::{
+    Context, CornerRadius, FontFamily, FontId, Stroke, Style, TextStyle, Theme, ThemePreference,
+    Visuals, vec2,
+};
+pub use tokens::Tokens;
+
+/// Text style of the numbers read from across the room.
+#[must_use]
+pub fn reading_style() -> TextStyle {
+    TextStyle::Name("reading".into())
+}
+
+/// Sets both themes and starts with the light one: tissue laboratories are lit rooms.
+pub fn apply(ctx: &Context) {
+    for theme in [Theme::Light, Theme::Dark] {
+        let tokens = Tokens::of(theme == Theme::Dark);
+        ctx.set_visuals_of(theme, visuals(theme, tokens));
+        ctx.style_mut_of(theme, set_type);
+    }
+    ctx.set_theme(ThemePreference::Light);
+}
+
+fn visuals(theme: Theme, tokens: &Tokens) -> Visuals {
+    let mut visuals = theme.default_visuals();
+    visuals.panel_fill = tokens.panel;
+    visuals.window_fill = tokens.panel;
+    visuals.extreme_bg_color = tokens.canvas;
+    visuals.text_edit_bg_color = Some(tokens.canvas);
+    visuals.weak_text_color = Some(tokens.text_quiet);
+    visuals.error_fg_color = tokens.alarm_text;
+    visuals.warn_fg_color = tokens.alarm_text;
+    visuals.selection.bg_fill = tokens.selection;
+    visuals.selection.stroke = Stroke::new(1.0, tokens.text);
+    let widgets = &mut visuals.widgets;
+    for (widget, fill) in [
+        (&mut widgets.noninteractive, tokens.panel),
+        (&mut widgets.inactive, tokens.control),
+        (&mut widgets.hovered, tokens.control_hover),
+        (&mut widgets.active, tokens.control_hover),
+        (&mut widgets.open, tokens.control_hover),
+    ] {
+        widget.bg_fill = fill;
+        widget.weak_bg_fill = fill;
+        widget.bg_stroke = Stroke::new(1.0, tokens.line);
+        widget.fg_stroke = Stroke::new(1.0, tokens.text);
+        widget.corner_radius = CornerRadius::same(3);
+        widget.expansion = 0.0;
+    }
+    // The focused control must be seen by those who work with the keyboard alone.
+    widgets.hovered.bg_stroke = Stroke::new(1.0, tokens.text_quiet);
+    widgets.active.bg_stroke = Stroke::new(2.0, tokens.focus);
+    visuals
+}
+
+fn set_type(style: &mut Style) {
+    let size = |points: f32, family: FontFamily| FontId::new(points, family);
+    style.text_styles = [
+        (TextStyle::Small, size(12.0, FontFamily::Proportional)),
+        (TextStyle::Body, size(13.5, FontFamily::Proportional)),
+        (TextStyle::Button, size(13.5, FontFamily::Proportional)),
+        (TextStyle::Heading, size(16.0, FontFamily::Proportional)),
+        (TextStyle::Monospace, size(12.5, FontFamily::Monospace)),
+        (reading_style(), size(24.0, FontFamily::Monospace)),
+    ]
+    .into();
+    style.spacing.item_spacing = vec2(6.0, 4.0);
+    style.spacing.button_padding = vec2(8.0, 4.0);
+    style.spacing.interact_size.y = 22.0;
+    // Nothing slides or fades on an instrument; it also keeps an idle window from repainting.
+    style.animation_time = 0.0;
+}

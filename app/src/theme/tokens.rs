@@ -1,0 +1,165 @@
+//! Every colour of the window. Greys by default; a saturated colour means "look here".
+
+use eframe::egui::Color32;
+
+/// The colours of one theme, by use.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tokens {
+    /// Behind everything.
+    pub panel: Color32,
+    /// Behind plots, text fields and the log.
+    pub canvas: Color32,
+    /// A control at rest.
+    pub control: Color32,
+    /// A control under the pointer or pressed.
+    pub control_hover: Color32,
+    /// Hairlines, frames and grids.
+    pub line: Color32,
+    /// Text.
+    pub text: Color32,
+    /// Labels, units, remarks.
+    pub text_quiet: Color32,
+    /// Selected text and toggles.
+    pub selection: Color32,
+    /// Keyboard focus.
+    pub focus: Color32,
+    /// A run under way: strong but grey.
+    pub active_fill: Color32,
+    /// Text on `active_fill`.
+    pub on_active: Color32,
+    /// Something waits for the operator.
+    pub notice_fill: Color32,
+    /// Text on `notice_fill`.
+    pub on_notice: Color32,
+    /// Something is wrong, and the stop control while motion is possible.
+    pub alarm_fill: Color32,
+    /// Text on `alarm_fill`.
+    pub on_alarm: Color32,
+    /// Sentences about what is wrong, on `panel` and `canvas`.
+    pub alarm_text: Color32,
+    /// Measured force: Okabe-Ito blue or sky blue.
+    pub series: Color32,
+    /// Interlock limits in plots: Okabe-Ito vermillion.
+    pub limit: Color32,
+    /// Shading of every other phase in plots.
+    pub phase_band: Color32,
+}
+
+const fn grey(level: u8) -> Color32 {
+    Color32::from_gray(level)
+}
+
+/// For lit rooms.
+pub const LIGHT: Tokens = Tokens {
+    panel: grey(0xF0),
+    canvas: grey(0xFC),
+    control: grey(0xE0),
+    control_hover: grey(0xD2),
+    line: grey(0xC4),
+    text: grey(0x1C),
+    text_quiet: grey(0x58),
+    selection: grey(0xC8),
+    focus: Color32::from_rgb(0x00, 0x72, 0xB2),
+    active_fill: grey(0x3A),
+    on_active: grey(0xFF),
+    notice_fill: Color32::from_rgb(0xE6, 0x9F, 0x00),
+    on_notice: grey(0x10),
+    alarm_fill: Color32::from_rgb(0xB4, 0x23, 0x18),
+    on_alarm: grey(0xFF),
+    alarm_text: Color32::from_rgb(0xA3, 0x1E, 0x12),
+    series: Color32::from_rgb(0x00, 0x72, 0xB2),
+    limit: Color32::from_rgb(0xD5, 0x5E, 0x00),
+    phase_band: grey(0xF0),
+};
+
+/// For dim rooms.
+pub const DARK: Tokens = Tokens {
+    panel: grey(0x24),
+    canvas: grey(0x18),
+    control: grey(0x38),
+    control_hover: grey(0x48),
+    line: grey(0x50),
+    text: grey(0xE8),
+    text_quiet: grey(0xAC),
+    selection: grey(0x50),
+    focus: Color32::from_rgb(0x56, 0xB4, 0xE9),
+    active_fill: grey(0xC8),
+    on_active: grey(0x10),
+    notice_fill: Color32::from_rgb(0xE6, 0x9F, 0x00),
+    on_notice: grey(0x10),
+    alarm_fill: Color32::from_rgb(0xC2, 0x2F, 0x22),
+    on_alarm: grey(0xFF),
+    alarm_text: Color32::from_rgb(0xFF, 0x9C, 0x8A),
+    series: Color32::from_rgb(0x56, 0xB4, 0xE9),
+    limit: Color32::from_rgb(0xD5, 0x5E, 0x00),
+    phase_band: grey(0x24),
+};
+
+impl Tokens {
+    /// The tokens of a theme.
+    #[must_use]
+    pub const fn of(is_dark: bool) -> &'static Self {
+        if is_dark { &DARK } else { &LIGHT }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Relative luminance, WCAG 2.2 (<https://www.w3.org/TR/WCAG22/#dfn-relative-luminance>).
+    fn luminance(color: Color32) -> f64 {
+        let linear = |channel: u8| {
+            let value = f64::from(channel) / 255.0;
+            if value <= 0.040_45 {
+                value / 12.92
+            } else {
+                ((value + 0.055) / 1.055).powf(2.4)
+            }
+        };
+        0.2126 * linear(color.r()) + 0.7152 * linear(color.g()) + 0.0722 * linear(color.b())
+    }
+
+    fn contrast(a: Color32, b: Color32) -> f64 {
+        let (a, b) = (luminance(a), luminance(b));
+        (a.max(b) + 0.05) / (a.min(b) + 0.05)
+    }
+
+    #[test]
+    fn text_is_readable_on_everything_it_stands_on() {
+        assert!((contrast(grey(0), grey(255)) - 21.0).abs() < 1e-9);
+        for tokens in [&LIGHT, &DARK] {
+            for (text, ground) in [
+                (tokens.text, tokens.panel),
+                (tokens.text, tokens.canvas),
+                (tokens.text, tokens.control),
+                (tokens.text, tokens.control_hover),
+                (tokens.text, tokens.selection),
+                (tokens.text_quiet, tokens.panel),
+                (tokens.text_quiet, tokens.canvas),
+                (tokens.text_quiet, tokens.phase_band),
+                (tokens.alarm_text, tokens.panel),
+                (tokens.alarm_text, tokens.canvas),
+                (tokens.on_active, tokens.active_fill),
+                (tokens.on_notice, tokens.notice_fill),
+                (tokens.on_alarm, tokens.alarm_fill),
+            ] {
+                let ratio = contrast(text, ground);
+                // WCAG 2.2 success criterion 1.4.3.
+                assert!(ratio >= 4.5, "{text:?} on {ground:?} has {ratio:.2}");
+            }
+        }
+    }
+
+    #[test]
+    fn lines_in_plots_stand_out_from_their_ground() {
+        for tokens in [&LIGHT, &DARK] {
+            for line in [tokens.series, tokens.limit] {
+                for ground in [tokens.canvas, tokens.phase_band] {
+                    // WCAG 2.2 success criterion 1.4.11, graphical objects.
+                    assert!(contrast(line, ground) >= 3.0, "{line:?} on {ground:?}");
+                }
+            }
+        }
+    }
+}

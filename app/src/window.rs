@@ -1,0 +1,172 @@
+//! The window: its options, how it opens, and where its panels stand.
+
+use crate::app::WorkbenchApp;
+use crate::command::Commands;
+use crate::plots::force_depth::force_depth_ui;
+use crate::plots::force_time::{TimeView, force_time_ui};
+use crate::screens::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
+use crate::screens::results_panel::results_ui;
+use crate::screens::rig_panel::rig_ui;
+use crate::shell::activity::{Activity, Intent, run_in_progress};
+use crate::shell::top_bar::{HEIGHT, top_bar_ui};
+use crate::theme::Tokens;
+use eframe::egui::{
+    CentralPanel, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder, vec2,
+};
+use palpate_drivers::Rig;
+use palpate_drivers::sim::SimSettings;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::Limits;
+use palpate_protocols::runner::TimeScale;
+use std::path::PathBuf;
+
+/// Widths of the panels beside the plots, in points.
+const LEFT_WIDTH: f32 = 306.0;
+const RIGHT_WIDTH: f32 = 292.0;
+
+/// Height of the event log in points.
+const LOG_HEIGHT: f32 = 134.0;
+
+/// What a window needs.
+pub struct WindowOptions {
+    /// The rig, opened.
+    pub rig: Box<dyn Rig>,
+    /// Volts to newtons of its load cell.
+    pub calibration: Calibration,
+    /// Interlock thresholds.
+    pub limits: Limits,
+    /// Pace of a simulated rig.
+    pub scale: TimeScale,
+    /// Folder for new sessions; the library if none.
+    pub sessions: Option<PathBuf>,
+}
+
+impl WindowOptions {
+    /// Options for a rig by name: `sim` or `sim:NAME`.
+    pub fn open(name: &str, settings: &SimSettings, scale: TimeScale) -> Result<Self, String> {
+        let rig = palpate_drivers::open(name, settings).map_err(|err| err.to_string())?;
+        let limits = Limits::for_travel(rig.description().travel);
+        Ok(Self {
+            rig,
+            calibration: palpate_drivers::sim::calibration(settings.profile),
+            limits,
+            scale,
+            sessions: None,
+        })
+    }
+}
+
+/// Opens the window and returns when it has closed, the motion stopped and the session closed.
+pub fn run_window(options: WindowOptions) -> Result<(), String> {
+    let native = eframe::NativeOptions {
+        viewport: ViewportBuilder::default()
+            .with_title("palpate")
+            .with_inner_size(vec2(1280.0, 800.0))
+            .with_min_inner_size(vec2(1100.0, 640.0)),
+        ..eframe::NativeOptions::default()
+    };
+    eframe::run_native(
+        "palpate",
+        native,
+        Box::new(move |cc| Ok(Box::new(WorkbenchApp::new(options, &cc.egui_ctx)?))),
+    )
+    .map_err(|err| format!("the window cannot be opened ({err}); 'palpate run' needs no window"))
+}
+
+fn frame(ui: &Ui, is_canvas: bool) -> Frame {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    Frame::new()
+        .fill(if is_canvas {
+            tokens.canvas
+        } else {
+            tokens.panel
+        })
+        .inner_margin(Margin::symmetric(8, 6))
+        .stroke(Stroke::NONE)
+}
+
+impl WorkbenchApp {
+    /// Draws every panel. Changes nothing but what is typed and pressed.
+    pub(crate) fn draw(&mut self, ui: &mut Ui, activity: &Activity, commands: &mut Commands) {
+        Panel::top("state")
+            .exact_size(HEIGHT + 14.0)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| {
+                let specimen = &self.form.labels.specimen;
+                top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
+            });
+        Panel::left("rig_and_protocol")
+            .exact_size(LEFT_WIDTH)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| self.left_ui(ui, commands));
+        Panel::bottom("log")
+            .exact_size(LOG_HEIGHT)
+            .resizable(false)
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.events.ui(ui, &self.snapshot, commands));
+        Panel::right("results")
+            .exact_size(RIGHT_WIDTH)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| {
+                ScrollArea::vertical()
+                    .id_salt("results")
+                    .auto_shrink(false)
+                    .show(ui, |ui| results_ui(ui, &self.snapshot, commands));
+            });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.plots_ui(ui));
+    }
+
+    fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let verdict = self.start_verdict();
+        Panel::bottom("start")
+            .resizable(false)
+            .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
+            .show(ui, |ui| {
+                start_ui(ui, &verdict, self.refusal.as_deref(), commands);
+            });
+        let facts = ProtocolFacts {
+            is_busy: run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None,
+            library: &self.library,
+            is_dialog_open: self.dialog.is_open(),
+        };
+        CentralPanel::no_frame().show(ui, |ui| {
+            ScrollArea::vertical()
+                .id_salt("rig_and_protocol")
+                .auto_shrink(false)
+                .show(ui, |ui| {
+                    rig_ui(ui, &self.snapshot, &self.ports, commands);
+                    protocol_ui(ui, &mut self.form, &facts, commands);
+                });
+        });
+    }
+
+    fn plots_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Force over time").heading().strong());
+            ui.selectable_value(&mut self.time_view, TimeView::Whole, "Whole run");
+            ui.selectable_value(&mut self.time_view, TimeView::FromRamp, "From ramp");
+            if let Some(remark) = self.plots.remark() {
+                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+            }
+        });
+        let run = self.snapshot.run.as_ref();
+        let limit = self.bench.limits.force_max;
+        // The chart over time carries the limits and phases, so it gets the larger half.
+        let height = (ui.available_height() - 30.0) * 0.56;
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+            force_time_ui(ui, run, &self.plots, self.time_view, limit);
+        });
+        ui.label(RichText::new("Force over depth").heading().strong());
+        let depth = self
+            .form
+            .checked()
+            .map_or(30.0, |checked| checked.params.depth.0);
+        force_depth_ui(ui, &self.plots, depth);
+    }
+}

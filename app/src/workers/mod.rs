@@ -1,0 +1,104 @@
+//! Work that may take its time, each on a named thread of its own: the window never waits.
+
+pub mod folder_dialog;
+pub mod ports;
+
+use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
+
+/// One job at a time on a named thread; the answer is fetched when it is there.
+#[derive(Debug)]
+pub struct Job<T> {
+    answer: Option<Receiver<T>>,
+}
+
+impl<T> Default for Job<T> {
+    fn default() -> Self {
+        Self { answer: None }
+    }
+}
+
+impl<T: Send + 'static> Job<T> {
+    /// Whether an answer is still to come.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.answer.is_some()
+    }
+
+    /// Starts the job, unless one is under way. `done` is called when the answer is there.
+    pub fn start(
+        &mut self,
+        name: &str,
+        work: impl FnOnce() -> T + Send + 'static,
+        done: impl FnOnce() + Send + 'static,
+    ) -> std::io::Result<()> {
+        if self.is_busy() {
+            return Ok(());
+        }
+        let (sender, receiver) = sync_channel(1);
+        std::thread::Builder::new()
+            .name(name.into())
+            .spawn(move || {
+                // Nobody may wait any more when the window has closed.
+                let _ = sender.try_send(work());
+                done();
+            })?;
+        self.answer = Some(receiver);
+        Ok(())
+    }
+
+    /// The answer, once.
+    pub fn poll(&mut self) -> Option<T> {
+        match self.answer.as_ref()?.try_recv() {
+            Ok(answer) => {
+                self.answer = None;
+                Some(answer)
+            }
+            Err(TryRecvError::Empty) => None,
+            Err(TryRecvError::Disconnected) => {
+                self.answer = None;
+                None
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_answer_is_fetched_once_and_then_a_new_job_may_start() {
+        let mut job = Job::default();
+        for round in 0..2 {
+            let (done, is_done) = sync_channel(1);
+            job.start(
+                "test-job",
+                move || round + 40,
+                move || {
+                    let _ = done.try_send(());
+                },
+            )
+            .unwrap();
+            assert!(job.is_busy());
+            is_done.recv().unwrap();
+            assert_eq!(job.poll(), Some(round + 40));
+            assert_eq!(job.poll(), None);
+            assert!(!job.is_busy());
+        }
+    }
+
+    #[test]
+    fn a_job_that_dies_does_not_stay_busy() {
+        let mut job: Job<u32> = Job::default();
+        job.start("test-job", || panic!("on purpose"), || {})
+            .unwrap();
+        for _ in 0..500 {
+            if !job.is_busy() {
+                return;
+            }
+            assert_eq!(job.poll(), None);
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        panic!("the job stayed busy");
+    }
+}
