@@ -79,6 +79,19 @@ pub(crate) fn psi_all(r: f64) -> [f64; PSI_COUNT] {
     all
 }
 
+/// The derivatives of `psi_0 ..= psi_3` at `r`, given [`psi_all`] there.
+pub(crate) fn psi_derivatives(r: f64, all: &[f64; PSI_COUNT]) -> [f64; 4] {
+    if r < 1.0 {
+        std::array::from_fn(|j| match j {
+            0 => 1.0 - all[0],
+            _ if r == 0.0 => 1.0 / (j + 1) as f64,
+            _ => all[j] / r - all[j] + all[j + 1],
+        })
+    } else {
+        std::array::from_fn(|j| psi_derivative(j as u32, r))
+    }
+}
+
 /// `sum_m (-1)^m r^(m+1) j! / (m+j+1)!`, nested so that no factorial is formed.
 fn series(j: f64, r: f64) -> f64 {
     // Terms until the next one cannot matter; their ratio is below one because r < j + 1.
@@ -148,6 +161,17 @@ mod tests {
                 (numerical - slope).abs() < allowed,
                 "psi_{j}'({r:e}): {numerical:e} {slope:e}"
             );
+        }
+    }
+
+    #[test]
+    fn derivatives_together_agree_with_one_by_one() {
+        for (j, r, _) in reference() {
+            if let Some(&slope) = psi_derivatives(r, &psi_all(r)).get(j as usize) {
+                let alone = psi_derivative(j, r);
+                let miss = (slope - alone).abs();
+                assert!(miss <= 4e-15 * alone, "psi_{j}'({r:e}): {miss:e}");
+            }
         }
     }
 

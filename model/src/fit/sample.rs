@@ -1,0 +1,144 @@
+//! What a fit is given, and the words in which it refuses.
+
+use crate::units::{Depth, Newtons, Seconds};
+use thiserror::Error;
+
+/// One sample of an indentation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FitSample {
+    /// When, in s on any clock; must increase from sample to sample.
+    pub t: Seconds,
+    /// Depth of the probe. Between samples it is taken to move straight.
+    pub depth: Depth,
+    /// Measured force.
+    pub force: Newtons,
+    /// Standard deviation of this force; the sample weighs `1 / sigma^2`.
+    pub sigma: Newtons,
+}
+
+/// A fit could not be made; the text says what to change.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum FitError {
+    /// Fewer samples than free parameters, or none at all.
+    #[error(
+        "the record has {samples} sample(s) and the fit {parameters} free parameter(s); record more samples or fix parameters"
+    )]
+    TooFewSamples {
+        /// Samples given.
+        samples: usize,
+        /// Parameters left free.
+        parameters: usize,
+    },
+    /// NaN or infinite.
+    #[error("sample {index} has a {what} of {value}; remove samples that are not finite numbers")]
+    NotFinite {
+        /// Sample, counted from 0.
+        index: usize,
+        /// Which of its numbers.
+        what: &'static str,
+        /// The number.
+        value: f64,
+    },
+    /// A force uncertainty of zero or less.
+    #[error("sample {index} has a force uncertainty of {sigma} N; it must be greater than zero")]
+    SigmaNotPositive {
+        /// Sample, counted from 0.
+        index: usize,
+        /// Its uncertainty in N.
+        sigma: f64,
+    },
+    /// Time stands still or runs backwards.
+    #[error(
+        "sample {index} is at {t} s after {before} s; times must increase, remove repeated samples and sort the record"
+    )]
+    TimeNotIncreasing {
+        /// Sample, counted from 0.
+        index: usize,
+        /// Its time in s.
+        t: f64,
+        /// The time before in s.
+        before: f64,
+    },
+    /// The probe never touched.
+    #[error(
+        "the depth never exceeds {deepest} mm and contact is at {contact} mm, so the probe never enters the tissue; check the contact position"
+    )]
+    NeverInTissue {
+        /// Greatest depth in mm.
+        deepest: f64,
+        /// Assumed contact in mm.
+        contact: f64,
+    },
+    /// Different parameters give the same force on this path.
+    #[error("this record cannot separate {}: {advice}", list(.names))]
+    Inseparable {
+        /// The parameters that cannot be told apart.
+        names: Vec<String>,
+        /// Why, and which record could.
+        advice: String,
+    },
+    /// A parameter that the model does not have.
+    #[error("the model has no parameter called '{name}'; it has {known}")]
+    UnknownParameter {
+        /// The name given.
+        name: String,
+        /// The names there are.
+        known: String,
+    },
+    /// A fixed value that cannot be.
+    #[error("{name} cannot be fixed at {value}; {reason}")]
+    BadValue {
+        /// The parameter.
+        name: String,
+        /// The value given.
+        value: f64,
+        /// What it must be.
+        reason: &'static str,
+    },
+    /// The numbers overflowed.
+    #[error(
+        "the fit produced numbers that are not finite; check the units of depth (mm) and force (N)"
+    )]
+    Overflow,
+}
+
+fn list(names: &[String]) -> String {
+    match names {
+        [] => String::new(),
+        [only] => format!("{only} from the others"),
+        [one, other] => format!("{one} from {other}"),
+        [rest @ .., last] => format!("{} and {last}", rest.join(", ")),
+    }
+}
+
+/// Checks every number and the order of times.
+pub(super) fn check_samples(samples: &[FitSample]) -> Result<(), FitError> {
+    let mut before = f64::NEG_INFINITY;
+    for (index, sample) in samples.iter().enumerate() {
+        let named = [
+            ("time", sample.t.0),
+            ("depth", sample.depth.0),
+            ("force", sample.force.0),
+            ("force uncertainty", sample.sigma.0),
+        ];
+        if let Some((what, value)) = named.into_iter().find(|(_, value)| !value.is_finite()) {
+            return Err(FitError::NotFinite { index, what, value });
+        }
+        if sample.sigma.0 <= 0.0 {
+            return Err(FitError::SigmaNotPositive {
+                index,
+                sigma: sample.sigma.0,
+            });
+        }
+        if sample.t.0 <= before {
+            return Err(FitError::TimeNotIncreasing {
+                index,
+                t: sample.t.0,
+                before,
+            });
+        }
+        before = sample.t.0;
+    }
+    Ok(())
+}
