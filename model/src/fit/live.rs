@@ -5,7 +5,8 @@
 //! between nodes by polynomials in log tau. Gram matrices lose half the digits, which a display
 //! can afford and a report cannot: [`super::fit`] works on the samples.
 
-use super::parameter::{PARAMETERS, Parameter};
+use super::options::{PARAMETER_NAMES, PARAMETER_UNITS};
+use super::report::Parameter;
 use crate::units::{Depth, Newtons, Seconds};
 use crate::viscoelastic::psi_all;
 use serde::{Deserialize, Serialize};
@@ -226,7 +227,12 @@ impl LiveFit {
             return None;
         }
         Some(LiveEstimate {
-            parameters: PARAMETERS.iter().zip(values).map(parameter).collect(),
+            parameters: PARAMETER_NAMES
+                .into_iter()
+                .zip(PARAMETER_UNITS)
+                .zip(values)
+                .map(parameter)
+                .collect(),
             rmse_n: (residual / self.weight_sum).sqrt(),
             samples: self.samples,
         })
@@ -372,14 +378,14 @@ impl Stencil {
     }
 }
 
-fn parameter(((name, unit), (value, error)): (&(&str, &str), (f64, f64))) -> Parameter {
+fn parameter(((name, unit), (value, error)): ((&str, &str), (f64, f64))) -> Parameter {
     // Initial force and offset are near zero by design; their size says nothing of identification.
-    let is_level = matches!(*name, "f0" | "f_offset");
+    let is_level = matches!(name, "f0" | "f_offset");
     let is_identified = is_level || error < IDENTIFIED_SHARE * value.abs();
     Parameter {
-        name: (*name).into(),
+        name: name.into(),
         value,
-        unit: (*unit).into(),
+        unit: unit.into(),
         std_error: is_identified.then_some(error),
         // 1.96 standard errors: two-sided 95 % of a normal distribution.
         ci95: is_identified.then_some([value - 1.96 * error, value + 1.96 * error]),

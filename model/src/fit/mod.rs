@@ -6,6 +6,7 @@
 
 mod design;
 mod identify;
+mod live;
 mod options;
 mod problem;
 mod refine;
@@ -15,6 +16,7 @@ mod scan;
 mod solve;
 mod triangle;
 
+pub use live::{LiveEstimate, LiveFit};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use report::{FitReport, MODEL_NAME, Parameter};
 pub use sample::{FitError, FitSample};

@@ -6,13 +6,13 @@ use super::problem::{Outer, Problem, linear_units, product, walk};
 use super::sample::FitSample;
 use crate::units::Newtons;
 use crate::viscoelastic::ModifiedKelvin;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 /// The one model a fit knows, by name.
 pub const MODEL_NAME: &str = "modified Kelvin, third order";
 
 /// One parameter of a fitted model.
-#[derive(Clone, Debug, PartialEq, Serialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameter {
     /// Its name, one of [`super::PARAMETER_NAMES`].
     pub name: String,

@@ -46,7 +46,10 @@ impl fmt::Display for Fault {
             Self::CommandRefused { detail } => write!(f, "the rig refused a command ({detail})"),
             Self::ControllerReset => write!(f, "the controller restarted; home the axis again"),
             Self::SignalInvalid { .. } => {
-                write!(f, "the load cell's signal is not a number; check its wiring")
+                write!(
+                    f,
+                    "the load cell's signal is not a number; check its wiring"
+                )
             }
             Self::LogFailed { detail } => write!(f, "the session log cannot be written ({detail})"),
         }

@@ -6,5 +6,6 @@ mod psi;
 
 pub(crate) use exact_step::{Compensated, Pieces, StepWeights, forcing};
 pub use kelvin::{BodyError, KelvinState, ModifiedKelvin};
+pub(crate) use psi::psi_all;
 pub(crate) use psi::{PSI_COUNT, psi_derivatives};
 pub use psi::{psi, psi_derivative};
