@@ -257,7 +257,7 @@ mod tests {
             host: Nanos(u64::MAX - tick),
             counts,
             volts: 0.1 + tick as f64 * 1e-17,
-            pulses: i64::MIN + tick as i64,
+            pulses: i64::MIN.wrapping_add(tick as i64),
             status: u32::MAX,
             force: tick.is_multiple_of(2).then_some(-0.0),
             depth: tick.is_multiple_of(3).then_some(f64::MIN_POSITIVE),

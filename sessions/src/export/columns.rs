@@ -21,9 +21,10 @@ pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
     let rows = &session.rows;
     let first_tick = rows.first().map_or(0, |row| row.tick);
     let tick_secs = session.manifest.rig.tick().0;
+    // A controller that restarted counts from zero again: its time is negative, not a failure.
     let t: Vec<f64> = rows
         .iter()
-        .map(|row| (row.tick - first_tick) as f64 * tick_secs)
+        .map(|row| row.tick.wrapping_sub(first_tick) as i64 as f64 * tick_secs)
         .collect();
     let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
     let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();

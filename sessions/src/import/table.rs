@@ -107,6 +107,11 @@ pub fn parse_table(text: &str) -> Result<Table, String> {
             continue;
         }
         let [t, depth, force] = layout.values(&cells, number)?;
+        if table.t.last().is_some_and(|&last| t <= last) {
+            return Err(format!(
+                "line {number}: the time does not increase; sort the rows by time and keep one measurement per table"
+            ));
+        }
         table.t.push(t);
         table.depth.push(depth);
         table.force.push(force);
@@ -198,14 +203,13 @@ impl Layout {
             } else {
                 cell.clone()
             };
-            let read = plain.parse::<f64>().ok().filter(|read| read.is_finite());
-            *value = factor
-                * read.ok_or_else(|| {
-                    format!(
-                        "line {number}: the {} '{cell}' is not a number; mend or remove the line",
-                        quantity.name()
-                    )
-                })?;
+            let read = plain.parse::<f64>().ok().map(|read| read * factor);
+            *value = read.filter(|read| read.is_finite()).ok_or_else(|| {
+                format!(
+                    "line {number}: the {} '{cell}' is not a number; mend or remove the line",
+                    quantity.name()
+                )
+            })?;
         }
         Ok(values)
     }
@@ -251,6 +255,8 @@ mod tests {
             "line 3: the depth 'one'",
         );
         check("t_s,depth_mm,force_N\n0,0,nan\n", "line 2: the force 'nan'");
+        check("t_s,depth_mm,force_kN\n0,0,1e306\n", "line 2: the force");
+        check("t_s,x_mm,F_N\n0,0,0\n1,0,0\n1,0,0\n", "line 4: the time");
         check("t_s,depth_mm,force_N\n0,0\n", "line 2 has 2 cells");
         check("t_s,depth_mm,force_N\n", "no rows");
     }

@@ -11,7 +11,7 @@ use crate::folder::SessionFolder;
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
 use palpate_model::Nanos;
-use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
@@ -23,8 +23,9 @@ const BATCH: Nanos = Nanos::from_millis(100);
 const BATCH_ROWS_MAX: usize = 1 << 16;
 /// Session time that fits in the queue at real pace, in s.
 const QUEUE_SECONDS: u64 = 30;
-/// Batches in the queue at real pace.
-const QUEUE_BATCHES: usize = (QUEUE_SECONDS * 1_000_000_000 / BATCH.0) as usize;
+const QUEUE: Nanos = Nanos::from_millis(QUEUE_SECONDS * 1000);
+/// Batches that fit in it: more than 30 s of batches, which slow samples make shorter.
+const QUEUE_BATCHES: usize = 4096;
 /// Wall time between two synchronisations with the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 
@@ -43,6 +44,8 @@ struct Batch {
     entries: Vec<Entry>,
     /// Newest time in the batch.
     through: Nanos,
+    /// Session time it covers, a pause before it not counted.
+    span: Nanos,
     end: Option<EndRecord>,
 }
 
@@ -52,7 +55,8 @@ struct Shared {
     has_failed: AtomicBool,
     failure: Mutex<Option<LogError>>,
     saved_through_ns: AtomicU64,
-    queued: AtomicUsize,
+    /// Session time in batches that are not written yet.
+    queued_ns: AtomicU64,
 }
 
 impl Shared {
@@ -78,7 +82,7 @@ impl Shared {
 /// so that the session is seen to be incomplete.
 pub struct SessionWriter {
     batch: Batch,
-    /// Time of the first item of the batch.
+    /// Where the batch's 100 ms begin: the end of the batch before, or the first item.
     batch_start: Option<Nanos>,
     last_order: Option<u64>,
     pace: Pace,
@@ -186,7 +190,7 @@ impl SessionWriter {
     /// Whether half of the queue is in use: the disk is slower than the session.
     #[must_use]
     pub fn is_falling_behind(&self) -> bool {
-        self.pace == Pace::Real && self.shared.queued.load(Ordering::Acquire) >= QUEUE_BATCHES / 2
+        self.pace == Pace::Real && self.shared.queued_ns.load(Ordering::Acquire) >= QUEUE.0 / 2
     }
 
     /// Writes the end record, waits until it is on the disk and ends the thread.
@@ -216,13 +220,20 @@ impl SessionWriter {
     }
 
     fn hand_over(&mut self) -> Result<(), LogError> {
+        if self.batch.rows.is_empty() && self.batch.entries.is_empty() {
+            self.batch_start = None;
+            return Ok(());
+        }
+        let through = self.batch.through;
+        // Counted from the end of the batch before, two batches never span more than 200 ms.
+        let start = self.batch_start.replace(through).unwrap_or(through);
+        self.batch.span = through.since(start).min(BATCH);
         let next = Batch {
             rows: Vec::with_capacity(self.batch.rows.len()),
-            through: self.batch.through,
+            through,
             ..Batch::default()
         };
         let batch = std::mem::replace(&mut self.batch, next);
-        self.batch_start = None;
         match self.pace {
             Pace::Virtual => self.send_waiting(batch),
             Pace::Real => self.send_at_once(batch),
@@ -233,7 +244,9 @@ impl SessionWriter {
         let Some(sender) = &self.sender else {
             return Err(LogError::Closed);
         };
-        self.shared.queued.fetch_add(1, Ordering::AcqRel);
+        self.shared
+            .queued_ns
+            .fetch_add(batch.span.0, Ordering::AcqRel);
         // The thread only goes away after it has failed, and then has said why.
         sender
             .send(batch)
@@ -244,8 +257,14 @@ impl SessionWriter {
         let Some(sender) = &self.sender else {
             return Err(LogError::Closed);
         };
-        self.shared.queued.fetch_add(1, Ordering::AcqRel);
-        match sender.try_send(batch) {
+        let span = batch.span.0;
+        let queued = self.shared.queued_ns.fetch_add(span, Ordering::AcqRel);
+        let outcome = if queued + span > QUEUE.0 {
+            Err(TrySendError::Full(batch))
+        } else {
+            sender.try_send(batch)
+        };
+        match outcome {
             Ok(()) => Ok(()),
             Err(TrySendError::Full(_)) => {
                 self.shared.fail(LogError::TooSlow {
@@ -296,7 +315,7 @@ fn write_batches<S: Sink>(mut log: LogWriter<S>, receiver: &Receiver<Batch>, sha
         };
         if let Some(batch) = batch {
             let outcome = log.append(&batch.rows, &batch.entries);
-            shared.queued.fetch_sub(1, Ordering::AcqRel);
+            shared.queued_ns.fetch_sub(batch.span.0, Ordering::AcqRel);
             if let Err(err) = outcome {
                 return shared.fail(err);
             }

@@ -1,0 +1,225 @@
+use crate::support::{Random, end, entries, log_bytes, manifest, rows, same_bits};
+use palpate_model::Nanos;
+use palpate_sessions::{Entry, ReadError, Row, Session};
+use std::fs;
+
+/// What a damaged file did.
+#[derive(Debug, Default)]
+struct Tally {
+    refused: usize,
+    short: usize,
+    whole: usize,
+}
+
+struct Original {
+    rows: Vec<Row>,
+    entries: Vec<Entry>,
+    bytes: Vec<u8>,
+}
+
+impl Original {
+    fn new(is_finished: bool) -> Self {
+        let rows = rows(3000, 11);
+        let entries = entries(&rows, 40);
+        let end = is_finished.then(|| end(Nanos::from_millis(3000)));
+        let bytes = log_bytes(&rows, &entries, end);
+        Self {
+            rows,
+            entries,
+            bytes,
+        }
+    }
+
+    /// Everything returned must be as recorded, and what is missing must be announced.
+    fn check(&self, session: &Session, context: &str) {
+        assert_eq!(session.manifest, manifest(), "{context}");
+        let count = session.rows.len();
+        assert!(
+            count <= self.rows.len() && same_bits(&session.rows, &self.rows[..count]),
+            "{context}: wrong rows"
+        );
+        let entry_count = session.entries.len();
+        assert_eq!(session.entries, self.entries[..entry_count], "{context}");
+        let is_short = count < self.rows.len() || entry_count < self.entries.len();
+        if is_short {
+            assert!(
+                session.end.is_none(),
+                "{context}: short, yet said to be complete"
+            );
+            assert!(!session.notes.is_empty(), "{context}: short without a word");
+        }
+    }
+}
+
+fn damage(bytes: &mut Vec<u8>, random: &mut Random) -> &'static str {
+    let place = random.below(bytes.len());
+    match random.below(6) {
+        0 => {
+            bytes.truncate(place);
+            "truncate"
+        }
+        1 => {
+            let tail = bytes.len() - random.below(4096.min(bytes.len()));
+            bytes[tail..].fill(0);
+            "zero tail"
+        }
+        2 => {
+            bytes[place] ^= 1 << random.below(8);
+            "bit flip"
+        }
+        3 => {
+            let stop = (place + 16).min(bytes.len());
+            bytes[place..stop]
+                .iter_mut()
+                .for_each(|byte| *byte = random.next() as u8);
+            "burst"
+        }
+        4 => {
+            let stop = (place + 1 + random.below(512)).min(bytes.len());
+            bytes.drain(place..stop);
+            "cut"
+        }
+        _ => {
+            let stop = (place + 1 + random.below(512)).min(bytes.len());
+            let repeated = bytes[place..stop].to_vec();
+            bytes.splice(place..place, repeated);
+            "repeat"
+        }
+    }
+}
+
+fn sweep(is_finished: bool, seed: u64) -> Tally {
+    let original = Original::new(is_finished);
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let mut random = Random(seed);
+    let mut tally = Tally::default();
+    for case in 0..4000 {
+        let mut bytes = original.bytes.clone();
+        let kind = damage(&mut bytes, &mut random);
+        let context = format!("{kind}, case {case} of seed {seed}");
+        if bytes == original.bytes {
+            continue;
+        }
+        fs::write(&path, &bytes).unwrap();
+        match Session::open(&path) {
+            Ok(session) => {
+                original.check(&session, &context);
+                if session.rows.len() < original.rows.len() {
+                    tally.short += 1;
+                } else {
+                    tally.whole += 1;
+                }
+            }
+            Err(refusal) => {
+                tally.refused += 1;
+                if let ReadError::Damaged { offset, .. } = refusal {
+                    assert!(offset <= bytes.len() as u64, "{context}");
+                }
+                if let Ok(session) = Session::recover(&path) {
+                    original.check(&session, &context);
+                }
+            }
+        }
+    }
+    tally
+}
+
+#[test]
+fn no_damage_to_a_finished_file_goes_unseen() {
+    let tally = sweep(true, 2026);
+    println!("finished: {tally:?}");
+    // Only what cuts off or zeroes the end may pass for an interrupted recording.
+    assert!(tally.refused > 2000, "{tally:?}");
+}
+
+#[test]
+fn no_damage_to_an_interrupted_file_gives_a_wrong_number() {
+    let tally = sweep(false, 305);
+    println!("interrupted: {tally:?}");
+    assert!(tally.refused > 1000 && tally.short > 500, "{tally:?}");
+}
+
+/// A process can die after any byte: every prefix opens with the batches it holds whole.
+#[test]
+fn every_prefix_keeps_every_whole_batch() {
+    let rows = rows(500, 12);
+    let bytes = log_bytes(&rows, &[], Some(end(Nanos::from_millis(500))));
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    let mut most = 0;
+    let mut openable = 0;
+    for length in 0..bytes.len() {
+        fs::write(&path, &bytes[..length]).unwrap();
+        match Session::open(&path) {
+            Ok(session) => {
+                assert!(same_bits(&session.rows, &rows[..session.rows.len()]));
+                assert_eq!(session.rows.len() % 100, 0);
+                assert!(session.rows.len() >= most, "{length}: fewer than before");
+                assert!(!session.notes.is_empty());
+                most = session.rows.len();
+                openable += 1;
+            }
+            // Only before the first chunk is whole is there nothing to open.
+            Err(refusal) => assert_eq!(openable, 0, "{length}: {refusal}"),
+        }
+    }
+    assert_eq!(most, 500);
+}
+
+#[test]
+fn damage_in_the_middle_is_refused_and_can_be_recovered_from() {
+    for is_finished in [true, false] {
+        let original = Original::new(is_finished);
+        let mut bytes = original.bytes.clone();
+        let middle = bytes.len() / 2;
+        bytes[middle..middle + 64].fill(0xa5);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.mcap");
+        fs::write(&path, &bytes).unwrap();
+        let refusal = Session::open(&path).unwrap_err();
+        let ReadError::Damaged { offset, .. } = &refusal else {
+            panic!("{refusal}");
+        };
+        assert!(*offset as usize <= middle && middle - (*offset as usize) < 20_000);
+        let recovered = Session::recover(&path).unwrap();
+        original.check(&recovered, "recovered");
+        assert!(recovered.rows.len() > 1000 && recovered.end.is_none());
+        assert!(recovered.notes[0].contains(&format!("byte {offset}")));
+    }
+}
+
+/// Lengths that ask for memory are refused before any is taken.
+#[test]
+fn absurd_lengths_are_refused() {
+    let original = Original::new(false);
+    for (opcode, length) in [
+        (6u8, u64::MAX),
+        (6, 1 << 40),
+        (9, 3),
+        (0x80, 0),
+        (1, u64::MAX),
+    ] {
+        let mut bytes = original.bytes.clone();
+        let mut frame = vec![opcode];
+        frame.extend(length.to_le_bytes());
+        bytes.splice(8..8, frame);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session.mcap");
+        fs::write(&path, &bytes).unwrap();
+        assert!(
+            Session::open(&path).is_err(),
+            "opcode {opcode}, length {length}"
+        );
+    }
+    // A chunk that claims to hold more than it may.
+    let mut bytes = original.bytes.clone();
+    let chunk = 8 + 9 + u64::from_le_bytes(bytes[9..17].try_into().unwrap()) as usize;
+    assert_eq!(bytes[chunk], 6);
+    bytes[chunk + 9 + 16..chunk + 9 + 24].copy_from_slice(&(1u64 << 50).to_le_bytes());
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    fs::write(&path, &bytes).unwrap();
+    let refusal = Session::open(&path).unwrap_err().to_string();
+    assert!(refusal.contains("larger than any chunk"), "{refusal}");
+}

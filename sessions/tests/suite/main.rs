@@ -1,0 +1,14 @@
+//! Sessions through the crate's public door: written, damaged, read back, exported.
+
+#[cfg(test)]
+mod damage;
+#[cfg(test)]
+mod exports;
+#[cfg(test)]
+mod faults;
+#[cfg(test)]
+mod pace;
+#[cfg(test)]
+mod round_trip;
+#[cfg(test)]
+mod support;

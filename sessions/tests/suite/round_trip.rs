@@ -1,0 +1,171 @@
+use crate::support::{MemorySink, end, entries, log_bytes, manifest, open_bytes, rows, same_bits};
+use palpate_model::Nanos;
+use palpate_sessions::{
+    LogError, LogWriter, Pace, ReadError, Session, SessionFolder, SessionWriter,
+};
+
+#[test]
+fn a_session_comes_back_bit_for_bit_at_either_pace() {
+    for pace in [Pace::Virtual, Pace::Real] {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("sessions/one");
+        let folder = SessionFolder::create(&path).unwrap();
+        let mut rows = rows(5000, 1);
+        rows[17].force = Some(-0.0);
+        // A rig whose converter drops out: counts vanish and come back.
+        rows[2345..2350]
+            .iter_mut()
+            .for_each(|row| row.counts = None);
+        let entries = entries(&rows, 50);
+        let mut writer = SessionWriter::start(folder, &manifest(), pace).unwrap();
+        let mut pending = entries.iter().peekable();
+        for (i, row) in rows.iter().enumerate() {
+            while let Some(entry) = pending.next_if(|entry| entry.after_sample == i as u64) {
+                writer.push_entry(entry.clone()).unwrap();
+            }
+            writer.push_row(*row).unwrap();
+        }
+        writer.close(end(Nanos::from_millis(5001))).unwrap();
+
+        let session = Session::open(&path).unwrap();
+        assert_eq!(session.manifest, manifest());
+        assert!(same_bits(&session.rows, &rows));
+        assert_eq!(session.entries, entries);
+        assert_eq!(session.notes, Vec::<String>::new());
+        let ending = session.end.clone().unwrap();
+        assert_eq!((ending.samples, ending.entries), (5000, 99));
+        assert_eq!(ending.time_use, end(Nanos::ZERO).time_use);
+        let by_file = Session::open(&path.join("session.mcap")).unwrap();
+        assert_eq!(by_file, session);
+    }
+}
+
+/// The container's own library, told to check everything, agrees that the file is whole.
+#[test]
+fn the_file_is_a_valid_mcap_file() {
+    let rows = rows(1000, 2);
+    let entries = entries(&rows, 100);
+    let bytes = log_bytes(&rows, &entries, Some(end(Nanos::from_millis(1000))));
+    let summary = mcap::read::Summary::read(&bytes).unwrap().unwrap();
+    let stats = summary.stats.as_ref().unwrap();
+    // One manifest, ten pairs of blocks, nine entries, one end.
+    assert_eq!(stats.message_count, 1 + 20 + 9 + 1);
+    assert_eq!(summary.chunk_indexes.len(), 12);
+    let mut last = std::collections::BTreeMap::new();
+    let mut count = 0;
+    for message in mcap::MessageStream::new(&bytes).unwrap() {
+        let message = message.unwrap();
+        assert!(
+            message.channel.schema.is_some(),
+            "viewers skip channels without"
+        );
+        let sequence: &mut u32 = last.entry(message.channel.topic.clone()).or_default();
+        assert_eq!(message.sequence, *sequence);
+        *sequence += 1;
+        count += 1;
+    }
+    assert_eq!(count, 31);
+    // Every chunk is where the index says, with an index per channel.
+    for index in &summary.chunk_indexes {
+        assert_eq!(bytes[index.chunk_start_offset as usize], 6);
+        assert!(!index.message_index_offsets.is_empty());
+    }
+}
+
+#[test]
+fn a_log_without_an_end_opens_with_a_note() {
+    let rows = rows(12_300, 3);
+    let session = open_bytes(&log_bytes(&rows, &[], None)).unwrap();
+    assert!(same_bits(&session.rows, &rows));
+    assert_eq!(session.end, None);
+    let note = &session.notes[0];
+    assert!(
+        note.starts_with("no end record: the recording was interrupted at 12.3 s"),
+        "{note}"
+    );
+}
+
+#[test]
+fn a_newer_session_is_refused_with_both_versions() {
+    let mut newer = manifest();
+    newer.record_version = 2;
+    newer.software_version = "3.1.4".into();
+    let sink = MemorySink::default();
+    let mut log = LogWriter::begin(sink.clone(), "memory", &newer).unwrap();
+    log.append(&rows(10, 4), &[]).unwrap();
+    log.finish(end(Nanos::ZERO)).unwrap();
+    let bytes = sink.bytes();
+    let refusal = open_bytes(&bytes).unwrap_err();
+    assert!(matches!(refusal, ReadError::Newer { .. }));
+    let text = refusal.to_string();
+    let expected = "was written by palpate 3.1.4 with record version 2; this palpate reads up to 1; update palpate";
+    assert!(text.ends_with(expected), "{text}");
+}
+
+#[test]
+fn what_is_no_session_is_told_apart() {
+    let folder = tempfile::tempdir().unwrap();
+    let missing = Session::open(&folder.path().join("nothing")).unwrap_err();
+    assert!(matches!(missing, ReadError::Missing { .. }), "{missing}");
+    let empty = Session::open(folder.path()).unwrap_err();
+    assert!(matches!(empty, ReadError::NotASession { .. }), "{empty}");
+    for bytes in [&b""[..], b"this is no session", &[0; 4096]] {
+        let refusal = open_bytes(bytes).unwrap_err();
+        assert!(
+            matches!(refusal, ReadError::NotASession { .. }),
+            "{refusal}"
+        );
+    }
+    let mut foreign = Vec::new();
+    let mut other = mcap::Writer::new(std::io::Cursor::new(&mut foreign)).unwrap();
+    let channel = other
+        .add_channel(0, "/daq/block", "json", &Default::default())
+        .unwrap();
+    let header = mcap::records::MessageHeader {
+        channel_id: channel,
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    };
+    other.write_to_known_channel(&header, b"{}").unwrap();
+    other.finish().unwrap();
+    drop(other);
+    let refusal = open_bytes(&foreign).unwrap_err();
+    assert!(
+        matches!(refusal, ReadError::NotASession { .. }),
+        "{refusal}"
+    );
+}
+
+#[test]
+fn what_could_not_be_read_back_is_not_written() {
+    let sink = MemorySink::default();
+    let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
+    let good = rows(3, 5);
+    let mut bad = good.clone();
+    bad[1].volts = f64::NAN;
+    let refusal = log.append(&bad, &[]).unwrap_err();
+    assert!(matches!(refusal, LogError::NotFinite { .. }), "{refusal}");
+    let mut entries = entries(&rows(30, 5), 10);
+    entries.swap(0, 1);
+    let refusal = log.append(&[], &entries).unwrap_err();
+    assert!(matches!(refusal, LogError::OutOfOrder { .. }), "{refusal}");
+    let mut deep = serde_json::Value::Null;
+    for _ in 0..200 {
+        deep = serde_json::Value::Array(vec![deep]);
+    }
+    entries.truncate(1);
+    entries[0].body = deep;
+    let refusal = log.append(&[], &entries).unwrap_err();
+    assert!(refusal.to_string().contains("levels deep"), "{refusal}");
+    // None of the refusals harmed the log.
+    log.append(&good, &[]).unwrap();
+    log.finish(end(Nanos::ZERO)).unwrap();
+    let bytes = sink.bytes();
+    assert!(same_bits(&open_bytes(&bytes).unwrap().rows, &good));
+
+    let mut manifest = manifest();
+    manifest.limits.travel_max.0 = f64::INFINITY;
+    let refusal = LogWriter::begin(MemorySink::default(), "memory", &manifest);
+    assert!(refusal.is_err());
+}

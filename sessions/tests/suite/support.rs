@@ -1,0 +1,210 @@
+//! Sessions to test with, and sinks that remember or fail.
+
+use chrono::{TimeZone, Utc};
+use palpate_model::rig::{AdcDescription, Limits, Phase, RigDescription};
+use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
+use palpate_sessions::{
+    EndRecord, Entry, EntryKind, LogWriter, Manifest, RECORD_VERSION, Row, Session, Sink,
+};
+use std::io;
+use std::sync::{Arc, Mutex};
+
+/// SplitMix64 (Steele, Lea and Flood 2014): enough randomness for tests, from one number.
+pub struct Random(pub u64);
+
+impl Random {
+    pub fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
+        let mut z = self.0;
+        z = (z ^ (z >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
+        z = (z ^ (z >> 27)).wrapping_mul(0x94d0_49bb_1331_11eb);
+        z ^ (z >> 31)
+    }
+
+    pub fn below(&mut self, limit: usize) -> usize {
+        (self.next() % limit as u64) as usize
+    }
+
+    pub fn unit(&mut self) -> f64 {
+        (self.next() >> 11) as f64 / (1u64 << 53) as f64
+    }
+}
+
+pub fn manifest() -> Manifest {
+    Manifest {
+        record_version: RECORD_VERSION,
+        session_id: "20260305T141507Z-0badcafe".into(),
+        software_version: "0.1.0".into(),
+        engine_version: 1,
+        started_at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
+        operator: "Ada \"A.\" Lovelace\n".into(),
+        specimen: "µ-gel 3 %".into(),
+        indenter: "sphere 10 mm".into(),
+        rig: RigDescription {
+            name: "sim".into(),
+            identity: "simulated rig".into(),
+            settings: [("seed".to_owned(), "7".to_owned())].into(),
+            mm_per_pulse: 0.015,
+            travel: Position(150.0),
+            tick_nanos: 976_562,
+            speed_quantum: MmPerS(0.03),
+            speed_max: MmPerS(5.0),
+            acceleration: MmPerS2(15.36),
+            adc: Some(AdcDescription {
+                counts_min: -32768,
+                counts_max: 32767,
+                volts_per_count: 10.0 / 32768.0,
+            }),
+            noise_expected: Volts(0.1 + 0.2),
+        },
+        limits: Limits::for_travel(Position(149.999_999_999_999_97)),
+        calibration: serde_json::json!({"slope_n_per_v": 3.591_234_567_890_123_4}),
+        plan: serde_json::json!({"kind": "ramp-and-hold", "depth_mm": 30.0}),
+        settings: serde_json::json!(null),
+        acknowledgements: vec!["depth beyond the calibrated force".into()],
+    }
+}
+
+/// Plausible rows at 1 kHz: missing values at first, then noise in every digit.
+pub fn rows(count: usize, seed: u64) -> Vec<Row> {
+    let mut random = Random(seed);
+    (0..count)
+        .map(|i| {
+            let volts = 0.5 + 0.01 * random.unit();
+            let phase = Phase::ALL[(i * Phase::ALL.len()) / count.max(1)];
+            Row {
+                tick: 1000 + i as u64,
+                host: Nanos(1_000_000 * i as u64 + random.next() % 1000),
+                counts: Some((volts * 3276.8) as i32),
+                volts,
+                pulses: (i / 7) as i64 - 3,
+                status: 33,
+                force: (i > count / 4).then_some(volts * 3.59),
+                depth: (i > count / 3).then_some(i as f64 * 0.000_75),
+                phase,
+                cycle: (i > count / 2).into(),
+            }
+        })
+        .collect()
+}
+
+/// One entry after every `every` rows, kinds in turn.
+pub fn entries(rows: &[Row], every: usize) -> Vec<Entry> {
+    let kinds = [EntryKind::Input, EntryKind::Decision, EntryKind::Fit];
+    rows.iter()
+        .enumerate()
+        .skip(every)
+        .step_by(every)
+        .enumerate()
+        .map(|(order, (after, row))| Entry {
+            kind: kinds[order % kinds.len()],
+            order: order as u64 * 2,
+            after_sample: after as u64,
+            now: row.host,
+            body: serde_json::json!({"step": order, "value": row.volts, "text": "naïve \u{0}"}),
+        })
+        .collect()
+}
+
+pub fn end(ended_at: Nanos) -> EndRecord {
+    EndRecord {
+        outcome: "finish".into(),
+        reason: "the plan is complete".into(),
+        samples: 0,
+        entries: 0,
+        ended_at,
+        time_use: vec![("motion".into(), 40.049), ("hold".into(), 0.1)],
+    }
+}
+
+/// A sink in memory that can be told to fail.
+#[derive(Clone, Default)]
+pub struct MemorySink(pub Arc<Mutex<Memory>>);
+
+#[derive(Default)]
+pub struct Memory {
+    pub bytes: Vec<u8>,
+    /// Bytes that a power cut would leave.
+    pub synced: usize,
+    pub operations: usize,
+    /// Fails this operation and all later ones; a failing append keeps `torn` of its bytes.
+    pub fail_at: Option<usize>,
+    pub torn: f64,
+}
+
+impl MemorySink {
+    /// What is in the sink.
+    pub fn bytes(&self) -> Vec<u8> {
+        self.0.lock().unwrap().bytes.clone()
+    }
+}
+
+impl Memory {
+    fn count(&mut self) -> io::Result<()> {
+        let operation = self.operations;
+        self.operations += 1;
+        match self.fail_at {
+            // 28 is ENOSPC.
+            Some(at) if operation >= at => Err(io::Error::from_raw_os_error(28)),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl Sink for MemorySink {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut memory = self.0.lock().unwrap();
+        let outcome = memory.count();
+        let kept = match outcome {
+            Ok(()) => bytes.len(),
+            Err(_) => (bytes.len() as f64 * memory.torn) as usize,
+        };
+        memory.bytes.extend_from_slice(&bytes[..kept]);
+        outcome
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        let mut memory = self.0.lock().unwrap();
+        memory.count()?;
+        memory.synced = memory.bytes.len();
+        Ok(())
+    }
+}
+
+/// A log as bytes: batches of 100 rows, entries with the batch they follow.
+pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+    let sink = MemorySink::default();
+    let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
+    let mut entries = entries.iter().peekable();
+    for (i, batch) in rows.chunks(100).enumerate() {
+        let mut due = Vec::new();
+        while let Some(entry) = entries.next_if(|entry| entry.after_sample < (i as u64 + 1) * 100) {
+            due.push(entry.clone());
+        }
+        log.append(batch, &due).unwrap();
+    }
+    if let Some(end) = end {
+        log.finish(end).unwrap();
+    }
+    sink.bytes()
+}
+
+/// Opens bytes as if they were a file.
+pub fn open_bytes(bytes: &[u8]) -> Result<Session, palpate_sessions::ReadError> {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("session.mcap");
+    std::fs::write(&path, bytes).unwrap();
+    Session::open(&path)
+}
+
+/// Whether two sets of rows agree in every bit, the sign of zero included.
+pub fn same_bits(a: &[Row], b: &[Row]) -> bool {
+    let bits = |row: &Row| {
+        (
+            row.volts.to_bits(),
+            row.force.map(f64::to_bits),
+            row.depth.map(f64::to_bits),
+        )
+    };
+    a == b && a.iter().map(bits).eq(b.iter().map(bits))
+}
