@@ -101,7 +101,8 @@ pub struct ReplayReport {
 pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
     let path = folder.join("blessed.json");
     let Some(text) = palpate_sessions::text::read_if_present(&path)
-        .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))? else {
+        .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))?
+    else {
         return Ok(Vec::new());
     };
     let blessings: Vec<Blessing> = serde_json::from_str(&text).map_err(|err| {

@@ -1,5 +1,7 @@
 //! Fixtures shared by the tests that cross crates.
 
+pub mod simulated;
+
 use std::path::{Path, PathBuf};
 
 /// The root of the source tree.

@@ -1,7 +1,7 @@
 //! `palpate export`: a session's samples as a table.
 
-use super::output::Output;
 use super::Failure;
+use super::output::Output;
 use clap::{Args, ValueEnum};
 use palpate_sessions::export::{export_csv, export_parquet};
 use palpate_sessions::log::Session;
@@ -38,7 +38,10 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         .session
         .canonicalize()
         .ok()
-        .and_then(|path| path.file_stem().map(|name| name.to_string_lossy().into_owned()))
+        .and_then(|path| {
+            path.file_stem()
+                .map(|name| name.to_string_lossy().into_owned())
+        })
         .unwrap_or_else(|| session.manifest.session_id.clone());
     let (extension, write): (_, fn(&Session, &std::path::Path) -> _) = match args.format {
         Format::Csv => ("csv", export_csv),
@@ -49,6 +52,8 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     let object = serde_json::json!({
         "command": "export", "file": path, "rows": session.rows.len(), "format": extension,
     });
-    output.result(&object, || format!("{} rows written to {}", session.rows.len(), path.display()));
+    output.result(&object, || {
+        format!("{} rows written to {}", session.rows.len(), path.display())
+    });
     Ok(())
 }

@@ -1,7 +1,7 @@
 //! `palpate fit`: the force model fitted to a session or a table.
 
-use super::output::Output;
 use super::Failure;
+use super::output::Output;
 use clap::Args;
 use palpate_model::fit::{FitOptions, FitReport, Parameter, fit};
 use palpate_protocols::analysis::{self, FitSource};
@@ -35,15 +35,24 @@ struct FitOutput<'a> {
 
 pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let options = options(args)?;
-    let FitSource { samples, notes } = analysis::read(&args.source).map_err(super::source_failure)?;
+    let FitSource { samples, notes } =
+        analysis::read(&args.source).map_err(super::source_failure)?;
     notes.iter().for_each(|note| output.note(note));
     let watch = Stopwatch::start();
-    let report = fit(&samples, &options).map_err(|err| {
-        Failure::failed(format!("{err}, in {}", args.source.display()))
-    })?;
+    let report = fit(&samples, &options)
+        .map_err(|err| Failure::failed(format!("{err}, in {}", args.source.display())))?;
     let seconds = watch.seconds();
-    report.warnings.iter().for_each(|warning| output.note(warning));
-    output.result(&FitOutput { report: &report, seconds }, || text(&report, seconds));
+    report
+        .warnings
+        .iter()
+        .for_each(|warning| output.note(warning));
+    output.result(
+        &FitOutput {
+            report: &report,
+            seconds,
+        },
+        || text(&report, seconds),
+    );
     Ok(())
 }
 
@@ -54,10 +63,17 @@ fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     }
     for pair in &args.fixed {
         let parsed = pair.split_once('=').and_then(|(name, value)| {
-            value.trim().parse::<f64>().ok().filter(|value| value.is_finite()).map(|value| (name.trim(), value))
+            value
+                .trim()
+                .parse::<f64>()
+                .ok()
+                .filter(|value| value.is_finite())
+                .map(|value| (name.trim(), value))
         });
         let Some((name, value)) = parsed else {
-            return Err(Failure::usage(format!("--fixed {pair} is not NAME=VALUE, as in --fixed f_offset=0")));
+            return Err(Failure::usage(format!(
+                "--fixed {pair} is not NAME=VALUE, as in --fixed f_offset=0"
+            )));
         };
         options.fix(name, value).map_err(Failure::usage)?;
     }
@@ -84,5 +100,8 @@ pub(super) fn parameter_line(parameter: &Parameter) -> String {
         None if parameter.is_fixed => "fixed".into(),
         None => "not identified".into(),
     };
-    format!("  {:<10} {:>14.7e} {:<9} {uncertainty}", parameter.name, parameter.value, parameter.unit)
+    format!(
+        "  {:<10} {:>14.7e} {:<9} {uncertainty}",
+        parameter.name, parameter.value, parameter.unit
+    )
 }

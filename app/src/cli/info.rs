@@ -1,7 +1,7 @@
 //! `palpate info`: what a session contains.
 
-use super::output::Output;
 use super::Failure;
+use super::output::Output;
 use clap::Args;
 use palpate_sessions::log::Session;
 use serde::Serialize;
@@ -21,7 +21,7 @@ pub struct InfoArgs {
 struct Info<'a> {
     command: &'static str,
     session_id: &'a str,
-    started_at: &'a str,
+    started_at: String,
     software_version: &'a str,
     engine_version: u32,
     record_version: u32,
@@ -48,7 +48,7 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
     let info = Info {
         command: "info",
         session_id: &manifest.session_id,
-        started_at: &manifest.started_at,
+        started_at: manifest.started_at_text(),
         software_version: &manifest.software_version,
         engine_version: manifest.engine_version,
         record_version: manifest.record_version,
@@ -85,7 +85,13 @@ fn phases(session: &Session) -> Vec<(String, usize)> {
 }
 
 fn text(info: &Info<'_>) -> String {
-    let or_dash = |text: &str| if text.is_empty() { "-".to_string() } else { text.to_string() };
+    let or_dash = |text: &str| {
+        if text.is_empty() {
+            "-".to_string()
+        } else {
+            text.to_string()
+        }
+    };
     let mut lines = vec![
         format!("session    {}", info.session_id),
         format!("started    {}", info.started_at),
@@ -94,18 +100,39 @@ fn text(info: &Info<'_>) -> String {
         format!("indenter   {}", or_dash(info.indenter)),
         format!("rig        {}", info.rig),
     ];
-    lines.extend(info.rig_settings.iter().map(|(key, value)| format!("           {key} {value}")));
-    lines.push(format!("written by palpate {}, engine {}", info.software_version, info.engine_version));
-    lines.push(format!("samples    {} over {:.1} s", info.samples, info.duration_s));
-    let phases: Vec<String> = info.phases.iter().map(|(name, count)| format!("{name} {count}")).collect();
+    lines.extend(
+        info.rig_settings
+            .iter()
+            .map(|(key, value)| format!("           {key} {value}")),
+    );
+    lines.push(format!(
+        "written by palpate {}, engine {}",
+        info.software_version, info.engine_version
+    ));
+    lines.push(format!(
+        "samples    {} over {:.1} s",
+        info.samples, info.duration_s
+    ));
+    let phases: Vec<String> = info
+        .phases
+        .iter()
+        .map(|(name, count)| format!("{name} {count}"))
+        .collect();
     lines.push(format!("phases     {}", phases.join(", ")));
-    lines.extend(info.acknowledgements.iter().map(|line| format!("accepted   {line}")));
+    lines.extend(
+        info.acknowledgements
+            .iter()
+            .map(|line| format!("accepted   {line}")),
+    );
     lines.push(match (info.ending, info.reason) {
         (Some(ending), Some(reason)) => format!("ending     {ending}: {reason}"),
         _ => "ending     none: the recording was interrupted".into(),
     });
     if let Some(time_use) = info.time_use_s {
-        let spent: Vec<String> = time_use.iter().map(|(phase, secs)| format!("{phase} {secs:.1} s")).collect();
+        let spent: Vec<String> = time_use
+            .iter()
+            .map(|(phase, secs)| format!("{phase} {secs:.1} s"))
+            .collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));

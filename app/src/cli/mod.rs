@@ -77,7 +77,9 @@ pub fn main(cli: Cli) -> ExitCode {
     let (output, result) = match cli.command {
         None => (Output::text(), rig::window(&rig::RigArgs::default())),
         Some(Command::Window(args)) => (Output::text(), rig::window(&args)),
-        Some(Command::Run(run::RunCommand::RampHold(args))) => with(args.json, |out| run::run(&args, out)),
+        Some(Command::Run(run::RunCommand::RampHold(args))) => {
+            with(args.json, |out| run::run(&args, out))
+        }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
@@ -96,7 +98,11 @@ fn with(
     is_json: bool,
     run: impl FnOnce(&Output) -> Result<(), Failure>,
 ) -> (Output, Result<(), Failure>) {
-    let output = if is_json { Output::json() } else { Output::text() };
+    let output = if is_json {
+        Output::json()
+    } else {
+        Output::text()
+    };
     let result = run(&output);
     (output, result)
 }

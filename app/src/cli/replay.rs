@@ -1,7 +1,7 @@
 //! `palpate replay`: recorded sessions through the same engine again.
 
-use super::output::Output;
 use super::Failure;
+use super::output::Output;
 use clap::Args;
 use palpate_protocols::replay::{ReplayReport, blessings_of, replay};
 use palpate_sessions::log::Session;
@@ -39,13 +39,30 @@ pub(super) fn run(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
     for path in &args.sessions {
         bar.set_message(path.display().to_string());
         let report = replay_one(path, output)?;
-        sessions.push(Replayed { session: path.clone(), report });
+        sessions.push(Replayed {
+            session: path.clone(),
+            report,
+        });
         bar.inc(1);
     }
     bar.finish_and_clear();
-    let differing = sessions.iter().filter(|one| one.report.first_difference.is_some()).count();
-    let replays = Replays { command: "replay", sessions, differing };
-    output.result(&replays, || replays.sessions.iter().map(text).collect::<Vec<_>>().join("\n"));
+    let differing = sessions
+        .iter()
+        .filter(|one| one.report.first_difference.is_some())
+        .count();
+    let replays = Replays {
+        command: "replay",
+        sessions,
+        differing,
+    };
+    output.result(&replays, || {
+        replays
+            .sessions
+            .iter()
+            .map(text)
+            .collect::<Vec<_>>()
+            .join("\n")
+    });
     if differing > 0 {
         return Err(Failure::failed(format!(
             "{differing} of {} sessions differ from what the engine decides now",
@@ -59,7 +76,8 @@ fn replay_one(path: &Path, output: &Output) -> Result<ReplayReport, Failure> {
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
     let blessings = blessings_of(path).map_err(Failure::usage)?;
-    replay(&session, &blessings).map_err(|err| Failure::failed(format!("{err}: {}", path.display())))
+    replay(&session, &blessings)
+        .map_err(|err| Failure::failed(format!("{err}: {}", path.display())))
 }
 
 fn text(replayed: &Replayed) -> String {
@@ -71,7 +89,10 @@ fn text(replayed: &Replayed) -> String {
             difference.what,
             difference.at_s,
             difference.after_sample,
-            difference.decision.map(|index| format!(", decision {index}")).unwrap_or_default(),
+            difference
+                .decision
+                .map(|index| format!(", decision {index}"))
+                .unwrap_or_default(),
             difference.recorded,
             difference.now
         );
@@ -79,7 +100,10 @@ fn text(replayed: &Replayed) -> String {
     let decisions = match (report.is_same_engine, report.blessed) {
         (false, _) => "decisions not compared, the engine has a newer version".to_string(),
         (true, 0) => format!("{} decisions identical", report.decisions),
-        (true, blessed) => format!("{} decisions, {blessed} of them differ as blessed", report.decisions),
+        (true, blessed) => format!(
+            "{} decisions, {blessed} of them differ as blessed",
+            report.decisions
+        ),
     };
     format!(
         "{name}: {} samples, {decisions}; force within {:.1e} N, depth within {:.1e} mm",

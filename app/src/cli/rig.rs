@@ -1,9 +1,10 @@
 //! Which rig, at which pace: shared by every command that needs one.
 
 use super::Failure;
+use crate::window::{WindowOptions, run_window};
 use clap::Args;
-use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_drivers::Rig;
+use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
@@ -45,7 +46,11 @@ impl RigArgs {
     /// The settings of the simulated rig.
     #[must_use]
     pub fn settings(&self) -> SimSettings {
-        SimSettings { profile: self.profile, seed: self.seed, clock: self.clock }
+        SimSettings {
+            profile: self.profile,
+            seed: self.seed,
+            clock: self.clock,
+        }
     }
 }
 
@@ -58,7 +63,7 @@ pub struct OpenRig {
     /// Interlock thresholds.
     pub limits: Limits,
     /// Keeps other programs off a rig that has a name of its own.
-    pub lock: Option<HolderLock>,
+    pub _lock: Option<HolderLock>,
 }
 
 /// Opens the rig, or says who holds it.
@@ -71,7 +76,12 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         None => None,
     };
     let limits = Limits::for_travel(rig.description().travel);
-    Ok(OpenRig { rig, calibration: settings.calibration(), limits, lock })
+    Ok(OpenRig {
+        rig,
+        calibration: palpate_drivers::sim::calibration(settings.profile),
+        limits,
+        _lock: lock,
+    })
 }
 
 fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
@@ -82,5 +92,19 @@ fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
 
 /// Opens the window.
 pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
-    Err(Failure::failed(format!("no window yet for {}", args.rig)))
+    let OpenRig {
+        rig,
+        calibration,
+        limits,
+        _lock,
+    } = open(args)?;
+    let scale = args.time_scale;
+    run_window(WindowOptions {
+        rig,
+        calibration,
+        limits,
+        scale,
+        sessions: None,
+    })
+    .map_err(Failure::Failed)
 }

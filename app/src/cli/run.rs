@@ -1,8 +1,8 @@
 //! `palpate run`: a protocol without a window, on the same runner.
 
+use super::Failure;
 use super::output::Output;
 use super::rig::RigArgs;
-use super::Failure;
 use clap::{Args, Subcommand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
@@ -106,14 +106,23 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         after_stop: AfterStop::Close,
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
-    let preview =
-        preview(&request.plan, bench.rig.description(), &request.limits, &curve, false);
+    let preview = preview(
+        &request.plan,
+        bench.rig.description(),
+        &request.limits,
+        &curve,
+        false,
+    );
     if args.preview {
         output.result(&preview, || preview_text(&preview));
         return Ok(());
     }
     if let Err(reason) = preview.verdict(args.acknowledge) {
-        let hint = if preview.refusals.is_empty() { "; add --acknowledge to accept this" } else { "" };
+        let hint = if preview.refusals.is_empty() {
+            "; add --acknowledge to accept this"
+        } else {
+            ""
+        };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
     preview.notes.iter().for_each(|note| output.note(note));
@@ -164,16 +173,29 @@ fn watch(runner: &Runner, woken: &Receiver<()>, output: &Output) -> Result<Arc<S
             return Ok(snapshot);
         }
         if !is_alive && !runner.is_alive() {
-            return Err(Failure::failed("the runner ended unexpectedly; the session is incomplete"));
+            return Err(Failure::failed(
+                "the runner ended unexpectedly; the session is incomplete",
+            ));
         }
     }
 }
 
 fn progress_text(view: &RunView) -> String {
     let left = view.time_left.0.round() as u64;
-    let force = view.derived.force.map_or(String::new(), |force| format!("  {force:.3}"));
-    let depth = view.derived.depth.map_or(String::new(), |depth| format!("  {depth:.2}"));
-    format!("{}{force}{depth}  {:02}:{:02} left", view.phase, left / 60, left % 60)
+    let force = view
+        .derived
+        .force
+        .map_or(String::new(), |force| format!("  {force:.3}"));
+    let depth = view
+        .derived
+        .depth
+        .map_or(String::new(), |depth| format!("  {depth:.2}"));
+    format!(
+        "{}{force}{depth}  {:02}:{:02} left",
+        view.phase,
+        left / 60,
+        left % 60
+    )
 }
 
 fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
@@ -195,7 +217,9 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
     };
     output.result(&report, || run_text(&report));
     if let Some(reason) = &view.log_error {
-        return Err(Failure::failed(format!("the session log could not be closed: {reason}")));
+        return Err(Failure::failed(format!(
+            "the session log could not be closed: {reason}"
+        )));
     }
     match outcome.ending {
         EndingKind::Finish => Ok(()),
@@ -233,7 +257,14 @@ fn preview_text(preview: &Preview) -> String {
     let mut lines: Vec<String> = preview
         .steps
         .iter()
-        .map(|step| format!("{:<10} {:>8.1} s, at most {:.1} s", step.phase.name(), step.expected.0, step.longest.0))
+        .map(|step| {
+            format!(
+                "{:<10} {:>8.1} s, at most {:.1} s",
+                step.phase.name(),
+                step.expected.0,
+                step.longest.0
+            )
+        })
         .collect();
     lines.push(format!(
         "total      {:>8.1} s, at most {:.1} s; peak force {:.1} to {:.1}; up to {:.1} MB",
@@ -243,8 +274,18 @@ fn preview_text(preview: &Preview) -> String {
         preview.force_band[1],
         preview.storage_bytes as f64 * 1e-6
     ));
-    lines.extend(preview.refusals.iter().map(|line| format!("refused: {line}")));
-    lines.extend(preview.acknowledgements.iter().map(|line| format!("to acknowledge: {line}")));
+    lines.extend(
+        preview
+            .refusals
+            .iter()
+            .map(|line| format!("refused: {line}")),
+    );
+    lines.extend(
+        preview
+            .acknowledgements
+            .iter()
+            .map(|line| format!("to acknowledge: {line}")),
+    );
     lines.extend(preview.notes.iter().map(|line| format!("note: {line}")));
     lines.join("\n")
 }

@@ -9,8 +9,8 @@ use palpate_model::fit::LiveFit;
 use palpate_model::rig::{Fault, Phase, Reading, RigCommand};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
-use palpate_sessions::{LogError, SessionWriter};
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
+use palpate_sessions::{LogError, SessionWriter};
 use std::collections::{BTreeMap, VecDeque};
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -93,29 +93,30 @@ impl ActiveRun {
         at.since(self.origin)
     }
 
-    /// Feeds one input to the engine and returns the commands for the rig, stops first.
-    pub fn feed(&mut self, now: Nanos, input: Input) -> Vec<RigCommand> {
-        let mut commands = Vec::new();
-        self.feed_one(now, input, &mut commands);
-        commands.sort_by_key(|command| !command.is_stopping());
-        commands
-    }
-
-    fn feed_one(&mut self, now: Nanos, input: Input, commands: &mut Vec<RigCommand>) {
+    /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
+    /// written down, other commands after. Commands keep the engine's order.
+    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(RigCommand)) {
         let Some(state) = self.engine.take() else {
             return;
         };
         *self.time_use.entry(state.phase().name()).or_default() += now.since(self.now).0;
         self.now = now;
-        let reading = match &input {
-            Input::Reading(reading) => Some(*reading),
+        let (reading, logged) = match &input {
+            Input::Reading(reading) => (Some(*reading), None),
             other => {
                 self.note_input(now, other);
-                self.log(now, kind_of(other), to_json(other));
-                None
+                (None, Some((kind_of(other), to_json(other))))
             }
         };
         let (state, effects) = engine::step(state, now, input);
+        let commands: Vec<RigCommand> = effects.iter().filter_map(command_of).collect();
+        let is_urgent = commands.iter().any(RigCommand::is_stopping);
+        if is_urgent {
+            commands.iter().copied().for_each(&mut *send);
+        }
+        if let Some((kind, body)) = logged {
+            self.log(now, kind, body);
+        }
         if let Some(reading) = reading {
             self.log_row(now, &reading, &state);
         }
@@ -124,36 +125,35 @@ impl ActiveRun {
         for effect in effects {
             self.log(now, EntryKind::Decision, to_json(&effect));
             match effect {
-                Effect::Command(command) => commands.push(command),
+                Effect::Command(_) => {}
                 Effect::Record(record) => self.note_record(now, &record),
                 Effect::Finished(outcome) => self.close(outcome),
             }
         }
-        if let Some(estimate) = estimate {
-            self.feed_one(now, Input::LiveFit(estimate), commands);
+        if !is_urgent {
+            commands.iter().copied().for_each(&mut *send);
         }
-        self.after_feed(now, commands);
+        if let Some(estimate) = estimate {
+            self.feed(now, Input::LiveFit(estimate), send);
+        }
+        self.after_feed(now, send);
     }
 
     /// What the runner owes the engine after each input: news of a failed log, and the choice of
     /// an operator who is not there.
-    fn after_feed(&mut self, now: Nanos, commands: &mut Vec<RigCommand>) {
-        if let (Some(detail), false) = (self.log_failure.clone(), self.is_log_failure_told) {
+    fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(RigCommand)) {
+        if let (Some(detail), false) = (&self.log_failure, self.is_log_failure_told) {
             self.is_log_failure_told = true;
-            self.feed_one(now, Input::Fault(Fault::LogFailed { detail }), commands);
+            let detail = detail.clone();
+            self.feed(now, Input::Fault(Fault::LogFailed { detail }), send);
         }
         let is_holding = self
             .engine
             .as_ref()
             .is_some_and(|state| state.holding().is_some());
         if is_holding && self.after_stop == AfterStop::Close {
-            self.feed_one(
-                now,
-                Input::Operator {
-                    choice: Operator::Close,
-                },
-                commands,
-            );
+            let choice = Operator::Close;
+            self.feed(now, Input::Operator { choice }, send);
         }
     }
 
@@ -179,7 +179,10 @@ impl ActiveRun {
             phase: state.phase(),
             cycle: state.cycle(),
         };
-        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_row(row));
+        let result = self
+            .writer
+            .as_mut()
+            .map_or(Ok(()), |writer| writer.push_row(row));
         self.note_log(result);
     }
 
@@ -192,7 +195,10 @@ impl ActiveRun {
             body,
         };
         self.order += 1;
-        let result = self.writer.as_mut().map_or(Ok(()), |writer| writer.push_entry(entry));
+        let result = self
+            .writer
+            .as_mut()
+            .map_or(Ok(()), |writer| writer.push_entry(entry));
         self.note_log(result);
     }
 
@@ -329,6 +335,13 @@ impl ActiveRun {
             .sum();
         let done = self.now.seconds().0;
         (Seconds(left), done / (done + left).max(1e-9))
+    }
+}
+
+fn command_of(effect: &Effect) -> Option<RigCommand> {
+    match effect {
+        Effect::Command(command) => Some(*command),
+        _ => None,
     }
 }
 

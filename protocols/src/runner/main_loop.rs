@@ -262,9 +262,8 @@ impl MainLoop {
             return;
         };
         let now = run.session_time(self.now);
-        for command in run.feed(now, input) {
-            self.rig.send(command);
-        }
+        let rig = &mut self.rig;
+        run.feed(now, input, &mut |command| rig.send(command));
         if let Some(state) = run.engine() {
             self.is_homed = state.is_homed();
         }

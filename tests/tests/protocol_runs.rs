@@ -1,76 +1,11 @@
 //! Whole protocols: the pure engine against the simulated rig, without disk or threads.
 
-use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
-use palpate_drivers::{Rig, RigEventBody};
-use palpate_model::Nanos;
-use palpate_model::rig::{Limits, Phase};
+use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
-use palpate_protocols::engine::{Config, Effect, EndingKind, Input, Operator, Record, State, step};
+use palpate_drivers::Rig;
+use palpate_protocols::engine::{EndingKind, Record};
 use palpate_protocols::plans::RampHold;
-use std::sync::Arc;
-
-struct Run {
-    rig: SimRig,
-    state: State,
-    records: Vec<Record>,
-    force_peak_in_contact_search: f64,
-    hold_ticks: u64,
-}
-
-fn run(settings: SimSettings, params: RampHold) -> Run {
-    let mut rig = SimRig::new(settings);
-    let config = Config {
-        rig: rig.description().clone(),
-        limits: Limits::for_travel(rig.description().travel),
-        curve: rig.calibration().curve().unwrap(),
-        plan: params.plan(),
-        is_homed: false,
-    };
-    let mut run_state = State::new(Arc::new(config));
-    let (mut records, mut force_peak, mut hold_ticks) = (Vec::new(), 0.0f64, 0);
-    let mut inputs = vec![(
-        Nanos::ZERO,
-        Input::Operator {
-            choice: Operator::Start,
-        },
-    )];
-    // No thesis run takes more than ten minutes; the bound keeps a broken engine from hanging.
-    let end = Nanos::from_seconds(Seconds(600.0));
-    loop {
-        for (now, input) in inputs.drain(..) {
-            let (next, effects) = step(run_state, now, input);
-            run_state = next;
-            for effect in effects {
-                match effect {
-                    Effect::Command(command) => rig.send(command),
-                    Effect::Record(record) => records.push(record),
-                    Effect::Finished(_) => {}
-                }
-            }
-        }
-        if run_state.outcome().is_some() || run_state.holding().is_some() {
-            break;
-        }
-        let event = rig.next_event(end).expect("the run takes too long");
-        if run_state.phase() == Phase::Contact {
-            force_peak = force_peak.max(rig.truth().force.0);
-        }
-        hold_ticks += u64::from(run_state.phase() == Phase::Hold);
-        let input = match event.body {
-            RigEventBody::Reading(reading) => Input::Reading(reading),
-            RigEventBody::Ack(ack) => Input::Ack(ack),
-            RigEventBody::Fault(fault) => Input::Fault(fault),
-        };
-        inputs.push((event.at, input));
-    }
-    Run {
-        rig,
-        state: run_state,
-        records,
-        force_peak_in_contact_search: force_peak,
-        hold_ticks,
-    }
-}
+use palpate_tests::simulated::run;
 
 fn short() -> RampHold {
     RampHold {
