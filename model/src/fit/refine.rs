@@ -13,6 +13,14 @@ const STEP_MAX: [f64; 2] = [1.0, 0.08];
 /// Rounding level of a sum of squares, relative to that of the forces.
 const ROUNDING: f64 = 1e-26;
 
+/// Where the outer parameters may go.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Ranges {
+    pub log_tau: (f64, f64),
+    /// Scaled.
+    pub contact: (f64, f64),
+}
+
 /// The end of the iteration.
 #[derive(Clone, Debug)]
 pub(super) struct Refined {
@@ -26,7 +34,7 @@ pub(super) struct Refined {
 }
 
 /// Follows a start to the minimum of the weighted sum of squares.
-pub(super) fn refine(problem: &Problem<'_>, start: &Start, log_tau_range: (f64, f64)) -> Refined {
+pub(super) fn refine(problem: &Problem<'_>, start: &Start, ranges: Ranges) -> Refined {
     let free = problem.basis.len();
     let all = free + problem.outer_free();
     let mut outer = start.outer;
@@ -47,7 +55,7 @@ pub(super) fn refine(problem: &Problem<'_>, start: &Start, log_tau_range: (f64, 
                     best.is_converged = true;
                     break;
                 }
-                outer = moved(best.outer, step, log_tau_range);
+                outer = moved(best.outer, step, ranges);
                 continue;
             }
         } else if !is_usable {
@@ -68,7 +76,7 @@ pub(super) fn refine(problem: &Problem<'_>, start: &Start, log_tau_range: (f64, 
             next(problem.fixed_tau.is_none(), STEP_MAX[0]),
             next(problem.fixed_contact.is_none(), STEP_MAX[1]),
         ];
-        let target = moved(outer, wanted, log_tau_range);
+        let target = moved(outer, wanted, ranges);
         step = [
             target.log_tau - outer.log_tau,
             target.contact - outer.contact,
@@ -98,15 +106,17 @@ pub(super) fn refine(problem: &Problem<'_>, start: &Start, log_tau_range: (f64, 
     })
 }
 
-fn moved(from: Outer, step: [f64; 2], (low, high): (f64, f64)) -> Outer {
-    let log_tau = from.log_tau + step[0];
-    Outer {
-        // A fixed tau may lie outside the searched range.
-        log_tau: if step[0] == 0.0 {
-            log_tau
+fn moved(from: Outer, step: [f64; 2], ranges: Ranges) -> Outer {
+    // A fixed value may lie outside the searched range.
+    let within = |from: f64, step: f64, (low, high): (f64, f64)| {
+        if step == 0.0 {
+            from
         } else {
-            log_tau.clamp(low, high)
-        },
-        contact: from.contact + step[1],
+            (from + step).clamp(low, high)
+        }
+    };
+    Outer {
+        log_tau: within(from.log_tau, step[0], ranges.log_tau),
+        contact: within(from.contact, step[1], ranges.contact),
     }
 }

@@ -19,8 +19,8 @@ const VALLEYS: usize = 3;
 const LENGTHS: f64 = 10.0;
 /// The grid for an unknown contact: relaxation times, contact positions, samples.
 const CONTACT_GRID: (usize, usize, usize) = (20, 28, 700);
-/// Contact positions tried, as shares of the travel; below zero the record starts in contact.
-const CONTACT_RANGE: (f64, f64) = (-0.25, 0.85);
+/// Deepest contact position tried, as a share of the travel.
+const CONTACT_SHARE_MAX: f64 = 0.85;
 
 /// A place to start from.
 #[derive(Clone, Copy, Debug)]
@@ -49,12 +49,7 @@ pub(super) fn best_start(problem: &Problem<'_>, contact: f64) -> Start {
         .iter()
         .map(|&log_tau| sum(problem, at(log_tau), block))
         .collect();
-    let mut valleys: Vec<usize> = (0..NODES)
-        .filter(|&i| {
-            let is_below = |j: usize| sums.get(j).is_none_or(|other| sums[i] <= *other);
-            is_below(i.wrapping_sub(1)) && is_below(i + 1)
-        })
-        .collect();
+    let mut valleys = valleys(NODES, |i| sums[i]);
     valleys.sort_by(|&a, &b| sums[a].total_cmp(&sums[b]));
     valleys.truncate(VALLEYS);
     let refined = valleys.into_iter().map(|i| {
@@ -76,16 +71,12 @@ pub(super) fn contact_starts(problem: &Problem<'_>) -> Vec<Start> {
         Some(tau) => vec![tau.ln()],
         None => nodes(log_tau_range(problem.samples), taus),
     };
-    let shallowest = problem
-        .samples
-        .iter()
-        .map(|sample| sample.depth.0 / problem.depth_scale)
-        .fold(f64::INFINITY, f64::min);
-    let (low, high) = CONTACT_RANGE;
-    let mut starts: Vec<Start> = (0..contacts)
+    let (low, high) = contact_range(problem);
+    let profile: Vec<Start> = (0..contacts)
         .filter_map(|i| {
-            let share = low + (high - low) * i as f64 / (contacts - 1) as f64;
-            let contact = shallowest + share;
+            // Denser near the shallow end, where contacts are.
+            let share = (i as f64 / (contacts - 1) as f64).powi(2);
+            let contact = low + (high - low) * share;
             lowest(
                 log_taus
                     .iter()
@@ -93,8 +84,32 @@ pub(super) fn contact_starts(problem: &Problem<'_>) -> Vec<Start> {
             )
         })
         .collect();
+    let mut starts: Vec<Start> = valleys(profile.len(), |i| profile[i].sum)
+        .into_iter()
+        .map(|i| profile[i])
+        .collect();
     starts.sort_by(|a, b| a.sum.total_cmp(&b.sum));
     starts
+}
+
+/// Scaled contact positions searched: within the record. Before its first depth a contact cannot be
+/// told from other elastic coefficients and an offset, since a shifted cubic is a cubic.
+pub(super) fn contact_range(problem: &Problem<'_>) -> (f64, f64) {
+    let shallowest = problem
+        .samples
+        .iter()
+        .map(|sample| sample.depth.0 / problem.depth_scale)
+        .fold(f64::INFINITY, f64::min);
+    (shallowest, shallowest + CONTACT_SHARE_MAX)
+}
+
+/// Indices that are not above their neighbours.
+fn valleys(count: usize, value: impl Fn(usize) -> f64) -> Vec<usize> {
+    (0..count)
+        .filter(|&i| {
+            (i == 0 || value(i) <= value(i - 1)) && (i + 1 == count || value(i) <= value(i + 1))
+        })
+        .collect()
 }
 
 fn lowest(starts: impl Iterator<Item = Start>) -> Option<Start> {

@@ -3,10 +3,10 @@
 use super::identify;
 use super::options::{CONTACT, FitOptions, LINEAR, LINEAR_COUNT, TAU};
 use super::problem::{Outer, Problem, linear_units};
-use super::refine::{Refined, refine};
+use super::refine::{Ranges, Refined, refine};
 use super::report::{Findings, FitReport, MODEL_NAME, physical, residuals};
 use super::sample::{FitError, FitSample, check_samples};
-use super::scan::{best_start, contact_starts, log_tau_range};
+use super::scan::{best_start, contact_range, contact_starts, log_tau_range};
 
 /// Starts followed when the contact position is free.
 const CONTACT_STARTS: usize = 4;
@@ -14,6 +14,8 @@ const CONTACT_STARTS: usize = 4;
 const CONTEST_SAMPLES: usize = 3000;
 /// `ln tau` this close to an end of the searched range is at the end.
 const EDGE: f64 = 1e-3;
+/// A scaled contact this close to the shallowest depth was stopped there.
+const CONTACT_EDGE: f64 = 1e-6;
 /// Neighbouring residuals correlated more than this have memory.
 const LAG_ONE_MAX: f64 = 0.2;
 
@@ -58,15 +60,18 @@ pub fn fit(samples: &[FitSample], options: &FitOptions) -> Result<FitReport, Fit
     check_samples(samples)?;
     let problem = Problem::new(samples, options)?;
     let free: Vec<usize> = (0..8).filter(|&k| options.fixed()[k].is_none()).collect();
-    let range = log_tau_range(samples);
+    let ranges = Ranges {
+        log_tau: log_tau_range(samples),
+        contact: contact_range(&problem),
+    };
     let redrawn = identify::redraw(samples, problem.depth_scale);
     let refined = match problem.fixed_contact {
         Some(contact) => {
             let start = best_start(&problem, contact);
             identify::check(&problem, &redrawn, &free, start.outer, None)?;
-            refine(&problem, &start, range)
+            refine(&problem, &start, ranges)
         }
-        None => refine_with_contact(&problem, range),
+        None => refine_with_contact(&problem, ranges),
     };
     if !refined.sum.is_finite() || refined.scaled.iter().any(|value| !value.is_finite()) {
         // A blind design divides by nothing; say which parameters rather than that.
@@ -80,43 +85,54 @@ pub fn fit(samples: &[FitSample], options: &FitOptions) -> Result<FitReport, Fit
         refined.outer,
         Some(&refined.scaled),
     )?;
-    Ok(report(&problem, options, &refined, range))
+    Ok(report(&problem, options, &refined, ranges))
 }
 
 /// The contact is searched on a grid, the best places compete on a thinned record, and the winner
 /// is refined on all samples.
-fn refine_with_contact(problem: &Problem<'_>, range: (f64, f64)) -> Refined {
+fn refine_with_contact(problem: &Problem<'_>, ranges: Ranges) -> Refined {
     let step = problem.samples.len().div_ceil(CONTEST_SAMPLES);
     let thin: Vec<FitSample> = problem.samples.iter().copied().step_by(step).collect();
     let contest = problem.on(&thin);
     let starts = contact_starts(problem);
-    let mut winner = starts[0];
+    let mut winner = starts.first().copied().unwrap_or_else(|| {
+        let contact = ranges.contact.0;
+        best_start(problem, contact)
+    });
     let mut lowest = f64::INFINITY;
     for start in starts.iter().take(CONTACT_STARTS) {
-        let refined = refine(&contest, start, range);
+        let refined = refine(&contest, start, ranges);
         if refined.sum < lowest {
             lowest = refined.sum;
             winner.outer = refined.outer;
             winner.scaled = refined.scaled;
         }
     }
-    refine(problem, &winner, range)
+    refine(problem, &winner, ranges)
 }
 
 fn report(
     problem: &Problem<'_>,
     options: &FitOptions,
     refined: &Refined,
-    range: (f64, f64),
+    ranges: Ranges,
 ) -> FitReport {
     let Refined { outer, scaled, .. } = *refined;
     let free = options.free_count();
     let spare = problem.samples.len() - free;
+    let range = ranges.log_tau;
     let edge = edge_of(problem, outer, range);
+    let contact_is_at_start =
+        problem.fixed_contact.is_none() && outer.contact < ranges.contact.0 + CONTACT_EDGE;
     let residuals = residuals(problem, outer, &scaled);
     let findings = Findings {
         values: physical(outer, &scaled, problem.depth_scale),
-        std_errors: std_errors(problem, options, refined, spare, edge.is_some()),
+        std_errors: std_errors(
+            problem,
+            options,
+            refined,
+            [edge.is_some(), contact_is_at_start],
+        ),
         is_fixed: std::array::from_fn(|k| options.fixed()[k].is_some()),
         degrees_of_freedom: spare,
     };
@@ -129,6 +145,13 @@ fn report(
             range.1.exp()
         ));
     }
+    if contact_is_at_start {
+        warnings.push(
+            "contact lies at or before the shallowest depth recorded, where it cannot be told \
+             from the elastic coefficients; record the approach as well"
+                .to_owned(),
+        );
+    }
     if !refined.is_converged {
         warnings.push(
             "the iteration did not settle; the parameters depend on each other too strongly"
@@ -136,7 +159,7 @@ fn report(
         );
     }
     let chance = 3.0 / (problem.samples.len() as f64).sqrt();
-    if spare > 0 && residuals.lag_one > LAG_ONE_MAX + chance && residuals.r2 < 1.0 - 1e-20 {
+    if spare > 0 && residuals.lag_one > LAG_ONE_MAX + chance && residuals.r2 < 1.0 - 1e-12 {
         warnings.push(format!(
             "neighbouring residuals are correlated ({:.2}); the standard errors assume \
              independent noise and are too small",
@@ -181,9 +204,9 @@ fn std_errors(
     problem: &Problem<'_>,
     options: &FitOptions,
     refined: &Refined,
-    spare: usize,
-    tau_is_at_edge: bool,
+    [tau_is_at_edge, contact_is_at_edge]: [bool; 2],
 ) -> [Option<f64>; 8] {
+    let spare = problem.samples.len() - options.free_count();
     let free = problem.basis.len();
     let all = free + problem.outer_free();
     let scatter = if spare > 0 {
@@ -205,6 +228,7 @@ fn std_errors(
         match index {
             TAU if tau_is_at_edge => None,
             TAU => Some(outer_deviation(0) * refined.outer.tau()),
+            CONTACT if contact_is_at_edge => None,
             CONTACT => {
                 let position = usize::from(problem.fixed_tau.is_none());
                 Some(outer_deviation(position) * problem.depth_scale)

@@ -150,12 +150,12 @@ impl Factor {
         let mut v: Vec<Vec<f64>> = (0..columns)
             .map(|j| (0..columns).map(|i| f64::from(u8::from(i == j))).collect())
             .collect();
-        for j in 0..columns {
-            let norm = sum_of_products(&a[j], &a[j]).sqrt();
+        for (j, column) in a.iter_mut().enumerate() {
+            let norm = sum_of_products(column, column).sqrt();
             if norm == 0.0 {
                 return (f64::INFINITY, v.swap_remove(j));
             }
-            a[j].iter_mut().for_each(|value| *value /= norm);
+            column.iter_mut().for_each(|value| *value /= norm);
         }
         for _ in 0..30 {
             let mut is_diagonal = true;
