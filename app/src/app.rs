@@ -63,7 +63,7 @@ impl WorkbenchApp {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let wake = ctx.clone();
-        let runner = Runner::start(options.rig, options.scale, move || {
+        let runner = Runner::start(options.rig, options.scale, None, move || {
             wake.request_repaint_after(FRAME_IDLE);
         })
         .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;

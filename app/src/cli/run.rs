@@ -29,13 +29,13 @@ pub enum RunCommand {
 #[derive(Debug, Args)]
 pub struct RampHoldArgs {
     /// Indentation speed in mm/s
-    #[arg(long, default_value = "0.75", value_parser = number)]
+    #[arg(long, default_value = "0.75", value_parser = number, allow_negative_numbers = true)]
     speed: f64,
     /// Depth from contact in mm
-    #[arg(long, default_value = "30", value_parser = number)]
+    #[arg(long, default_value = "30", value_parser = number, allow_negative_numbers = true)]
     depth: f64,
     /// Time at depth in s
-    #[arg(long, default_value = "50", value_parser = number)]
+    #[arg(long, default_value = "50", value_parser = number, allow_negative_numbers = true)]
     hold: f64,
     #[command(flatten)]
     rig: RigArgs,
@@ -128,16 +128,20 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     preview.notes.iter().for_each(|note| output.note(note));
 
     let (wake, woken) = sync_channel(1);
-    let runner = Runner::start(bench.rig, args.rig.time_scale, move || {
+    let (reply, answer) = sync_channel(1);
+    let first = Request::Run(Box::new(request), reply);
+    let runner = Runner::start(bench.rig, args.rig.time_scale, Some(first), move || {
         // A full channel already says what this would say.
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
     stop_on_signals(&runner)?;
-    runner.run(request).map_err(|err| match err {
-        StartError::Refused(reason) => Failure::Usage(reason),
-        StartError::Failed(reason) => Failure::Failed(reason),
-    })?;
+    match answer.recv() {
+        Ok(Ok(())) => {}
+        Ok(Err(StartError::Refused(reason))) => return Err(Failure::Usage(reason)),
+        Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
+        Err(_) => return Err(Failure::failed("the runner ended before the run began")),
+    }
     let snapshot = watch(&runner, &woken, output)?;
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed("the runner ended without a run"));

@@ -46,9 +46,13 @@ pub struct Runner {
 
 impl Runner {
     /// Takes a rig and starts the runner's thread. `wake` is called after each snapshot.
+    ///
+    /// `first` is served before any time passes, so that a run given here starts at time zero of
+    /// a simulated rig and is the same whenever it is repeated.
     pub fn start(
         rig: Box<dyn Rig>,
         scale: TimeScale,
+        first: Option<Request>,
         wake: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(REQUESTS_MAX);
@@ -57,7 +61,7 @@ impl Runner {
         let shared = Arc::clone(&snapshot);
         let thread = std::thread::Builder::new()
             .name("runner".into())
-            .spawn(move || main_loop.run(&receiver, &shared, &wake))?;
+            .spawn(move || main_loop.run(first, &receiver, &shared, &wake))?;
         Ok(Self {
             requests,
             snapshot,
@@ -70,16 +74,6 @@ impl Runner {
         self.requests
             .try_send(request)
             .map_err(|_| "the runner does not answer; close palpate and check the rig".to_string())
-    }
-
-    /// Starts a run and waits for the runner's word.
-    pub fn run(&self, request: RunRequest) -> Result<(), StartError> {
-        let (reply, answer) = sync_channel(1);
-        self.request(Request::Run(Box::new(request), reply))
-            .map_err(StartError::Failed)?;
-        answer
-            .recv()
-            .unwrap_or_else(|_| Err(StartError::Failed("the runner ended".into())))
     }
 
     /// Passes on the operator's choice.
@@ -151,9 +145,18 @@ impl MainLoop {
         }
     }
 
-    fn run(mut self, requests: &Receiver<Request>, shared: &ArcSwap<Snapshot>, wake: &impl Fn()) {
+    fn run(
+        mut self,
+        first: Option<Request>,
+        requests: &Receiver<Request>,
+        shared: &ArcSwap<Snapshot>,
+        wake: &impl Fn(),
+    ) {
         let mut publish = Throttle::new(PUBLISH_EVERY);
         let mut sequence = 0;
+        if first.is_some_and(|request| self.serve(request)) {
+            return;
+        }
         let mut pacer = Pacer::new(self.pace(), self.now);
         loop {
             let was_running = self.is_running();
