@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use thiserror::Error;
 
 /// Name of the log in a session folder.
-pub const LOG_FILE: &str = "session.mcap";
+pub const LOG_FILE: &str = "000.mcap";
 /// Name of the lock in a session folder.
 pub const LOCK_FILE: &str = "lock";
 

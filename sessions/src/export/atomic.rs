@@ -32,10 +32,21 @@ pub(super) fn write(
         })
         .and_then(|()| file.flush().map_err(io_error))
         .and_then(|()| file.get_ref().sync_all().map_err(io_error))
-        .and_then(|()| fs::rename(&hidden, path).map_err(io_error));
+        .and_then(|()| give_name(&hidden, path).map_err(io_error));
     if result.is_err() {
         // Half a table under a hidden name helps nobody; the error already says what happened.
         let _ = fs::remove_file(&hidden);
     }
     result
+}
+
+/// Renames, but never onto a file that appeared in the meantime.
+fn give_name(hidden: &Path, path: &Path) -> io::Result<()> {
+    use rustix::fs::{CWD, RenameFlags, renameat_with};
+    use rustix::io::Errno;
+    match renameat_with(CWD, hidden, CWD, path, RenameFlags::NOREPLACE) {
+        // Some file systems cannot promise this; the check at the start has to do there.
+        Err(Errno::INVAL | Errno::NOSYS | Errno::OPNOTSUPP) => fs::rename(hidden, path),
+        outcome => Ok(outcome?),
+    }
 }

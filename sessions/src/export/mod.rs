@@ -2,14 +2,13 @@
 
 mod atomic;
 mod columns;
+mod parquet;
 
 pub use columns::COLUMNS;
+pub use parquet::export_parquet;
 
 use crate::log::Session;
-use crate::manifest::RECORD_VERSION;
-use polars::prelude::{
-    CsvWriter, DataFrame, KeyValueMetadata, ParquetWriter, PolarsError, SerWriter,
-};
+use polars::prelude::{CsvWriter, DataFrame, PolarsError, SerWriter};
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -48,38 +47,6 @@ pub fn export_csv(session: &Session, path: &Path) -> Result<(), ExportError> {
     let mut frame = frame(session, path)?;
     atomic::write(path, |file| {
         CsvWriter::new(file).include_header(true).finish(&mut frame)
-    })
-}
-
-/// Writes the samples as Parquet. The file's metadata carries the units (`palpate.columns`, JSON
-/// from column to unit) and where the numbers come from.
-pub fn export_parquet(session: &Session, path: &Path) -> Result<(), ExportError> {
-    let mut frame = frame(session, path)?;
-    let units: serde_json::Map<String, serde_json::Value> = COLUMNS
-        .iter()
-        .map(|(name, unit)| ((*name).to_owned(), (*unit).into()))
-        .collect();
-    let manifest = &session.manifest;
-    let metadata = KeyValueMetadata::from_static(vec![
-        (
-            "palpate.columns".to_owned(),
-            serde_json::Value::Object(units).to_string(),
-        ),
-        ("palpate.session".to_owned(), manifest.session_id.clone()),
-        (
-            "palpate.software".to_owned(),
-            manifest.software_version.clone(),
-        ),
-        (
-            "palpate.record_version".to_owned(),
-            RECORD_VERSION.to_string(),
-        ),
-    ]);
-    atomic::write(path, |file| {
-        ParquetWriter::new(file)
-            .with_key_value_metadata(Some(metadata))
-            .finish(&mut frame)
-            .map(|_bytes| ())
     })
 }
 

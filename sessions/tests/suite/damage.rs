@@ -2,6 +2,7 @@ use crate::support::{Random, end, entries, log_bytes, manifest, rows, same_bits}
 use palpate_model::Nanos;
 use palpate_sessions::{Entry, ReadError, Row, Session};
 use std::fs;
+use std::path::Path;
 
 /// What a damaged file did.
 #[derive(Debug, Default)]
@@ -51,6 +52,12 @@ impl Original {
     }
 }
 
+/// Writes a file anew: overwriting in place makes some file systems wait for the disk.
+fn put(path: &Path, bytes: &[u8]) {
+    let _ = fs::remove_file(path);
+    fs::write(path, bytes).unwrap();
+}
+
 fn damage(bytes: &mut Vec<u8>, random: &mut Random) -> &'static str {
     let place = random.below(bytes.len());
     match random.below(6) {
@@ -91,7 +98,7 @@ fn damage(bytes: &mut Vec<u8>, random: &mut Random) -> &'static str {
 fn sweep(is_finished: bool, seed: u64) -> Tally {
     let original = Original::new(is_finished);
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.mcap");
+    let path = folder.path().join("000.mcap");
     let mut random = Random(seed);
     let mut tally = Tally::default();
     for case in 0..4000 {
@@ -101,7 +108,7 @@ fn sweep(is_finished: bool, seed: u64) -> Tally {
         if bytes == original.bytes {
             continue;
         }
-        fs::write(&path, &bytes).unwrap();
+        put(&path, &bytes);
         match Session::open(&path) {
             Ok(session) => {
                 original.check(&session, &context);
@@ -146,11 +153,11 @@ fn every_prefix_keeps_every_whole_batch() {
     let rows = rows(500, 12);
     let bytes = log_bytes(&rows, &[], Some(end(Nanos::from_millis(500))));
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.mcap");
+    let path = folder.path().join("000.mcap");
     let mut most = 0;
     let mut openable = 0;
     for length in 0..bytes.len() {
-        fs::write(&path, &bytes[..length]).unwrap();
+        put(&path, &bytes[..length]);
         match Session::open(&path) {
             Ok(session) => {
                 assert!(same_bits(&session.rows, &rows[..session.rows.len()]));
@@ -175,8 +182,8 @@ fn damage_in_the_middle_is_refused_and_can_be_recovered_from() {
         let middle = bytes.len() / 2;
         bytes[middle..middle + 64].fill(0xa5);
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("session.mcap");
-        fs::write(&path, &bytes).unwrap();
+        let path = folder.path().join("000.mcap");
+        put(&path, &bytes);
         let refusal = Session::open(&path).unwrap_err();
         let ReadError::Damaged { offset, .. } = &refusal else {
             panic!("{refusal}");
@@ -205,8 +212,8 @@ fn absurd_lengths_are_refused() {
         frame.extend(length.to_le_bytes());
         bytes.splice(8..8, frame);
         let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("session.mcap");
-        fs::write(&path, &bytes).unwrap();
+        let path = folder.path().join("000.mcap");
+        put(&path, &bytes);
         assert!(
             Session::open(&path).is_err(),
             "opcode {opcode}, length {length}"
@@ -218,8 +225,8 @@ fn absurd_lengths_are_refused() {
     assert_eq!(bytes[chunk], 6);
     bytes[chunk + 9 + 16..chunk + 9 + 24].copy_from_slice(&(1u64 << 50).to_le_bytes());
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.mcap");
-    fs::write(&path, &bytes).unwrap();
+    let path = folder.path().join("000.mcap");
+    put(&path, &bytes);
     let refusal = Session::open(&path).unwrap_err().to_string();
     assert!(refusal.contains("larger than any chunk"), "{refusal}");
 }

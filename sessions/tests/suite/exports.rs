@@ -118,7 +118,8 @@ except ImportError:
     print('no pyarrow'); sys.exit(0)
 t = pq.read_table(sys.argv[1])
 m = t.schema.metadata
-print(json.dumps([t.num_rows, json.loads(m[b'palpate.columns'])['force_N'],
+assert pq.read_metadata(sys.argv[1]).metadata[b'palpate.columns'] == m[b'palpate.columns']
+print(json.dumps([t.num_rows, str(t['counts'].type), str(t['cycle'].type), str(t['phase'].type), json.loads(m[b'palpate.columns'])['force_N'],
     m[b'palpate.session'].decode(), t['force_N'].null_count, t['counts'].null_count,
     t['signal_V'][2999].as_py(), t['phase'][2999].as_py(), t['t_s'][2999].as_py()]))
 ";
@@ -142,6 +143,9 @@ print(json.dumps([t.num_rows, json.loads(m[b'palpate.columns'])['force_N'],
         .count();
     let expected = serde_json::json!([
         3000,
+        "int32",
+        "uint32",
+        "string",
         "N",
         session.manifest.session_id,
         nulls,
@@ -173,7 +177,7 @@ with open(sys.argv[1], 'rb') as file:
 print(json.dumps([session, topics]))
 ";
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.mcap");
+    let path = folder.path().join("000.mcap");
     std::fs::write(
         &path,
         log_bytes(&rows(1000, 42), &[], Some(end(Nanos::ZERO))),

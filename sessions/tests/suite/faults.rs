@@ -4,7 +4,7 @@ use palpate_sessions::{LogError, LogWriter, Pace, Row, SessionFolder, SessionWri
 
 /// Writes ten batches, syncing after each. Returns how many batches were reported as saved.
 fn write_until_failure(sink: MemorySink, rows: &[Row]) -> (usize, Result<(), LogError>) {
-    let mut log = match LogWriter::begin(sink, "/data/session.mcap", &manifest()) {
+    let mut log = match LogWriter::begin(sink, "/data/000.mcap", &manifest()) {
         Ok(log) => log,
         Err(err) => return (0, Err(err)),
     };
@@ -48,7 +48,7 @@ fn whatever_operation_fails_all_that_was_reported_saved_is_there() {
             failures += 1;
             let text = err.to_string();
             assert!(text.contains("No space left on device"), "{text}");
-            assert!(text.contains("/data/session.mcap"), "{text}");
+            assert!(text.contains("/data/000.mcap"), "{text}");
             match open_bytes(&memory.bytes) {
                 Ok(session) => {
                     // A batch torn in the index behind its chunk is there, though not reported.
@@ -73,7 +73,7 @@ fn the_thread_reports_its_failure_on_the_next_push_and_on_close() {
         let sink = MemorySink::default();
         sink.0.lock().unwrap().fail_at = Some(5);
         let mut writer =
-            SessionWriter::start_on(sink.clone(), "/data/session.mcap", &manifest(), pace).unwrap();
+            SessionWriter::start_on(sink.clone(), "/data/000.mcap", &manifest(), pace).unwrap();
         assert_eq!(writer.failure(), None);
         let rows = rows(1000, 22);
         let mut refused = None;
@@ -87,7 +87,7 @@ fn the_thread_reports_its_failure_on_the_next_push_and_on_close() {
             }
         }
         let err = refused.unwrap();
-        let expected = "cannot write the session log (No space left on device (os error 28)): /data/session.mcap; everything saved before is kept";
+        let expected = "cannot write the session log (No space left on device (os error 28)): /data/000.mcap; everything saved before is kept";
         assert_eq!(err.to_string(), expected);
         assert_eq!(writer.failure().as_deref(), Some(expected));
         assert_eq!(writer.close(end(Nanos::ZERO)), Err(err));
@@ -101,10 +101,10 @@ fn a_folder_that_cannot_be_written_refuses_the_start() {
     let parent = tempfile::tempdir().unwrap();
     let folder = SessionFolder::create(parent.path()).unwrap();
     // Somebody puts a log in the locked folder: it is not overwritten.
-    std::fs::write(parent.path().join("session.mcap"), "precious").unwrap();
+    std::fs::write(parent.path().join("000.mcap"), "precious").unwrap();
     let refusal = SessionWriter::start(folder, &manifest(), Pace::Virtual);
     let text = refusal.err().unwrap().to_string();
     assert!(text.contains("File exists"), "{text}");
-    let kept = std::fs::read(parent.path().join("session.mcap")).unwrap();
+    let kept = std::fs::read(parent.path().join("000.mcap")).unwrap();
     assert_eq!(kept, b"precious");
 }

@@ -35,7 +35,7 @@ fn a_session_comes_back_bit_for_bit_at_either_pace() {
         let ending = session.end.clone().unwrap();
         assert_eq!((ending.samples, ending.entries), (5000, 99));
         assert_eq!(ending.time_use, end(Nanos::ZERO).time_use);
-        let by_file = Session::open(&path.join("session.mcap")).unwrap();
+        let by_file = Session::open(&path.join("000.mcap")).unwrap();
         assert_eq!(by_file, session);
     }
 }

@@ -192,7 +192,7 @@ pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec
 /// Opens bytes as if they were a file.
 pub fn open_bytes(bytes: &[u8]) -> Result<Session, palpate_sessions::ReadError> {
     let folder = tempfile::tempdir().unwrap();
-    let path = folder.path().join("session.mcap");
+    let path = folder.path().join("000.mcap");
     std::fs::write(&path, bytes).unwrap();
     Session::open(&path)
 }
