@@ -39,7 +39,9 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
     rig.send(RigCommand::EnableMotor);
     let mut pause = 5;
     while seen.samples < 60_000 {
-        let event = rig.next_event(common::FOREVER).unwrap();
+        let Some(event) = rig.next_event(common::FOREVER) else {
+            panic!("the rig fell silent");
+        };
         match event.body {
             RigEventBody::Ack(ack) => match ack.command {
                 RigCommand::MoveTo(made) => {
@@ -62,7 +64,10 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
                 let miss = followed.distance_from(truth.position_counted()).abs();
                 assert!(miss < 1e-9, "seed {seed} tick {}: {miss} mm", reading.tick);
                 let is_moving = reading.status.has(AxisStatus::MOVING);
-                assert!(!(tracker.is_at_rest() && is_moving));
+                assert_eq!(tracker.is_at_rest(), !is_moving, "seed {seed}");
+                // Whole pulses at or below the position.
+                let part = truth.position_counted().0 / 0.015 - reading.pulses as f64;
+                assert!((-1e-5..1.0).contains(&part), "seed {seed}: {part}");
                 let at_limit = reading.status.has(AxisStatus::FORWARD_LIMIT)
                     || reading.status.has(AxisStatus::REVERSE_LIMIT);
                 seen.limits += u64::from(at_limit && is_moving);

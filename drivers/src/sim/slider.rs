@@ -96,7 +96,7 @@ impl Slider {
         self.is_just_halted = false;
         self.is_just_ended = false;
         let Some(motion) = self.motion else { return };
-        if tick > motion.start_tick && self.since(motion, tick).0 >= motion.profile.duration().0 {
+        if self.since(motion, tick).0 >= motion.profile.duration().0 {
             self.position = match motion.target_pulses {
                 Some(target) => position_from_pulses(target, self.mm_per_pulse),
                 None => self.whole_pulse_at(motion.profile.end()),
