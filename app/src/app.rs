@@ -50,6 +50,7 @@ pub struct WorkbenchApp {
     pub(crate) refusal: Option<String>,
     start: Start,
     is_closing: bool,
+    are_fonts_warm: bool,
     keys: Keys,
     meter: FrameMeter,
 }
@@ -93,6 +94,7 @@ impl WorkbenchApp {
             refusal: None,
             start: Start::None,
             is_closing: false,
+            are_fonts_warm: false,
             keys: Keys::default(),
             meter: FrameMeter::from_environment(),
         })
@@ -250,6 +252,9 @@ impl eframe::App for WorkbenchApp {
         let mut commands = Commands::default();
         let activity = activity(&self.snapshot, self.intent());
         self.draw(ui, &activity, &mut commands);
+        if !std::mem::replace(&mut self.are_fonts_warm, true) {
+            theme::warm_up_fonts(ui.ctx());
+        }
         let rig = &self.snapshot.rig;
         self.form
             .refresh(&rig.description, &self.bench, rig.is_homed);

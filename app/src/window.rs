@@ -21,8 +21,8 @@ use palpate_protocols::runner::TimeScale;
 use std::path::PathBuf;
 
 /// Widths of the panels beside the plots, in points.
-const LEFT_WIDTH: f32 = 306.0;
-const RIGHT_WIDTH: f32 = 292.0;
+const LEFT_WIDTH: f32 = 304.0;
+const RIGHT_WIDTH: f32 = 318.0;
 
 /// Height of the event log in points.
 const LOG_HEIGHT: f32 = 134.0;

@@ -7,6 +7,7 @@ use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_app::app::WorkbenchApp;
 use palpate_app::shell::activity::{is_motion_possible, run_in_progress};
+use palpate_app::shell::frame_meter::thread_cpu_s;
 use palpate_app::window::WindowOptions;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::Phase;
@@ -77,7 +78,11 @@ impl Flow {
             let run = window.state().snapshot().run.as_ref();
             run.is_some_and(|run| is_there(run) || is_stopped(run))
         });
-        assert!(self.run().is_some_and(|run| is_there(&run)), "{}", self.story());
+        assert!(
+            self.run().is_some_and(|run| is_there(&run)),
+            "{}",
+            self.story()
+        );
     }
 
     fn run(&self) -> Option<RunView> {
@@ -87,7 +92,9 @@ impl Flow {
     fn type_into(&mut self, name: &str, text: &str) {
         self.window.get_by_label(name).focus();
         self.window.step();
-        self.window.get_by_label(name).set_text_value_accesskit(text);
+        self.window
+            .get_by_label(name)
+            .set_text_value_accesskit(text);
         self.window.run_steps(2);
     }
 
@@ -98,11 +105,18 @@ impl Flow {
     }
 
     fn is_enabled(&self, name: &str) -> bool {
-        !self.window.get_by_label(name).accesskit_node().is_disabled()
+        !self
+            .window
+            .get_by_label(name)
+            .accesskit_node()
+            .is_disabled()
     }
 
     fn says(&self, words: &str) -> bool {
-        self.window.query_all_by_label_contains(words).next().is_some()
+        self.window
+            .query_all_by_label_contains(words)
+            .next()
+            .is_some()
     }
 
     fn sessions(&self) -> Vec<PathBuf> {
@@ -115,11 +129,9 @@ impl Flow {
     fn wait_for_end(&mut self) -> RunView {
         self.wait("the end of the run", |window| {
             let run = window.state().snapshot().run.as_ref();
-            run.is_some_and(|run| run.outcome.is_some() || run.holding.is_some())
+            run.is_some_and(|run| run.outcome.is_some())
         });
-        let run = self.run().unwrap();
-        assert!(run.outcome.is_some(), "{}", self.story());
-        run
+        self.run().unwrap()
     }
 }
 
@@ -159,7 +171,10 @@ fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
     assert_eq!(session.manifest.operator, "A. Tester");
     assert_eq!(session.rows.len() as u64, run.samples);
     flow.window.step();
-    assert!(flow.is_enabled("Start  F5"), "a second run must be possible");
+    assert!(
+        flow.is_enabled("Start  F5"),
+        "a second run must be possible"
+    );
 }
 
 #[test]
@@ -178,7 +193,10 @@ fn a_wrong_speed_gives_a_sentence_and_no_start() {
         assert!(!flow.is_enabled("Start  F5"));
         flow.window.key_press(Key::F5);
         flow.window.run_steps(5);
-        assert!(flow.run().is_none(), "F5 must not start what the button refuses");
+        assert!(
+            flow.run().is_none(),
+            "F5 must not start what the button refuses"
+        );
     }
     flow.type_into("speed", "1.5");
     assert!(flow.is_enabled("Start  F5"));
@@ -248,7 +266,10 @@ fn closing_while_moving_stops_first() {
     });
     assert!(!is_motion_possible(flow.window.state().snapshot()));
     let session = flow.sessions().remove(0);
-    let Flow { window, folder: _folder } = flow;
+    let Flow {
+        window,
+        folder: _folder,
+    } = flow;
     // eframe drops the app when the window closes; the runner then closes the session.
     drop(window);
     let session = Session::open(&session).unwrap();
@@ -311,18 +332,21 @@ fn frames_of_a_run_stay_within_their_budget() {
     flow.wait_for_phase(Phase::Ramp);
     let mut frame_ms: Vec<f64> = Vec::new();
     while frame_ms.len() < 200 {
-        let watch = palpate_protocols::runner::Stopwatch::start();
+        let start = thread_cpu_s().unwrap();
         flow.window.step();
         let output = flow.window.output();
         let meshes = flow.window.ctx.tessellate(output.shapes.clone(), 1.0);
-        frame_ms.push(watch.seconds() * 1e3);
+        frame_ms.push((thread_cpu_s().unwrap() - start) * 1e3);
         assert!(!meshes.is_empty());
         std::thread::sleep(FRAME);
     }
     frame_ms.sort_by(f64::total_cmp);
     let (median, max) = (frame_ms[100], frame_ms[199]);
-    println!("layout and tessellation: median {median:.2} ms, maximum {max:.2} ms of 200 frames");
-    // The maximum belongs to whoever else uses this computer; the median is ours. It includes
-    // the harness's accessibility tree, which a window without a screen reader does not build.
+    println!(
+        "CPU of layout and tessellation: median {median:.2} ms, maximum {max:.2} ms of 200 frames"
+    );
+    // CPU time, so that other programs do not count. It includes the harness's accessibility
+    // tree, which a window without a screen reader does not build; the maximum is only printed
+    // because a cold cache after a switch to another program counts, too.
     assert!(median < 8.0, "the median frame took {median:.2} ms");
 }

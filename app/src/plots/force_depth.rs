@@ -1,15 +1,16 @@
 //! Force over depth, from the moment contact is known.
 
 use super::points::PlotCache;
+use super::style::quiet;
 use crate::theme::Tokens;
 use eframe::egui::Ui;
-use egui_plot::{HoverPosition, Plot, PlotPoints, Points};
+use egui_plot::{Plot, PlotPoints, Points};
 
 /// Draws the plot in the space there is. `depth_mm` is the depth the form or the run asks for,
 /// so the axis does not creep while the probe goes in.
 pub fn force_depth_ui(ui: &mut Ui, cache: &PlotCache, depth_mm: f64) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let plot = quiet(Plot::new("force_depth"))
+    let plot = quiet(Plot::new("force_depth"), tokens)
         .x_axis_label("depth from contact (mm)")
         .y_axis_label("force above tare (N)")
         .include_x(0.0)
@@ -29,19 +30,4 @@ pub fn force_depth_ui(ui: &mut Ui, cache: &PlotCache, depth_mm: f64) {
             );
         }
     });
-}
-
-/// What both plots have in common.
-pub(super) fn quiet(plot: Plot<'_>) -> Plot<'_> {
-    plot.show_x(true)
-        .show_y(true)
-        .allow_scroll(false)
-        .set_margin_fraction(eframe::egui::vec2(0.01, 0.04))
-        .y_axis_min_width(34.0)
-        .label_formatter(|hover| match hover {
-            HoverPosition::NearDataPoint { position, .. } => {
-                Some(format!("{:.3}\n{:.4} N", position.x, position.y))
-            }
-            HoverPosition::Elsewhere { .. } => None,
-        })
 }

@@ -1,9 +1,10 @@
 //! Force over session time: phases shaded, the interlock's limit drawn.
 
 use super::points::{PlotCache, phase_spans};
+use super::style::quiet;
 use crate::theme::Tokens;
-use eframe::egui::{Ui, Vec2b};
-use egui_plot::{HLine, LineStyle, Plot, Span};
+use eframe::egui::{Align2, Color32, Ui, Vec2b};
+use egui_plot::{HLine, LineStyle, Plot, PlotPoint, Span, Text};
 use palpate_model::rig::Phase;
 use palpate_model::units::Newtons;
 use palpate_protocols::runner::RunView;
@@ -18,6 +19,9 @@ pub enum TimeView {
     FromRamp,
 }
 
+/// Seconds shown before the ramp.
+const LEAD_S: f64 = 2.0;
+
 /// Draws the plot in the space there is.
 pub fn force_time_ui(
     ui: &mut Ui,
@@ -31,23 +35,24 @@ pub fn force_time_ui(
         .filter(|_| view == TimeView::FromRamp)
         .and_then(ramp_start);
     let now = run.map_or(60.0, |run| run.now.seconds().0.max(1.0));
-    let plot = super::force_depth::quiet(Plot::new("force_time"))
+    let plot = quiet(Plot::new("force_time"), tokens)
         .x_axis_label("session time (s)")
         .y_axis_label("force above tare (N)")
         .include_y(-0.5)
+        // Room above the limit for the names of the phases.
+        .include_y(1.12 * force_max.0)
         .include_x(now)
         .auto_bounds(Vec2b::new(from.is_none(), true));
     plot.show(ui, |plot_ui| {
         if let Some(start) = from {
-            plot_ui.set_plot_bounds_x(start - 2.0..=now.max(start + 1.0));
+            plot_ui.set_plot_bounds_x(start - LEAD_S..=now.max(start + 1.0));
         }
         if let Some(run) = run {
-            // A stretch of one colour has no name on it where it would not fit.
             for (i, span) in phase_spans(run).enumerate() {
                 let fill = if i % 2 == 0 {
-                    tokens.phase_band
+                    Color32::TRANSPARENT
                 } else {
-                    tokens.canvas
+                    tokens.phase_band
                 };
                 plot_ui.span(
                     Span::new(span.phase.name(), span.start..=span.end)
@@ -56,6 +61,18 @@ pub fn force_time_ui(
                 );
             }
         }
+        // At the left edge as it will be: the text's own place counts in the automatic bounds.
+        let left = from.map_or(0.0, |start| start - LEAD_S);
+        plot_ui.text(
+            Text::new(
+                "limit",
+                PlotPoint::new(left, force_max.0),
+                format!(" interlock at {force_max:.1}"),
+            )
+            .anchor(Align2::LEFT_TOP)
+            .color(tokens.text_quiet)
+            .allow_hover(false),
+        );
         plot_ui.hline(
             HLine::new("interlock", force_max.0)
                 .color(tokens.limit)

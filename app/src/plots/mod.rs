@@ -3,5 +3,6 @@
 pub mod force_depth;
 pub mod force_time;
 mod points;
+mod style;
 
 pub use points::PlotCache;

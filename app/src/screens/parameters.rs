@@ -21,6 +21,7 @@ const SHOWN: [(&str, &str); 7] = [
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.spacing_mut().interact_size.y = 18.0;
     let live = run.and_then(|run| run.live.as_ref());
     let find = |name: &str| {
         live.and_then(|live| {
@@ -58,10 +59,10 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
 fn row_ui(ui: &mut Ui, name: &str, unit: &str, parameter: Option<&Parameter>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
-        cell(ui, 56.0, |ui| {
+        cell(ui, 54.0, |ui| {
             ui.label(RichText::new(name).color(tokens.text_quiet));
         });
-        cell(ui, 148.0, |ui| {
+        cell(ui, 166.0, |ui| {
             let text = value_text(parameter);
             let ink = if is_known(parameter) {
                 tokens.text
@@ -70,8 +71,14 @@ fn row_ui(ui: &mut Ui, name: &str, unit: &str, parameter: Option<&Parameter>) {
             };
             ui.label(RichText::new(text).monospace().color(ink));
         });
+        let unit = typeset(unit);
         ui.label(RichText::new(unit).color(tokens.text_quiet).small());
     });
+}
+
+/// A unit as it is printed rather than typed.
+fn typeset(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³").replace('*', "·")
 }
 
 fn cell(ui: &mut Ui, width: f32, content: impl FnOnce(&mut Ui)) {
@@ -155,6 +162,14 @@ mod tests {
             value_text(Some(&parameter("mu1", Some(0.1)))),
             "1.50 ± 0.10"
         );
+    }
+
+    #[test]
+    fn every_unit_is_typeset() {
+        for (_, unit) in SHOWN {
+            assert!(!typeset(unit).contains(['^', '*']), "{unit}");
+        }
+        assert_eq!(typeset("N*s/mm^2"), "N·s/mm²");
     }
 
     #[test]

@@ -4,11 +4,11 @@ use super::form::ProtocolForm;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
 use crate::widgets::uncertain::clock;
-use eframe::egui::{RichText, Ui};
+use eframe::egui::{Checkbox, RichText, Ui};
 use palpate_protocols::preview::Preview;
 
 /// Draws durations, forces and storage, then refusals, the acknowledgement and notes.
-pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm) {
+pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm, is_busy: bool) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let Some(checked) = form.checked() else {
         ui.label(
@@ -33,10 +33,8 @@ pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm) {
             ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
         }
         let mut is_acknowledged = form.is_acknowledged();
-        if ui
-            .checkbox(&mut is_acknowledged, "I accept this; it is recorded")
-            .changed()
-        {
+        let tick = Checkbox::new(&mut is_acknowledged, "I accept this; it is recorded");
+        if ui.add_enabled(!is_busy, tick).changed() {
             form.acknowledge(is_acknowledged);
         }
     }

@@ -19,6 +19,9 @@ pub struct ProtocolFacts<'a> {
     pub is_dialog_open: bool,
 }
 
+/// Opacity of locked fields; enough contrast is left to read their values.
+const LOCKED_ALPHA: f32 = 0.8;
+
 /// Draws the form and the preview.
 pub fn protocol_ui(
     ui: &mut Ui,
@@ -27,17 +30,28 @@ pub fn protocol_ui(
     commands: &mut Commands,
 ) {
     section_ui(ui, "Ramp and hold");
-    ui.add_enabled_ui(!facts.is_busy, |ui| {
-        text_ui(ui, "operator", &mut form.labels.operator);
-        text_ui(ui, "specimen", &mut form.labels.specimen);
-        text_ui(ui, "indenter", &mut form.labels.indenter);
-        quantity_ui(ui, "speed", "mm/s", &mut form.speed);
-        quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
-        quantity_ui(ui, "hold", "s", &mut form.hold);
-        folder_ui(ui, form, facts, commands);
-        section_ui(ui, "Preview");
-        preview_ui(ui, form);
+    ui.scope(|ui| {
+        // Locked while a run goes on, but still to be read: it says what is running.
+        ui.visuals_mut().disabled_alpha = LOCKED_ALPHA;
+        ui.add_enabled_ui(!facts.is_busy, |ui| fields_ui(ui, form, facts, commands));
     });
+    section_ui(ui, "Preview");
+    preview_ui(ui, form, facts.is_busy);
+}
+
+fn fields_ui(
+    ui: &mut Ui,
+    form: &mut ProtocolForm,
+    facts: &ProtocolFacts<'_>,
+    commands: &mut Commands,
+) {
+    text_ui(ui, "operator", &mut form.labels.operator);
+    text_ui(ui, "specimen", &mut form.labels.specimen);
+    text_ui(ui, "indenter", &mut form.labels.indenter);
+    quantity_ui(ui, "speed", "mm/s", &mut form.speed);
+    quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
+    quantity_ui(ui, "hold", "s", &mut form.hold);
+    folder_ui(ui, form, facts, commands);
 }
 
 fn folder_ui(

@@ -49,11 +49,12 @@ fn reading_ui(ui: &mut Ui, rig: &RigView, reading: &Reading) {
     fact_ui(ui, "signal", format!("{:.4}{counts}", reading.volts));
     let position = position_from_pulses(reading.pulses, rig.description.mm_per_pulse);
     let place = if rig.is_homed {
-        format!("{:.3} from home  ({} pulses)", position, reading.pulses)
+        format!("{position:.3} from home")
     } else {
-        format!("not homed  ({} pulses)", reading.pulses)
+        "not homed".into()
     };
     fact_ui(ui, "position", place);
+    fact_ui(ui, "counter", format!("{} pulses", reading.pulses));
     fact_ui(ui, "axis", axis_words(reading.status));
 }
 

@@ -56,12 +56,11 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
     ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
         ui.set_width(270.0);
         ui.spacing_mut().item_spacing.y = 2.0;
-        let specimen = if specimen.trim().is_empty() {
-            "no name"
-        } else {
-            specimen
+        let specimen = match specimen.trim() {
+            "" => "specimen not named".to_string(),
+            name => format!("specimen {name}"),
         };
-        ui.add(Label::new(format!("specimen {specimen}")).truncate());
+        ui.add(Label::new(specimen).truncate());
         let (line, fraction) = match run {
             Some(run) => (run_line(run), run.fraction),
             None => ("no run yet".into(), 0.0),

@@ -73,3 +73,30 @@ fn set_type(style: &mut Style) {
     // Nothing slides or fades on an instrument; it also keeps an idle window from repainting.
     style.animation_time = 0.0;
 }
+
+/// Characters of sentences, and those that only numbers read from afar have.
+const SENTENCE_CHARS: std::ops::RangeInclusive<char> = ' '..='~';
+const READING_CHARS: &str = "-.0123456789";
+
+/// Times a character is laid out in a row, so that it falls on each of the four fractions of a
+/// pixel at which egui keeps a picture of it.
+const REPEATS: usize = 6;
+
+/// Draws every character of every size into the font atlas. Called in the first frame: a word
+/// that first appears in a run would else cost a frame of it several milliseconds.
+pub fn warm_up_fonts(ctx: &Context) {
+    let style = ctx.global_style();
+    for (name, font) in &style.text_styles {
+        let text: String = if *name == reading_style() {
+            READING_CHARS.chars().flat_map(repeated).collect()
+        } else {
+            SENTENCE_CHARS.flat_map(repeated).collect()
+        };
+        let color = style.visuals.text_color();
+        ctx.fonts_mut(|fonts| fonts.layout_no_wrap(text, font.clone(), color));
+    }
+}
+
+fn repeated(character: char) -> impl Iterator<Item = char> {
+    std::iter::repeat_n(character, REPEATS)
+}

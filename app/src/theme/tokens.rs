@@ -41,7 +41,7 @@ pub struct Tokens {
     pub series: Color32,
     /// Interlock limits in plots: Okabe-Ito vermillion.
     pub limit: Color32,
-    /// Shading of every other phase in plots.
+    /// Shading of every other phase in plots; translucent, so the grid shows through.
     pub phase_band: Color32,
 }
 
@@ -69,7 +69,7 @@ pub const LIGHT: Tokens = Tokens {
     alarm_text: Color32::from_rgb(0xA3, 0x1E, 0x12),
     series: Color32::from_rgb(0x00, 0x72, 0xB2),
     limit: Color32::from_rgb(0xD5, 0x5E, 0x00),
-    phase_band: grey(0xF0),
+    phase_band: Color32::from_black_alpha(14),
 };
 
 /// For dim rooms.
@@ -92,7 +92,7 @@ pub const DARK: Tokens = Tokens {
     alarm_text: Color32::from_rgb(0xFF, 0x9C, 0x8A),
     series: Color32::from_rgb(0x56, 0xB4, 0xE9),
     limit: Color32::from_rgb(0xD5, 0x5E, 0x00),
-    phase_band: grey(0x24),
+    phase_band: Color32::from_rgba_premultiplied(14, 14, 14, 14),
 };
 
 impl Tokens {
@@ -125,6 +125,11 @@ mod tests {
         (a.max(b) + 0.05) / (a.min(b) + 0.05)
     }
 
+    /// A phase's shading as it stands on the canvas.
+    fn band(tokens: &Tokens) -> Color32 {
+        tokens.canvas.blend(tokens.phase_band)
+    }
+
     #[test]
     fn text_is_readable_on_everything_it_stands_on() {
         assert!((contrast(grey(0), grey(255)) - 21.0).abs() < 1e-9);
@@ -135,9 +140,10 @@ mod tests {
                 (tokens.text, tokens.control),
                 (tokens.text, tokens.control_hover),
                 (tokens.text, tokens.selection),
+                (tokens.text, band(tokens)),
                 (tokens.text_quiet, tokens.panel),
                 (tokens.text_quiet, tokens.canvas),
-                (tokens.text_quiet, tokens.phase_band),
+                (tokens.text_quiet, band(tokens)),
                 (tokens.alarm_text, tokens.panel),
                 (tokens.alarm_text, tokens.canvas),
                 (tokens.on_active, tokens.active_fill),
@@ -155,7 +161,7 @@ mod tests {
     fn lines_in_plots_stand_out_from_their_ground() {
         for tokens in [&LIGHT, &DARK] {
             for line in [tokens.series, tokens.limit] {
-                for ground in [tokens.canvas, tokens.phase_band] {
+                for ground in [tokens.canvas, band(tokens)] {
                     // WCAG 2.2 success criterion 1.4.11, graphical objects.
                     assert!(contrast(line, ground) >= 3.0, "{line:?} on {ground:?}");
                 }

@@ -4,7 +4,7 @@ use crate::theme::Tokens;
 use eframe::egui::{Align, Label, Layout, RichText, Sense, Ui, vec2};
 
 /// Width of the names.
-pub const NAME_WIDTH: f32 = 92.0;
+pub const NAME_WIDTH: f32 = 72.0;
 
 /// Draws one fact; values wrap under themselves.
 pub fn fact_ui(ui: &mut Ui, name: &str, value: impl Into<String>) {

@@ -1,5 +1,8 @@
 //! Values with their uncertainty, rounded to what the uncertainty supports.
 
+/// Smallest error that plain digits show: two significant digits in five decimals.
+const SHORTEST_PLAIN_ERROR: f64 = 1e-4;
+
 /// `value ± error`, the error to two significant digits and the value to the same decimal, in
 /// one common power of ten where plain digits would be long (GUM 7.2.6: one or two digits).
 #[must_use]
@@ -8,11 +11,8 @@ pub fn with_error(value: f64, error: f64) -> String {
         return plain(value);
     }
     let magnitude = value.abs().max(error).log10().floor() as i32;
-    let exponent = if (-3..5).contains(&magnitude) {
-        0
-    } else {
-        magnitude
-    };
+    let are_digits_short = magnitude < 5 && error >= SHORTEST_PLAIN_ERROR;
+    let exponent = if are_digits_short { 0 } else { magnitude };
     let scale = 10f64.powi(exponent);
     let (value, error) = (value / scale, error / scale);
     let decimals = (1 - error.log10().floor() as i32).clamp(0, 6) as usize;
@@ -66,11 +66,13 @@ mod tests {
     #[test]
     fn the_error_rules_the_digits() {
         for (value, error, text) in [
-            (1.023_45, 0.002_1, "1.0235 ± 0.0021"),
+            (1.023_47, 0.002_1, "1.0235 ± 0.0021"),
             (-0.5, 0.13, "-0.50 ± 0.13"),
             (41.235_4, 0.006, "41.2354 ± 0.0060"),
             (1234.5, 25.0, "1234 ± 25"),
             (4.12e-5, 3.1e-7, "(4.120 ± 0.031)e-5"),
+            (-0.008_732, 2.9e-6, "(-8.7320 ± 0.0029)e-3"),
+            (0.985_73, 0.000_99, "0.98573 ± 0.00099"),
             (0.0, 2.0e-6, "(0.0 ± 2.0)e-6"),
             (5.0, f64::NAN, "5.000"),
         ] {

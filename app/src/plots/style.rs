@@ -1,0 +1,101 @@
+//! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
+
+use crate::theme::Tokens;
+use eframe::egui::{Rangef, vec2};
+use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
+
+/// Labelled lines across the width of a plot, at most.
+const MARKS_ACROSS: f64 = 9.0;
+
+/// Unlabelled lines between two labelled ones.
+const MINOR_PER_MAJOR: f64 = 5.0;
+
+/// Gives a plot the common look.
+pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+    plot.allow_scroll(false)
+        .set_margin_fraction(vec2(0.01, 0.03))
+        .grid_color(tokens.line)
+        // Points between two lines at which they begin to show and are drawn in full.
+        .grid_spacing(Rangef::new(10.0, 70.0))
+        .x_grid_spacer(round_marks)
+        .y_axis_min_width(34.0)
+        .label_formatter(|hover| match hover {
+            HoverPosition::NearDataPoint { position, .. } => {
+                Some(format!("{:.3}\n{:.4} N", position.x, position.y))
+            }
+            HoverPosition::Elsewhere { .. } => None,
+        })
+}
+
+/// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
+fn round_marks(input: GridInput) -> Vec<GridMark> {
+    let (low, high) = input.bounds;
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) {
+        return Vec::new();
+    }
+    let major = round_up(span / MARKS_ACROSS);
+    let minor = major / MINOR_PER_MAJOR;
+    // The bounds hold at most ten majors, so at most fifty minors and two at the edges.
+    let (first, last) = ((low / minor).ceil() as i64, (high / minor).floor() as i64);
+    (first..=last)
+        .map(|i| GridMark {
+            value: i as f64 * minor,
+            step_size: if i % MINOR_PER_MAJOR as i64 == 0 {
+                major
+            } else {
+                minor
+            },
+        })
+        .collect()
+}
+
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+fn round_up(least: f64) -> f64 {
+    let power = 10f64.powf(least.log10().floor());
+    // 1e-9 forgives the rounding of the logarithm.
+    let round = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|factor| factor * power >= least * (1.0 - 1e-9));
+    round.unwrap_or(10.0) * power
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn steps_are_round_and_never_too_small() {
+        for (least, step) in [
+            (17.8, 20.0),
+            (0.1, 0.1),
+            (3.4, 5.0),
+            (6.0, 10.0),
+            (1e-5, 1e-5),
+        ] {
+            assert!((round_up(least) / step - 1.0).abs() < 1e-9, "{least}");
+        }
+    }
+
+    #[test]
+    fn a_run_is_labelled_at_round_seconds() {
+        let marks = |low: f64, high: f64| {
+            round_marks(GridInput {
+                bounds: (low, high),
+                base_step_size: 1.0,
+            })
+        };
+        let labelled: Vec<f64> = marks(-1.6, 158.0)
+            .iter()
+            .filter(|mark| mark.step_size > 10.0)
+            .map(|mark| mark.value)
+            .collect();
+        assert_eq!(labelled.len(), 8);
+        for (i, value) in labelled.iter().enumerate() {
+            assert!((value - 20.0 * i as f64).abs() < 1e-9);
+        }
+        assert!(marks(0.0, f64::INFINITY).is_empty());
+        assert!(marks(1.0, 1.0).is_empty());
+        assert!(marks(-1e-300, 1e-300).len() < 70);
+    }
+}
