@@ -1,5 +1,7 @@
 //! The fit finds the body that made the record, and its errors mean what they say.
 
+#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
+
 mod support;
 
 use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, fit};

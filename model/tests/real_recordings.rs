@@ -1,6 +1,12 @@
 //! Recordings of real tissue, kept outside the repository because of their licences. Each test says
 //! so and passes when its file is absent.
 
+#![expect(
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "helpers of tests fail by panicking and say why they skip"
+)]
+
 use palpate_model::fit::{FitOptions, FitSample, fit};
 use palpate_model::{Depth, Newtons, Seconds};
 use std::path::Path;

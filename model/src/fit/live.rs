@@ -5,6 +5,7 @@
 //! between nodes by polynomials in log tau. Gram matrices lose half the digits, which a display
 //! can afford and a report cannot: [`super::fit`] works on the samples.
 
+use super::live_stencil::{Solution, Stencil};
 use super::options::{PARAMETER_NAMES, PARAMETER_UNITS};
 use super::report::Parameter;
 use crate::units::{Depth, Newtons, Seconds};
@@ -12,16 +13,13 @@ use crate::viscoelastic::psi_all;
 use serde::{Deserialize, Serialize};
 
 /// Relaxation times in the bank and their range in s: soft tissue from a tap to a creep test.
-const NODES: usize = 64;
+pub(super) const NODES: usize = 64;
 const TAU_RANGE: [f64; 2] = [0.01, 1000.0];
 
 /// Columns: three orthogonal depth terms, the viscous one, initial force, offset; then the force.
-const COLUMNS: usize = 6;
+pub(super) const COLUMNS: usize = 6;
 const WIDTH: usize = COLUMNS + 1;
 const GRAM: usize = WIDTH * (WIDTH + 1) / 2;
-
-/// Nodes used to refine between nodes: a polynomial of degree five.
-const STENCIL: usize = 6;
 
 /// A scaled pivot below this is rounding: the columns cannot be told apart.
 const PIVOT_MIN: f64 = 1e-10;
@@ -83,15 +81,6 @@ pub struct LiveEstimate {
     pub rmse_n: f64,
     /// Samples taken.
     pub samples: u64,
-}
-
-/// One node's linear solution: mu1, mu2, mu3, tau_sig, f0, f_offset in their units, their
-/// variances per unit of residual variance, and the residual sum.
-#[derive(Clone, Copy)]
-struct Solution {
-    values: [f64; COLUMNS],
-    variances: [f64; COLUMNS],
-    residual: f64,
 }
 
 impl LiveFit {
@@ -348,75 +337,6 @@ fn fold(gram: &mut [Lane], batch: &Batch) {
                     + (a2[node] * b2[node] + a3[node] * b3[node]);
             }
         }
-    }
-}
-
-/// Six neighbouring solutions and the polynomials through them, in units of the node spacing.
-struct Stencil {
-    first: usize,
-    solutions: [Solution; STENCIL],
-}
-
-impl Stencil {
-    fn around(best: usize, solutions: &[Option<Solution>]) -> Option<Self> {
-        let ideal = best.saturating_sub(STENCIL / 2 - 1).min(NODES - STENCIL);
-        // Next to nodes that cannot be solved the stencil leans the other way.
-        let starts = (0..=NODES - STENCIL).filter(|first| {
-            (first + 1..first + STENCIL - 1).contains(&best)
-                && solutions[*first..first + STENCIL]
-                    .iter()
-                    .all(Option::is_some)
-        });
-        let first = starts.min_by_key(|first| first.abs_diff(ideal))?;
-        let mut chosen = solutions[first..first + STENCIL].iter().flatten();
-        let head = *chosen.next()?;
-        let mut stencil = Self {
-            first,
-            solutions: [head; STENCIL],
-        };
-        for (slot, solution) in stencil.solutions[1..].iter_mut().zip(chosen) {
-            *slot = *solution;
-        }
-        Some(stencil)
-    }
-
-    /// Value at `offset` nodes from the first of the polynomial through the six (Lagrange).
-    fn at(&self, offset: f64, of: impl Fn(&Solution) -> f64) -> f64 {
-        (0..STENCIL)
-            .map(|i| {
-                let weight: f64 = (0..STENCIL)
-                    .filter(|&j| j != i)
-                    .map(|j| (offset - j as f64) / (i as f64 - j as f64))
-                    .product();
-                weight * of(&self.solutions[i])
-            })
-            .sum()
-    }
-
-    /// Where the residual sum is smallest, and its second derivative there.
-    fn minimum(&self) -> Option<(f64, f64)> {
-        let residual = |offset: f64| self.at(offset, |solution| solution.residual);
-        let best = (0..STENCIL).min_by(|&a, &b| {
-            self.solutions[a]
-                .residual
-                .total_cmp(&self.solutions[b].residual)
-        })?;
-        let (mut low, mut high) = (best as f64 - 1.0, best as f64 + 1.0);
-        // Golden section: forty steps shrink two spacings to 1e-8.
-        let golden = 0.5 * (5f64.sqrt() - 1.0);
-        for _ in 0..40 {
-            let (left, right) = (high - golden * (high - low), low + golden * (high - low));
-            if residual(left) < residual(right) {
-                high = right
-            } else {
-                low = left
-            }
-        }
-        let offset = 0.5 * (low + high);
-        let h = 0.05;
-        let curvature =
-            (residual(offset - h) - 2.0 * residual(offset) + residual(offset + h)) / (h * h);
-        (curvature > 0.0).then_some((offset, curvature))
     }
 }
 

@@ -7,6 +7,7 @@
 mod design;
 mod identify;
 mod live;
+mod live_stencil;
 mod options;
 mod problem;
 mod refine;
