@@ -8,6 +8,7 @@ use crate::plans::Plan;
 use crate::runner::{LiveFeed, to_json};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
+use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_model::units::Volts;
 use palpate_sessions::log::Session;
@@ -24,8 +25,12 @@ use thiserror::Error;
 /// turn into less than this, in mm and N.
 pub const TOLERANCE_DERIVED: f64 = 1e-9;
 
-/// The live fit accumulates over the whole run; relative.
-pub const TOLERANCE_LIVE: f64 = 1e-6;
+/// Residuals of the live fit; relative. Its Gram matrices keep about eight digits.
+pub const TOLERANCE_LIVE_RMSE: f64 = 1e-6;
+
+/// Parameters of the live fit, in standard errors: what nobody could see on the display. A
+/// parameter that is not identified has no value to agree on.
+pub const TOLERANCE_LIVE_SIGMAS: f64 = 0.01;
 
 /// A session cannot be replayed at all.
 #[derive(Debug, Error)]
@@ -212,7 +217,7 @@ struct Replay<'a> {
     live: LiveFeed,
     recorded: Vec<&'a Entry>,
     is_finished: bool,
-    expected_live: VecDeque<Value>,
+    expected_live: VecDeque<LiveEstimate>,
     blessings: &'a [Blessing],
     report: ReplayReport,
 }
@@ -222,10 +227,13 @@ impl Replay<'_> {
     fn feed_inputs(&mut self, inputs: &mut VecDeque<RecordedInput>, index: u64) {
         while let Some(next) = inputs.pop_front_if(|next| next.after_sample <= index) {
             if let Input::LiveFit(estimate) = &next.input {
-                let recorded = to_json(estimate);
-                let recomputed = self.expected_live.pop_front().unwrap_or(Value::Null);
-                if !agree(&recorded, &recomputed, TOLERANCE_LIVE) {
-                    self.differ(next.now, index, "live fit", None, recorded, recomputed);
+                let recomputed = self.expected_live.pop_front();
+                if !recomputed
+                    .as_ref()
+                    .is_some_and(|again| is_same_fit(estimate, again))
+                {
+                    let (recorded, now) = (to_json(estimate), to_json(&recomputed));
+                    self.differ(next.now, index, "live fit", None, recorded, now);
                 }
             }
             self.step(next.now, next.after_sample, next.input);
@@ -245,7 +253,7 @@ impl Replay<'_> {
         let derived = *state.derived();
         let (phase, cycle) = (state.phase(), state.cycle());
         if let Some(estimate) = self.live.push(&reading, state) {
-            self.expected_live.push_back(to_json(&estimate));
+            self.expected_live.push_back(estimate);
         }
         let force = (row.force, derived.force.map(|force| force.0));
         let depth = (row.depth, derived.depth.map(|depth| depth.0));
@@ -368,6 +376,20 @@ impl Replay<'_> {
             now,
         });
     }
+}
+
+/// Whether two live fits say the same.
+fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
+    let is_same_rmse = (a.rmse_n - b.rmse_n).abs() <= TOLERANCE_LIVE_RMSE * a.rmse_n.abs();
+    let mut pairs = a.parameters.iter().zip(&b.parameters);
+    a.samples == b.samples
+        && is_same_rmse
+        && pairs.all(|(a, b)| match (a.std_error, b.std_error) {
+            (Some(error), Some(_)) => {
+                a.name == b.name && (a.value - b.value).abs() <= TOLERANCE_LIVE_SIGMAS * error
+            }
+            _ => a.name == b.name,
+        })
 }
 
 /// Whether two JSON values are equal, numbers within a relative (above 1) or absolute tolerance.

@@ -104,7 +104,8 @@ impl PathTracker {
                 start_tick,
                 is_stopping,
             } => {
-                let mut since = Seconds((reading.tick - *start_tick) as f64 * self.tick.0);
+                let mut since =
+                    Seconds(reading.tick.saturating_sub(*start_tick) as f64 * self.tick.0);
                 if reading.status.has(AxisStatus::STOPPING) && !*is_stopping {
                     *profile = profile.stopped_at(since);
                     *start_tick = reading.tick;

@@ -63,6 +63,10 @@ pub(super) struct Trip {
 /// Samples in each of the two means whose difference is the force rate.
 const RATE_SAMPLES: usize = 10;
 
+/// So many equal samples are a dead cell: with noise of a few counts each has a chance of at
+/// most a half.
+const STUCK_SAMPLES: u32 = 100;
+
 /// While the operator retracts after an over-force the limits that stopped the run are already
 /// exceeded; the ceiling becomes what was felt at the start of the retract plus this.
 const RETRACT_HEADROOM: Newtons = Newtons(0.5);
@@ -78,6 +82,8 @@ pub(super) struct Watch {
     recent_count: usize,
     retract_ceiling: Option<(Newtons, Volts)>,
     newest: (Newtons, Volts),
+    /// Consecutive samples with exactly the newest signal.
+    same_count: u32,
 }
 
 impl Watch {
@@ -95,6 +101,16 @@ impl Watch {
     /// The signal's zero moved (tare): forces before and after do not compare.
     pub fn forget_rate(&mut self) {
         self.recent_count = 0;
+    }
+
+    /// Whether the signal stands still; takes the newest.
+    fn is_stuck(&mut self, volts: Volts) -> bool {
+        self.same_count = if volts == self.newest.1 {
+            self.same_count + 1
+        } else {
+            0
+        };
+        self.same_count >= STUCK_SAMPLES
     }
 
     /// Change of force between the two newest means, in N/s, once there are enough samples.
@@ -125,6 +141,12 @@ pub(super) fn judge(
         return trip(
             Interlock::Signal,
             "the load cell's signal is not a number; check its wiring".into(),
+        );
+    }
+    if state.watch.is_stuck(reading.volts) {
+        return trip(
+            Interlock::Signal,
+            format!("the signal has not changed for {STUCK_SAMPLES} samples; check the load cell"),
         );
     }
     let force = state.force_from_volts(reading.volts);

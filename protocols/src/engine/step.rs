@@ -11,7 +11,7 @@ use super::stop;
 use super::tare::Taring;
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, Reading, RigCommand};
+use palpate_model::rig::{Ack, Fault, PathTracker, Reading, RigCommand};
 use palpate_model::units::{Depth, Position, Seconds};
 
 /// Longest time a controller may take to acknowledge a command.
@@ -222,6 +222,8 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
     match fault {
         Fault::LinkLost { .. } | Fault::ControllerReset => {
             cx.state.is_homed = false;
+            // What the tracker knew of the path ended with the link.
+            cx.state.path = PathTracker::new(&cx.state.config.rig);
             on_trip(
                 cx,
                 Trip {
@@ -239,6 +241,10 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
         ),
         Fault::CommandRefused { .. } => {
             cx.state.unacknowledged.clear();
+            // A refused stop is not repeated for ever: braking has its time limit, then the halt.
+            if stop::is_braking(cx.state) {
+                return;
+            }
             stop::begin(cx, EndingKind::Abort, reason);
         }
         Fault::LogFailed { .. } => stop::begin(cx, EndingKind::Abort, reason),

@@ -37,22 +37,28 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
     };
     cx.state.power = Power::Stopped;
     cx.state.in_flight = None;
-    if is_halt {
-        // A stepper cut at speed may lose steps.
-        cx.state.is_homed = false;
-    }
     // Any operator stop reaches the rig, also when the engine believes the axis at rest.
-    cx.command(if is_halt {
-        RigCommand::Halt
+    if is_halt {
+        cut(cx);
     } else {
-        RigCommand::Stop
-    });
+        cx.command(RigCommand::Stop);
+    }
     cx.enter_phase(Phase::Stopped);
-    let deadline = cx.now + Nanos::from_seconds(BRAKE_MAX);
+    let deadline = match cx.state.activity {
+        Activity::Braking { deadline, .. } => deadline,
+        _ => cx.now + Nanos::from_seconds(BRAKE_MAX),
+    };
     cx.state.activity = Activity::Braking {
         ending: outcome,
         deadline,
     };
+}
+
+/// Cuts the motion. A stepper cut at speed may lose steps, so its position is no longer known.
+fn cut(cx: &mut Context<'_>) {
+    cx.state.is_halted = true;
+    cx.state.is_homed = false;
+    cx.command(RigCommand::Halt);
 }
 
 /// Whether the axis is already being stopped.
@@ -64,8 +70,15 @@ pub(super) fn is_braking(state: &State) -> bool {
 pub(super) fn on_time(cx: &mut Context<'_>) {
     match cx.state.activity.clone() {
         Activity::Braking { ending, deadline } => {
-            let is_silent = cx.now > deadline;
-            if (cx.state.path.is_at_rest() && cx.state.unacknowledged.is_empty()) || is_silent {
+            let is_late = cx.now > deadline;
+            if cx.state.path.is_at_rest() && (cx.state.unacknowledged.is_empty() || is_late) {
+                cx.state.activity = Activity::Holding { ending };
+            } else if is_late && !cx.state.is_halted {
+                // It should have stopped long ago: cut the motion, whatever that costs in steps.
+                cut(cx);
+                let deadline = cx.now + Nanos::from_seconds(BRAKE_MAX);
+                cx.state.activity = Activity::Braking { ending, deadline };
+            } else if is_late {
                 cx.state.activity = Activity::Holding { ending };
             }
         }

@@ -358,3 +358,12 @@ impl MainLoop {
         }
     }
 }
+
+impl Drop for MainLoop {
+    /// If anything here ever panics, the axis still stops.
+    fn drop(&mut self) {
+        if std::thread::panicking() {
+            self.rig.send(RigCommand::Stop);
+        }
+    }
+}

@@ -101,9 +101,8 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
             new_session_folder(&library, &session_id)
         }
     };
+    check_free_space(&path, preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
-    check_free_space(folder.path(), preview.storage_bytes)
-        .map_err(|err| refused(err.to_string()))?;
 
     let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
         value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))

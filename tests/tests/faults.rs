@@ -1,0 +1,121 @@
+//! Whatever fails, the run ends with its reason, the axis stopped and the session closed.
+
+use palpate_drivers::Rig;
+use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
+use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Limits};
+use palpate_model::units::{Depth, MmPerS, Seconds, Volts};
+use palpate_protocols::plans::RampHold;
+use palpate_protocols::replay::replay;
+use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
+use palpate_sessions::Session;
+use std::path::Path;
+use std::sync::mpsc::sync_channel;
+
+fn request(rig: &SimRig, out: &Path) -> RunRequest {
+    let params = RampHold {
+        speed: MmPerS(3.0),
+        depth: Depth(12.0),
+        hold: Seconds(2.0),
+    };
+    RunRequest {
+        plan: params.plan(),
+        calibration: rig.calibration(),
+        limits: Limits::for_travel(rig.description().travel),
+        out: Some(out.to_path_buf()),
+        labels: Labels::default(),
+        is_acknowledged: false,
+        after_stop: AfterStop::Close,
+    }
+}
+
+/// Runs with one scripted fault and returns the session.
+fn run_with(kind: FaultKind, at: Nanos) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("session");
+    let rig = SimRig::new(SimSettings::default());
+    let request = request(&rig, &out);
+    let faulty = FaultyRig::new(rig, vec![ScriptedFault::from(at, kind)], 5);
+    let (reply, answer) = sync_channel(1);
+    let (wake, woken) = sync_channel(1);
+    let first = Request::Run(Box::new(request), reply);
+    let runner = Runner::start(Box::new(faulty), TimeScale::Max, Some(first), move || {
+        let _ = wake.try_send(());
+    })
+    .unwrap();
+    answer.recv().unwrap().unwrap();
+    while runner
+        .snapshot()
+        .run
+        .as_ref()
+        .is_none_or(|run| run.outcome.is_none())
+    {
+        woken
+            .recv_timeout(std::time::Duration::from_secs(60))
+            .expect("the run does not end");
+    }
+    drop(runner);
+    Session::open(&out).unwrap()
+}
+
+/// Half a minute into the run the probe is in the contact search, most of the time moving.
+const MID_RUN: Nanos = Nanos::from_millis(30_000);
+
+#[test]
+fn every_fault_ends_the_run_with_its_reason_and_replays() {
+    for (kind, ending, word) in [
+        (FaultKind::Silent, "interlock", "no sample"),
+        (
+            FaultKind::Late(Nanos::from_millis(400)),
+            "interlock",
+            "no sample",
+        ),
+        (FaultKind::NotANumber, "interlock", "not a number"),
+        (FaultKind::Saturated(Rail::High), "interlock", ""),
+        (FaultKind::Saturated(Rail::Low), "interlock", "tension"),
+        (FaultKind::Stuck, "interlock", "has not changed"),
+        (FaultKind::Disconnect, "interlock", "link"),
+        (FaultKind::Reset, "interlock", "restarted"),
+        (FaultKind::UnannouncedReset, "interlock", "restarted"),
+        (FaultKind::LostSteps(4), "interlock", "path"),
+        (FaultKind::SignalJump(Volts(1.0)), "interlock", "force"),
+        (FaultKind::RefuseCommands, "abort", "refused"),
+    ] {
+        let name = format!("{kind:?}");
+        let session = run_with(kind, MID_RUN);
+        let end = session
+            .end
+            .as_ref()
+            .unwrap_or_else(|| panic!("{name}: no end record"));
+        assert_eq!(end.outcome, ending, "{name}: {}", end.reason);
+        assert!(end.reason.contains(word), "{name}: {}", end.reason);
+        let report = replay(&session, &[]).unwrap();
+        assert_eq!(report.first_difference, None, "{name}");
+        if let Some(last) = session.rows.last() {
+            let is_moving = AxisStatus(last.status).has(AxisStatus::MOVING);
+            let is_seen = !matches!(
+                name.as_str(),
+                "Silent" | "Disconnect" | "NotANumber" | "RefuseCommands"
+            );
+            assert!(
+                !is_moving || !is_seen,
+                "{name}: still moving at the last sample"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_noisy_cell_is_refused_before_anything_moves() {
+    let session = run_with(FaultKind::Noisy(Volts(0.02)), Nanos::ZERO);
+    let end = session.end.unwrap();
+    assert_eq!(end.outcome, "abort");
+    assert!(end.reason.contains("noise"), "{}", end.reason);
+    assert!(
+        session
+            .rows
+            .iter()
+            .all(|row| !AxisStatus(row.status).has(AxisStatus::MOVING))
+    );
+}
