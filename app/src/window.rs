@@ -4,7 +4,7 @@ use crate::app::WorkbenchApp;
 use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{TimeView, force_time_ui};
-use crate::screens::protocol_panel::{ProtocolFacts, protocol_ui, start_ui};
+use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
 use crate::shell::activity::{Activity, Intent, run_in_progress};
@@ -123,14 +123,20 @@ impl WorkbenchApp {
 
     fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let verdict = self.start_verdict();
+        let is_busy = run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None;
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
             .show(ui, |ui| {
-                start_ui(ui, &verdict, self.refusal.as_deref(), commands);
+                let facts = StartFacts {
+                    is_busy,
+                    verdict: &verdict,
+                    refusal: self.refusal.as_deref(),
+                };
+                start_ui(ui, &mut self.form, &facts, commands);
             });
         let facts = ProtocolFacts {
-            is_busy: run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None,
+            is_busy,
             library: &self.library,
             is_dialog_open: self.dialog.is_open(),
         };

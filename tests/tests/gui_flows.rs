@@ -1,6 +1,7 @@
 //! Flows through the window by accessible name: no display, no graphics card, no pixels.
 //!
 //! Every wait is bounded by a count of frames, so a flow that hangs fails instead.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;
@@ -297,7 +298,7 @@ fn forces_beyond_the_calibration_ask_for_an_acknowledgement() {
     flow.type_into("depth", "45");
     assert!(flow.says("calibrated only up to"));
     assert!(!flow.is_enabled("Start  F5"));
-    assert!(flow.says("tick the acknowledgement"));
+    assert!(flow.says("tick the box"));
     flow.click(tick);
     assert!(flow.is_enabled("Start  F5"));
     // Other forces, other words: they ask anew.

@@ -4,8 +4,9 @@ use crate::theme::Tokens;
 use eframe::egui::{Rangef, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
 
-/// Labelled lines across the width of a plot, at most.
-const MARKS_ACROSS: f64 = 9.0;
+/// Labelled steps across the width and up the height of a plot, at most.
+const STEPS_ACROSS: f64 = 9.0;
+const STEPS_UP: f64 = 6.0;
 
 /// Unlabelled lines between two labelled ones.
 const MINOR_PER_MAJOR: f64 = 5.0;
@@ -17,7 +18,10 @@ pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         .grid_color(tokens.line)
         // Points between two lines at which they begin to show and are drawn in full.
         .grid_spacing(Rangef::new(10.0, 70.0))
-        .x_grid_spacer(round_marks)
+        .x_grid_spacer(|input| round_marks(input, STEPS_ACROSS))
+        .y_grid_spacer(|input| round_marks(input, STEPS_UP))
+        .x_axis_formatter(|mark, _| mark_text(mark))
+        .y_axis_formatter(|mark, _| mark_text(mark))
         .y_axis_min_width(34.0)
         .label_formatter(|hover| match hover {
             HoverPosition::NearDataPoint { position, .. } => {
@@ -28,13 +32,13 @@ pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
-fn round_marks(input: GridInput) -> Vec<GridMark> {
+fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {
         return Vec::new();
     }
-    let major = round_up(span / MARKS_ACROSS);
+    let major = round_up(span / steps_max);
     let minor = major / MINOR_PER_MAJOR;
     // The bounds hold at most ten majors, so at most fifty minors and two at the edges.
     let (first, last) = ((low / minor).ceil() as i64, (high / minor).floor() as i64);
@@ -48,6 +52,12 @@ fn round_marks(input: GridInput) -> Vec<GridMark> {
             },
         })
         .collect()
+}
+
+/// A mark's value with the decimals its step needs: egui's own rounding shows 0.5 as 0.
+fn mark_text(mark: GridMark) -> String {
+    let decimals = (-mark.step_size.log10().floor()).clamp(0.0, 9.0) as usize;
+    format!("{:.decimals$}", mark.value)
 }
 
 /// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
@@ -78,12 +88,25 @@ mod tests {
     }
 
     #[test]
+    fn labels_show_the_decimals_of_their_step() {
+        for (value, step_size, text) in [
+            (-0.5, 0.5, "-0.5"),
+            (20.0, 10.0, "20"),
+            (0.04, 0.02, "0.04"),
+            (1e4, 5e3, "10000"),
+        ] {
+            assert_eq!(mark_text(GridMark { value, step_size }), text);
+        }
+    }
+
+    #[test]
     fn a_run_is_labelled_at_round_seconds() {
         let marks = |low: f64, high: f64| {
-            round_marks(GridInput {
+            let input = GridInput {
                 bounds: (low, high),
                 base_step_size: 1.0,
-            })
+            };
+            round_marks(input, STEPS_ACROSS)
         };
         let labelled: Vec<f64> = marks(-1.6, 158.0)
             .iter()

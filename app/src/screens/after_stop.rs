@@ -4,8 +4,7 @@ use crate::command::{Command, Commands};
 use crate::shell::activity::is_planned;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::reason_button::reason_button;
-use eframe::egui::{Label, RichText, Ui, vec2};
+use eframe::egui::{Button, Label, RichText, Ui, vec2};
 use palpate_protocols::engine::Outcome;
 use palpate_protocols::runner::RunView;
 
@@ -18,13 +17,28 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     } else if let Some(ending) = &run.holding {
         section_ui(ui, "Run stopped, axis holds");
         outcome_ui(ui, ending);
-        let size = vec2(112.0, 28.0);
-        if reason_button(ui, "Retract  F8", size, &run.can_retract) {
+        choices_ui(ui, run, commands);
+    }
+}
+
+/// The two ways on, with the reason if one of them is closed.
+fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let button = |text: &'static str| Button::new(text).min_size(vec2(112.0, 28.0));
+    ui.horizontal(|ui| {
+        if ui
+            .add_enabled(run.can_retract.is_ok(), button("Retract  F8"))
+            .clicked()
+        {
             commands.push(Command::Retract);
         }
-        if reason_button(ui, "Close session", size, &Ok(())) {
+        if ui.add(button("Close session")).clicked() {
             commands.push(Command::CloseSession);
         }
+    });
+    if let Err(reason) = &run.can_retract {
+        let text = format!("No retract: {reason}");
+        ui.add(Label::new(RichText::new(text).color(tokens.text_quiet).small()).wrap());
     }
 }
 

@@ -145,7 +145,7 @@ impl ProtocolForm {
             && !checked.preview.acknowledgements.is_empty()
             && !self.is_acknowledged()
         {
-            return Err("tick the acknowledgement above first".into());
+            return Err("tick the box above first".into());
         }
         checked.preview.verdict(self.is_acknowledged())
     }
@@ -262,7 +262,7 @@ mod tests {
     #[test]
     fn an_acknowledgement_holds_for_its_words_only() {
         let (mut form, bench) = form_with("0.75", "45", "50");
-        assert!(form.verdict().unwrap_err().contains("acknowledgement"));
+        assert!(form.verdict().unwrap_err().contains("tick the box"));
         form.acknowledge(true);
         assert_eq!(form.verdict(), Ok(()));
         assert!(form.request(&bench).unwrap().is_acknowledged);

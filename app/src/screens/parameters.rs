@@ -21,27 +21,25 @@ const SHOWN: [(&str, &str); 7] = [
 /// Draws one row per parameter.
 pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.spacing_mut().interact_size.y = 18.0;
     let live = run.and_then(|run| run.live.as_ref());
-    let find = |name: &str| {
-        live.and_then(|live| {
-            live.parameters
-                .iter()
-                .find(|parameter| parameter.name == name)
-        })
-    };
-    for (name, unit) in SHOWN {
-        let parameter = find(name);
-        row_ui(
-            ui,
-            name,
-            parameter.map_or(unit, |parameter| &parameter.unit),
-            parameter,
-        );
-    }
-    let remark = match (run, live) {
-        (None, _) => Some("parameters appear during the ramp".to_string()),
-        (Some(run), live) => remark(run.phase, live.map(|live| live.parameters.as_slice())),
+    let found = live.map_or(&[][..], |live| live.parameters.as_slice());
+    ui.scope(|ui| {
+        // Seven rows of numbers read better close together.
+        ui.spacing_mut().interact_size.y = 18.0;
+        ui.spacing_mut().item_spacing.y = 2.0;
+        for (name, unit) in SHOWN {
+            let parameter = found.iter().find(|parameter| parameter.name == name);
+            row_ui(
+                ui,
+                name,
+                parameter.map_or(unit, |known| &known.unit),
+                parameter,
+            );
+        }
+    });
+    let remark = match run {
+        None => Some("parameters appear during the ramp".to_string()),
+        Some(run) => remark(run.phase, found),
     };
     if let Some(live) = live {
         let text = format!(
@@ -106,14 +104,11 @@ fn value_text(parameter: Option<&Parameter>) -> String {
 }
 
 /// Why something is not known yet, or never became known; `None` when all is known.
-fn remark(phase: Phase, parameters: Option<&[Parameter]>) -> Option<String> {
+fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
     let missing: Vec<&str> = SHOWN
         .iter()
         .map(|(name, _)| *name)
-        .filter(|name| {
-            let found = parameters.unwrap_or(&[]);
-            !is_known(found.iter().find(|parameter| parameter.name == *name))
-        })
+        .filter(|name| !is_known(parameters.iter().find(|parameter| parameter.name == *name)))
         .collect();
     if missing.is_empty() {
         return None;
@@ -174,15 +169,15 @@ mod tests {
 
     #[test]
     fn the_remark_names_what_is_missing_and_why() {
-        let early = remark(Phase::Contact, None).unwrap();
+        let early = remark(Phase::Contact, &[]).unwrap();
         assert!(early.contains("none known") && early.contains("not indented"));
         let mut known: Vec<Parameter> = SHOWN
             .iter()
             .map(|(name, _)| parameter(name, Some(0.1)))
             .collect();
-        assert_eq!(remark(Phase::Hold, Some(&known)), None);
+        assert_eq!(remark(Phase::Hold, &known), None);
         known[4].std_error = None;
-        let text = remark(Phase::Ramp, Some(&known)).unwrap();
+        let text = remark(Phase::Ramp, &known).unwrap();
         assert!(
             text.contains("tau_sig not yet") && text.contains("ramp"),
             "{text}"

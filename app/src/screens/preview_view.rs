@@ -7,8 +7,8 @@ use crate::widgets::uncertain::clock;
 use eframe::egui::{Checkbox, RichText, Ui};
 use palpate_protocols::preview::Preview;
 
-/// Draws durations, forces and storage, then refusals, the acknowledgement and notes.
-pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm, is_busy: bool) {
+/// Draws durations, forces and storage, then refusals and notes.
+pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let Some(checked) = form.checked() else {
         ui.label(
@@ -16,8 +16,8 @@ pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm, is_busy: bool) {
         );
         return;
     };
-    let preview = checked.preview.clone();
-    numbers_ui(ui, &preview);
+    let preview = &checked.preview;
+    numbers_ui(ui, preview);
     for refusal in &preview.refusals {
         ui.label(RichText::new(format!("Refused: {refusal}")).color(tokens.alarm_text));
     }
@@ -28,15 +28,24 @@ pub fn preview_ui(ui: &mut Ui, form: &mut ProtocolForm, is_busy: bool) {
                 .small(),
         );
     }
-    if !preview.acknowledgements.is_empty() {
-        for warning in &preview.acknowledgements {
-            ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
-        }
-        let mut is_acknowledged = form.is_acknowledged();
-        let tick = Checkbox::new(&mut is_acknowledged, "I accept this; it is recorded");
-        if ui.add_enabled(!is_busy, tick).changed() {
-            form.acknowledge(is_acknowledged);
-        }
+}
+
+/// Draws what the preview asks to acknowledge, with the box to tick; nothing if it asks nothing.
+pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let warnings = form.checked().map_or(Vec::new(), |checked| {
+        checked.preview.acknowledgements.clone()
+    });
+    if warnings.is_empty() {
+        return;
+    }
+    for warning in &warnings {
+        ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
+    }
+    let mut is_acknowledged = form.is_acknowledged();
+    let tick = Checkbox::new(&mut is_acknowledged, "I accept this; it is recorded");
+    if ui.add(tick).changed() {
+        form.acknowledge(is_acknowledged);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The protocol: who, what, how fast, how deep, how long, where to; and the start.
 
 use super::form::ProtocolForm;
-use super::preview_view::preview_ui;
+use super::preview_view::{acknowledgement_ui, preview_ui};
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
@@ -36,7 +36,7 @@ pub fn protocol_ui(
         ui.add_enabled_ui(!facts.is_busy, |ui| fields_ui(ui, form, facts, commands));
     });
     section_ui(ui, "Preview");
-    preview_ui(ui, form, facts.is_busy);
+    preview_ui(ui, form);
 }
 
 fn fields_ui(
@@ -83,20 +83,34 @@ fn folder_ui(
     }
 }
 
-/// Draws the start strip: the button, why it cannot be pressed, and the last refusal.
+/// What the start strip says.
+pub struct StartFacts<'a> {
+    /// Whether a run is in progress or about to start.
+    pub is_busy: bool,
+    /// Whether the form may start a run, or why not.
+    pub verdict: &'a Result<(), String>,
+    /// Why the last start was refused.
+    pub refusal: Option<&'a str>,
+}
+
+/// Draws the start strip, which never scrolls away: what to acknowledge, the button, why it cannot
+/// be pressed, and the last refusal.
 pub fn start_ui(
     ui: &mut Ui,
-    verdict: &Result<(), String>,
-    refusal: Option<&str>,
+    form: &mut ProtocolForm,
+    facts: &StartFacts<'_>,
     commands: &mut Commands,
 ) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
+    if !facts.is_busy {
+        acknowledgement_ui(ui, form);
+    }
     ui.horizontal(|ui| {
-        if reason_button(ui, "Start  F5", vec2(104.0, 34.0), verdict) {
+        if reason_button(ui, "Start  F5", vec2(104.0, 34.0), facts.verdict) {
             commands.push(Command::Start);
         }
     });
-    if let Some(refusal) = refusal {
+    if let Some(refusal) = facts.refusal {
         ui.label(RichText::new(format!("Not started: {refusal}")).color(tokens.alarm_text));
     }
 }

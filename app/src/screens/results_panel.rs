@@ -55,6 +55,7 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
 }
 
 fn steps_ui(ui: &mut Ui, run: &RunView) {
+    ui.spacing_mut().item_spacing.y = 2.0;
     let is_running = run.outcome.is_none() && run.holding.is_none();
     let is_complete = run
         .outcome

@@ -61,17 +61,16 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
             name => format!("specimen {name}"),
         };
         ui.add(Label::new(specimen).truncate());
-        let (line, fraction) = match run {
-            Some(run) => (run_line(run), run.fraction),
-            None => ("no run yet".into(), 0.0),
-        };
+        let line = run.map_or_else(|| "no run yet".into(), run_line);
         ui.add(Label::new(RichText::new(line).color(tokens.text_quiet)).truncate());
-        ui.add(
-            ProgressBar::new(fraction as f32)
-                .desired_height(10.0)
-                .corner_radius(2)
-                .fill(tokens.text_quiet),
-        );
+        if let Some(run) = run {
+            ui.add(
+                ProgressBar::new(run.fraction as f32)
+                    .desired_height(10.0)
+                    .corner_radius(2)
+                    .fill(tokens.text_quiet),
+            );
+        }
     });
 }
 

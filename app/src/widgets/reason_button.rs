@@ -1,7 +1,7 @@
 //! A button that, when it cannot be pressed, says why in words beside it.
 
 use crate::theme::Tokens;
-use eframe::egui::{Button, RichText, Ui, Vec2};
+use eframe::egui::{Button, Label, RichText, Ui, Vec2};
 
 /// Draws the button; `verdict` both enables it and gives the reason. True when pressed.
 pub fn reason_button(
@@ -15,7 +15,8 @@ pub fn reason_button(
         .add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size))
         .clicked();
     if let Err(reason) = verdict {
-        ui.label(RichText::new(reason).color(tokens.text_quiet).small());
+        let reason = RichText::new(reason).color(tokens.text_quiet).small();
+        ui.add(Label::new(reason).wrap());
     }
     is_pressed
 }
