@@ -340,8 +340,9 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
 
 fn log_file(session: &Path) -> PathBuf {
     std::fs::read_dir(session)
-        .unwrap()
-        .map(|entry| entry.unwrap().path())
+        .expect("a session folder")
+        .flatten()
+        .map(|entry| entry.path())
         .find(|path| {
             path.extension()
                 .is_some_and(|extension| extension == "mcap")

@@ -24,10 +24,8 @@ impl<const N: usize> Triangle<N> {
             let norm = a.hypot(b);
             let (cos, sin) = (a / norm, b / norm);
             self.r[i][i] = norm;
-            for j in i + 1..N {
-                let (top, bottom) = (self.r[i][j], row[j]);
-                self.r[i][j] = cos * top + sin * bottom;
-                row[j] = cos * bottom - sin * top;
+            for (top, bottom) in self.r[i].iter_mut().zip(&mut row).skip(i + 1) {
+                (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
             }
         }
     }

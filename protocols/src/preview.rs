@@ -230,7 +230,7 @@ impl Walk<'_> {
 
     fn check_depth(&mut self, depth: Depth) {
         let travel = self.limits.travel_max;
-        if !(depth.0 > 0.0) {
+        if depth.0.is_nan() || depth.0 <= 0.0 {
             self.refusals.push(format!(
                 "ramp: a depth of {depth} is not possible; give a depth above 0 mm"
             ));

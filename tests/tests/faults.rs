@@ -1,4 +1,5 @@
 //! Whatever fails, the run ends with its reason, the axis stopped and the session closed.
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
 use palpate_drivers::Rig;
 use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};

@@ -1,8 +1,8 @@
 //! Whole protocols: the pure engine against the simulated rig, without disk or threads.
 
+use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
-use palpate_drivers::Rig;
 use palpate_protocols::engine::{EndingKind, Record};
 use palpate_protocols::plans::RampHold;
 use palpate_tests::simulated::run;

@@ -25,29 +25,51 @@ fn dependencies(package: &str) -> BTreeSet<String> {
 #[test]
 fn crates_only_use_what_is_below_them() {
     let ours = |package: &str| -> Vec<String> {
-        dependencies(package).into_iter().filter(|name| name.starts_with("palpate-")).collect()
+        dependencies(package)
+            .into_iter()
+            .filter(|name| name.starts_with("palpate-"))
+            .collect()
     };
     assert!(ours("model").is_empty());
     assert_eq!(ours("drivers"), ["palpate-model"]);
     assert_eq!(ours("sessions"), ["palpate-model"]);
-    assert_eq!(ours("protocols"), ["palpate-drivers", "palpate-model", "palpate-sessions"]);
+    assert_eq!(
+        ours("protocols"),
+        ["palpate-drivers", "palpate-model", "palpate-sessions"]
+    );
     for package in CRATES.iter().filter(|package| **package != "tests") {
-        assert!(!dependencies(package).contains("palpate-tests"), "{package} uses the tests");
+        assert!(
+            !dependencies(package).contains("palpate-tests"),
+            "{package} uses the tests"
+        );
     }
 }
 
 #[test]
 fn crates_do_not_use_what_is_forbidden_to_them() {
     let allowed_in_model = BTreeSet::from(["argmin", "serde", "thiserror"].map(String::from));
-    assert!(dependencies("model").is_subset(&allowed_in_model), "{:?}", dependencies("model"));
+    assert!(
+        dependencies("model").is_subset(&allowed_in_model),
+        "{:?}",
+        dependencies("model")
+    );
     for (package, forbidden) in [
-        ("drivers", &["eframe", "egui_plot", "polars", "mcap", "rfd"][..]),
+        (
+            "drivers",
+            &["eframe", "egui_plot", "polars", "mcap", "rfd"][..],
+        ),
         ("sessions", &["eframe", "egui_plot", "serialport", "rfd"]),
-        ("protocols", &["eframe", "egui_plot", "serialport", "polars", "rfd", "mcap"]),
+        (
+            "protocols",
+            &["eframe", "egui_plot", "serialport", "polars", "rfd", "mcap"],
+        ),
         ("app", &["serialport", "polars", "mcap"]),
     ] {
         for name in forbidden {
-            assert!(!dependencies(package).contains(*name), "{package} uses {name}");
+            assert!(
+                !dependencies(package).contains(*name),
+                "{package} uses {name}"
+            );
         }
     }
 }
@@ -59,8 +81,19 @@ fn engine_and_plans_import_nothing_but_the_model() {
         assert!(!files.is_empty());
         for file in files {
             let text = fs::read_to_string(&file).unwrap();
-            for forbidden in ["palpate_drivers", "palpate_sessions", "std::fs", "std::thread", "std::time", "std::io"] {
-                assert!(!text.contains(forbidden), "{} uses {forbidden}", file.display());
+            for forbidden in [
+                "palpate_drivers",
+                "palpate_sessions",
+                "std::fs",
+                "std::thread",
+                "std::time",
+                "std::io",
+            ] {
+                assert!(
+                    !text.contains(forbidden),
+                    "{} uses {forbidden}",
+                    file.display()
+                );
             }
         }
     }
@@ -72,7 +105,11 @@ fn only_the_runner_sends_commands_to_a_rig() {
         for file in files_below(&workspace().join(package).join("src"), "rs") {
             let text = fs::read_to_string(&file).unwrap();
             let is_runner = file.ends_with("runner/main_loop.rs");
-            assert!(is_runner || !text.contains("rig.send("), "{}", file.display());
+            assert!(
+                is_runner || !text.contains("rig.send("),
+                "{}",
+                file.display()
+            );
         }
     }
 }
@@ -84,8 +121,18 @@ fn colours_live_in_the_tokens() {
             continue;
         }
         let text = fs::read_to_string(&file).unwrap();
-        for literal in ["Color32::from_rgb", "Color32::from_gray", "Color32::RED", "Color32::from_hex", "Rgba::from"] {
-            assert!(!text.contains(literal), "{} has a colour of its own: {literal}", file.display());
+        for literal in [
+            "Color32::from_rgb",
+            "Color32::from_gray",
+            "Color32::RED",
+            "Color32::from_hex",
+            "Rgba::from",
+        ] {
+            assert!(
+                !text.contains(literal),
+                "{} has a colour of its own: {literal}",
+                file.display()
+            );
         }
     }
 }
@@ -95,7 +142,11 @@ fn doubles_are_for_tests_only() {
     for package in ["app", "protocols", "sessions"] {
         for file in files_below(&workspace().join(package).join("src"), "rs") {
             let text = fs::read_to_string(&file).unwrap();
-            assert!(!text.contains("doubles"), "{} names a test double", file.display());
+            assert!(
+                !text.contains("doubles"),
+                "{} names a test double",
+                file.display()
+            );
         }
     }
 }
@@ -105,7 +156,11 @@ fn files_stay_readable() {
     for package in CRATES {
         for file in files_below(&workspace().join(package), "rs") {
             let lines = fs::read_to_string(&file).unwrap().lines().count();
-            assert!(lines <= 800, "{} has {lines} lines; split it or write a decision page", file.display());
+            assert!(
+                lines <= 800,
+                "{} has {lines} lines; split it or write a decision page",
+                file.display()
+            );
         }
     }
 }
@@ -113,13 +168,29 @@ fn files_stay_readable() {
 #[test]
 fn every_package_takes_the_workspace_lints_and_explains_itself() {
     for package in CRATES {
-        assert!(read(&format!("{package}/Cargo.toml")).contains("[lints]\nworkspace = true"), "{package}");
-        assert!(read(&format!("{package}/src/lib.rs")).starts_with("//! "), "{package}");
+        assert!(
+            read(&format!("{package}/Cargo.toml")).contains("[lints]\nworkspace = true"),
+            "{package}"
+        );
+        assert!(
+            read(&format!("{package}/src/lib.rs")).starts_with("//! "),
+            "{package}"
+        );
     }
-    for page in ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+    for page in [
+        "README.md",
+        "ARCHITECTURE.md",
+        "CONTRIBUTING.md",
+        "CHANGELOG.md",
+        "LICENSE-MIT",
+        "LICENSE-APACHE",
+    ] {
         assert!(!read(page).is_empty());
     }
-    assert!(read("README.md").contains("docs/pictures/window.png"), "the README shows the window");
+    assert!(
+        read("README.md").contains("docs/pictures/window.png"),
+        "the README shows the window"
+    );
     assert!(workspace().join("docs/pictures/window.png").exists());
 }
 
@@ -127,8 +198,14 @@ fn every_package_takes_the_workspace_lints_and_explains_itself() {
 fn every_dependency_has_its_reason() {
     let reasons = read("ARCHITECTURE.md");
     for package in CRATES {
-        for name in dependencies(package).iter().filter(|name| !name.starts_with("palpate-")) {
-            assert!(reasons.contains(name.as_str()), "{name}, used by {package}, has no reason in ARCHITECTURE.md");
+        for name in dependencies(package)
+            .iter()
+            .filter(|name| !name.starts_with("palpate-"))
+        {
+            assert!(
+                reasons.contains(name.as_str()),
+                "{name}, used by {package}, has no reason in ARCHITECTURE.md"
+            );
         }
     }
 }
@@ -136,12 +213,20 @@ fn every_dependency_has_its_reason() {
 #[test]
 fn no_test_is_ignored_and_no_page_is_unsafe() {
     // Written in two halves so that this file does not find itself.
-    let banned = [["#[ign", "ore"].concat(), ["unsafe", " {"].concat(), ["to", "do!("].concat()];
+    let banned = [
+        ["#[ign", "ore"].concat(),
+        ["unsafe", " {"].concat(),
+        ["to", "do!("].concat(),
+    ];
     for package in CRATES {
         for file in files_below(&workspace().join(package), "rs") {
             let text = fs::read_to_string(&file).unwrap();
             for word in &banned {
-                assert!(!text.contains(word.as_str()), "{} has {word}", file.display());
+                assert!(
+                    !text.contains(word.as_str()),
+                    "{} has {word}",
+                    file.display()
+                );
             }
         }
     }

@@ -87,15 +87,16 @@ impl PathTracker {
         let reported = position_from_pulses(reading.pulses, self.mm_per_pulse);
         let at_rest = self.position.unwrap_or(reported);
         let is_moving = reading.status.has(AxisStatus::MOVING);
-        if is_moving && matches!(self.motion, Motion::Rest) {
-            if let Some(command) = self.pending.take() {
-                let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
-                self.motion = Motion::Moving {
-                    profile: Profile::to_rest(at_rest, target, command.speed, command.acceleration),
-                    start_tick: reading.tick,
-                    is_stopping: false,
-                };
-            }
+        if is_moving
+            && matches!(self.motion, Motion::Rest)
+            && let Some(command) = self.pending.take()
+        {
+            let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
+            self.motion = Motion::Moving {
+                profile: Profile::to_rest(at_rest, target, command.speed, command.acceleration),
+                start_tick: reading.tick,
+                is_stopping: false,
+            };
         }
         let position = match &mut self.motion {
             Motion::Rest => at_rest,
