@@ -143,7 +143,7 @@ fn doubles_are_for_tests_only() {
         for file in files_below(&workspace().join(package).join("src"), "rs") {
             let text = fs::read_to_string(&file).unwrap();
             assert!(
-                !text.contains("doubles"),
+                !text.contains("palpate_drivers::doubles"),
                 "{} names a test double",
                 file.display()
             );

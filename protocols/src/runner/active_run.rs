@@ -2,7 +2,7 @@
 
 use super::snapshot::{LogLine, RunView};
 use super::start::AfterStop;
-use crate::engine::{self, Config, Effect, Input, Operator, Outcome, Record, State};
+use crate::engine::{self, Config, Effect, EndingKind, Input, Operator, Outcome, Record, State};
 use crate::preview::Preview;
 use palpate_model::Nanos;
 use palpate_model::fit::LiveFit;
@@ -233,10 +233,11 @@ impl ActiveRun {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((now.seconds().0, *phase));
         }
-        let is_alarm = matches!(
-            record,
-            Record::InterlockTripped { .. } | Record::EndingStarted { .. }
-        );
+        let is_alarm = match record {
+            Record::InterlockTripped { .. } => true,
+            Record::EndingStarted { ending, .. } => is_alarming(*ending),
+            _ => false,
+        };
         self.note(LogLine {
             at: now,
             text: record.to_string(),
@@ -255,7 +256,7 @@ impl ActiveRun {
         self.note(LogLine {
             at: self.now,
             text: format!("{}: {}", outcome.ending, outcome.reason),
-            is_alarm: outcome.ending != engine::EndingKind::Finish,
+            is_alarm: is_alarming(outcome.ending),
         });
         let end = EndRecord {
             outcome: outcome.ending.name().into(),
@@ -336,6 +337,11 @@ impl ActiveRun {
         let done = self.now.seconds().0;
         (Seconds(left), done / (done + left).max(1e-9))
     }
+}
+
+/// Whether an ending needs attention; a stop the operator asked for does not.
+fn is_alarming(ending: EndingKind) -> bool {
+    !matches!(ending, EndingKind::Finish | EndingKind::Stop)
 }
 
 fn command_of(effect: &Effect) -> Option<RigCommand> {
