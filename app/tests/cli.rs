@@ -221,7 +221,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
         ),
         (run(&["--out", "full"]), "not empty"),
         (run(&["--out", "a-file/x"]), "a-file"),
-        (run(&["--out", "/proc/x"]), "/proc/x"),
+        (run(&["--out", "/proc/x"]), "/proc"),
         (vec!["fit", "nowhere"], "nowhere"),
         (vec!["fit", "noforce.csv"], "force"),
         (vec!["fit", "words.csv"], "line 3"),
@@ -422,5 +422,71 @@ fn a_killed_run_leaves_a_session_that_opens() {
         succeeded(&output);
         assert_eq!(json(&output)["is_complete"], false);
         succeeded(&palpate(at, &["replay", &name]));
+    }
+}
+
+/// A disk that fills up in mid-run: a 24 MB file system of its own, in a mount namespace.
+#[test]
+fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("disk")).unwrap();
+    let script = r#"
+        mount -t tmpfs -o size=24m none disk || exit 77
+        "$0" run ramp-hold --time-scale 50 --out disk/session 2>error.txt >/dev/null &
+        run=$!
+        until [ -s disk/session/000.mcap ]; do sleep 0.05; done
+        sleep 0.3
+        cat /dev/zero >disk/filler 2>/dev/null
+        wait $run; echo $? >exit.txt
+        cp -r disk/session saved
+    "#;
+    let done = Command::new("unshare")
+        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .output();
+    match done {
+        Ok(output) if output.status.code() == Some(0) => {}
+        other => {
+            println!("skipped: no mount namespace here ({other:?})");
+            return;
+        }
+    }
+    let said = std::fs::read_to_string(at.join("error.txt")).unwrap();
+    assert_eq!(
+        std::fs::read_to_string(at.join("exit.txt")).unwrap().trim(),
+        "1",
+        "{said}"
+    );
+    assert!(said.contains("No space left on device"), "{said}");
+    let info = json(&palpate(at, &["info", "saved", "--json"]));
+    assert_eq!(info["is_complete"], false);
+    assert!(info["samples"].as_u64().unwrap() > 1000, "{info}");
+    succeeded(&palpate(at, &["replay", "saved"]));
+}
+
+#[test]
+fn a_disk_without_room_is_refused_before_the_start() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("disk")).unwrap();
+    let script = r#"mount -t tmpfs -o size=4m none disk || exit 77
+        exec "$0" run ramp-hold --time-scale max --out disk/session"#;
+    let output = Command::new("unshare")
+        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .output();
+    match output {
+        Ok(output) if output.status.code() == Some(2) => {
+            assert!(
+                stderr(&output).contains("free some space"),
+                "{}",
+                stderr(&output)
+            );
+        }
+        Ok(output) if output.status.code() == Some(0) => panic!("it ran on a disk of 4 MB"),
+        other => println!("skipped: no mount namespace here ({other:?})"),
     }
 }
