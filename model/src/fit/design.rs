@@ -5,7 +5,9 @@
 //! `[mu1 X, mu2 X^2, mu3 X^3, tau_sig X^2, f0, f_offset]`.
 
 use super::options::LINEAR_COUNT;
-use crate::viscoelastic::{Compensated, PSI_COUNT, Pieces, StepWeights, forcing, psi_derivatives};
+use crate::viscoelastic::{
+    Compensated, NEGLIGIBLE, PSI_COUNT, Pieces, StepWeights, forcing, psi_derivatives,
+};
 
 /// Step lengths this close (relative) share their psi, corrected to first order; the remaining
 /// relative error is the square of this.
@@ -163,6 +165,9 @@ impl<const EXACT: bool> Columns<EXACT> {
             for ((q, old), sloped) in self.tau_slopes.iter_mut().zip(old).zip(sloped) {
                 // d r / d log tau = -r.
                 *q -= psi_0 * *q + r * (sloped - slope[0] * old);
+                if q.abs() < NEGLIGIBLE {
+                    *q = 0.0;
+                }
             }
             for (power, weighted) in self.powers.iter_mut().zip(weighted) {
                 power.relax(weighted, psi_0);
@@ -175,8 +180,8 @@ impl<const EXACT: bool> Columns<EXACT> {
             for (power, weighted) in self.powers.iter_mut().zip(weighted) {
                 power.value += weighted - psi_0 * power.value;
             }
-            self.viscous.value += drive - psi_0 * self.viscous.value;
-            self.decay.value -= psi_0 * self.decay.value;
+            self.viscous.relax(drive, psi_0);
+            self.decay.relax(0.0, psi_0);
         }
     }
 

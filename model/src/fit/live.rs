@@ -9,7 +9,7 @@ use super::live_stencil::{Solution, Stencil};
 use super::options::{PARAMETER_NAMES, PARAMETER_UNITS};
 use super::report::Parameter;
 use crate::units::{Depth, Newtons, Seconds};
-use crate::viscoelastic::psi_all;
+use crate::viscoelastic::{NEGLIGIBLE, psi_all};
 use serde::{Deserialize, Serialize};
 
 /// Relaxation times in the bank and their range in s: soft tissue from a tap to a creep test.
@@ -151,8 +151,8 @@ impl LiveFit {
             f1[node] += w1 - p0 * f1[node];
             f2[node] += w2 - p0 * f2[node];
             f3[node] += w3 - p0 * f3[node];
-            g[node] += rate * w1 - p0 * g[node];
-            e[node] -= p0 * e[node];
+            g[node] = settled(g[node] + rate * w1 - p0 * g[node]);
+            e[node] = settled(e[node] - p0 * e[node]);
         }
     }
 
@@ -353,6 +353,12 @@ fn parameter(((name, unit), (value, error)): ((&str, &str), (f64, f64))) -> Para
         ci95: is_identified.then_some([value - 1.96 * error, value + 1.96 * error]),
         is_fixed: false,
     }
+}
+
+/// Zero for what decayed beyond meaning, which would otherwise slow every later sample down.
+#[inline]
+fn settled(value: f64) -> f64 {
+    if value.abs() < NEGLIGIBLE { 0.0 } else { value }
 }
 
 #[cfg(test)]

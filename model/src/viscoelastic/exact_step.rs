@@ -14,6 +14,9 @@
 
 use super::psi::{PSI_COUNT, psi_all};
 
+/// Far below the last digit of any force (1e-16 of 1e-3 N), far above the subnormal numbers.
+pub(crate) const NEGLIGIBLE: f64 = 1e-200;
+
 /// A running sum with its rounding error carried along (Knuth's two-sum).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Compensated {
@@ -42,6 +45,11 @@ impl Compensated {
     #[inline]
     pub fn relax(&mut self, weighted: f64, psi_0: f64) {
         self.add(weighted - psi_0 * self.value);
+        // A filter left alone decays for ever; below the smallest normal number every operation
+        // on it would take a hundred times as long and still mean nothing.
+        if self.value.abs() < NEGLIGIBLE {
+            *self = Self::default();
+        }
     }
 }
 

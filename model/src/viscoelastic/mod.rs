@@ -4,7 +4,7 @@ mod exact_step;
 mod kelvin;
 mod psi;
 
-pub(crate) use exact_step::{Compensated, Pieces, StepWeights, forcing};
+pub(crate) use exact_step::{Compensated, NEGLIGIBLE, Pieces, StepWeights, forcing};
 pub use kelvin::{BodyError, KelvinState, ModifiedKelvin};
 pub(crate) use psi::psi_all;
 pub(crate) use psi::{PSI_COUNT, psi_derivatives};
