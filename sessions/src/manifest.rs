@@ -45,10 +45,10 @@ pub struct Manifest {
 }
 
 impl Manifest {
-    /// The start as an RFC 3339 text in UTC, to the second.
+    /// The start as an RFC 3339 text in UTC, to the millisecond.
     #[must_use]
     pub fn started_at_text(&self) -> String {
-        self.started_at.to_rfc3339_opts(SecondsFormat::Secs, true)
+        self.started_at.to_rfc3339_opts(SecondsFormat::Millis, true)
     }
 }
 
