@@ -382,7 +382,11 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
         );
     }
     // Asked to end, the holder stops the slider, closes the session and reports failure.
-    let killed = Command::new("kill").args(["-TERM", &pid]).status().unwrap();
+    // The shell has its own kill; a minimal system has no other.
+    let killed = Command::new("sh")
+        .args(["-c", &format!("kill -TERM {pid}")])
+        .status()
+        .unwrap();
     assert!(killed.success());
     assert_eq!(holder.wait().unwrap().code(), Some(1));
     let info = json(&palpate(at, &["info", "held", "--json"]));
