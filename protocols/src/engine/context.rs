@@ -74,7 +74,12 @@ impl Context<'_> {
         let to = palpate_model::rig::command::position_from_pulses(target_pulses, rig.mm_per_pulse);
         let duration = Profile::to_rest(from, to, speed, rig.acceleration).duration();
         let deadline = self.now + Nanos::from_seconds(duration + MOVE_GRACE);
-        self.state.in_flight = Some(MoveInFlight { deadline });
+        let is_forward = target_pulses > self.state.pulses;
+        self.state.in_flight = Some(MoveInFlight {
+            deadline,
+            speed,
+            is_forward,
+        });
         self.state.path.on_move(command);
         self.command(RigCommand::MoveTo(command));
         Ok(())

@@ -9,6 +9,10 @@ use palpate_model::units::MmPerS;
 /// distance of the fast search.
 const BACK_OFF_MM: f64 = 2.0;
 
+/// Distance to leave a switch on which the probe was parked, in mm: from behind the rear limit
+/// switch, 2 mm behind home, with margin.
+const LEAVE_MM: f64 = 8.0;
+
 /// How far past the back-off distance the slow touch may look, in mm.
 const TOUCH_REACH_MM: f64 = 2.0;
 
@@ -27,20 +31,31 @@ enum Stage {
 pub(crate) struct Homing {
     speed: MmPerS,
     touch_speed: MmPerS,
+    /// How far the probe was moved off the switch.
+    back_off_mm: f64,
     stage: Stage,
 }
 
 impl Homing {
     pub fn begin(cx: &mut Context<'_>, speed: MmPerS, touch_speed: MmPerS) -> Result<Self, String> {
         cx.state.is_homed = false;
+        let mut homing = Self {
+            speed,
+            touch_speed,
+            back_off_mm: BACK_OFF_MM,
+            stage: Stage::Searching,
+        };
+        if cx.state.status.has(AxisStatus::HOME) {
+            // Parked on the switch, perhaps on the limit behind it: leave it first.
+            homing.back_off_mm = LEAVE_MM;
+            homing.stage = Stage::BackingOff;
+            cx.move_to_pulses(cx.state.pulses + pulses(cx, LEAVE_MM), speed)?;
+            return Ok(homing);
+        }
         // The axis can be anywhere on its travel, so the search covers all of it and a margin.
         let reach = pulses(cx, cx.state.config.limits.travel_max.0 + 10.0);
         cx.move_to_pulses(cx.state.pulses - reach, speed)?;
-        Ok(Self {
-            speed,
-            touch_speed,
-            stage: Stage::Searching,
-        })
+        Ok(homing)
     }
 
     pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
@@ -67,7 +82,7 @@ impl Homing {
                 if is_at_switch {
                     return Err("the home switch stays closed; check it".into());
                 }
-                let target = reading.pulses - pulses(cx, BACK_OFF_MM + TOUCH_REACH_MM);
+                let target = reading.pulses - pulses(cx, self.back_off_mm + TOUCH_REACH_MM);
                 cx.move_to_pulses(target, self.touch_speed)?;
                 self.stage = Stage::Touching;
             }

@@ -1,9 +1,9 @@
 //! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
 
-use super::state::State;
+use super::state::{Power, State};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Limits, Reading};
-use palpate_model::units::{Newtons, Position, Volts};
+use palpate_model::rig::{AxisStatus, Limits, Phase, Reading};
+use palpate_model::units::{MmPerS, Newtons, Position, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -24,6 +24,8 @@ pub enum Interlock {
     ForceRate,
     /// Samples arrive too late for the speed.
     SampleAge,
+    /// The motor lost its current.
+    Motor,
     /// Pulses and commanded path disagree.
     Path,
     /// The link or the controller failed.
@@ -41,6 +43,7 @@ impl Interlock {
             Self::Volts => "raw signal",
             Self::ForceRate => "force rate",
             Self::SampleAge => "sample age",
+            Self::Motor => "motor",
             Self::Path => "path",
             Self::Link => "link",
         }
@@ -172,6 +175,7 @@ pub(super) fn judge(
         })
         .or_else(|| rate_trip(rate, limits.force_rate_max))
         .or(age)
+        .or_else(|| motor_trip(state, reading))
         .or_else(|| {
             path_error.map(|reason| Trip {
                 interlock: Interlock::Path,
@@ -189,20 +193,27 @@ fn trip(interlock: Interlock, reason: String) -> Option<Trip> {
     Some(Trip { interlock, reason })
 }
 
+/// A closed limit switch trips unless the axis leaves it, or has not been homed and only stands
+/// there: otherwise a probe parked on a switch could never come home.
 fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip> {
     let position = state.derived.position;
-    for (bit, which) in [
-        (AxisStatus::FORWARD_LIMIT, "far"),
-        (AxisStatus::REVERSE_LIMIT, "rear"),
+    let is_parked = state.phase == Phase::SelfTest && !state.is_homed;
+    for (bit, which, is_forward) in [
+        (AxisStatus::FORWARD_LIMIT, "far", true),
+        (AxisStatus::REVERSE_LIMIT, "rear", false),
     ] {
-        if reading.status.has(bit) {
+        let is_leaving = state
+            .in_flight
+            .is_some_and(|flight| flight.is_forward != is_forward);
+        if reading.status.has(bit) && !is_leaving && !is_parked {
             return trip(
                 Interlock::Travel,
                 format!("the {which} limit switch closed"),
             );
         }
     }
-    if state.is_homed && position > limits.travel_max {
+    let is_returning = state.in_flight.is_some_and(|flight| !flight.is_forward);
+    if state.is_homed && position > limits.travel_max && !is_returning {
         let Position(end) = limits.travel_max;
         return trip(
             Interlock::Travel,
@@ -213,6 +224,18 @@ fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip
         );
     }
     None
+}
+
+/// A motor that was energised for motion and no longer is: the position is not held.
+fn motor_trip(state: &mut State, reading: &Reading) -> Option<Trip> {
+    if state.power != Power::Enabled || reading.status.has(AxisStatus::MOTOR_ON) {
+        return None;
+    }
+    state.is_homed = false;
+    trip(
+        Interlock::Motor,
+        "the motor lost its current; check its supply, then home".into(),
+    )
 }
 
 fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<Trip> {
@@ -242,7 +265,10 @@ fn rate_trip(rate: Option<f64>, rate_max: f64) -> Option<Trip> {
 fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     let last_at = state.watch.last_at?;
     let age = now.since(last_at).seconds();
-    let age_max = Limits::sample_age_max(state.derived.velocity);
+    // A move just begun counts at its full speed: the newest sample cannot know it yet.
+    let commanded = state.in_flight.map_or(0.0, |flight| flight.speed.0);
+    let speed = state.derived.velocity.0.abs().max(commanded);
+    let age_max = Limits::sample_age_max(MmPerS(speed));
     if age <= age_max {
         return None;
     }

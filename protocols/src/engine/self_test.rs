@@ -4,7 +4,7 @@
 use super::context::{Context, Progress};
 use super::state::Power;
 use super::stats::RunningStats;
-use palpate_model::rig::{Reading, RigCommand};
+use palpate_model::rig::{AxisStatus, Reading, RigCommand};
 use palpate_model::units::{Newtons, Seconds, Volts};
 
 /// Data of a self-test in progress.
@@ -68,6 +68,9 @@ impl SelfTest {
                 noise * 1e3,
                 noise_max * 1e3
             ));
+        }
+        if !cx.state.status.has(AxisStatus::MOTOR_ON) {
+            return Err("the motor is not energised; check its supply".into());
         }
         check_unloaded(cx, Volts(self.volts.mean()))
     }

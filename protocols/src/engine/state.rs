@@ -10,7 +10,7 @@ use crate::plans::{Plan, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
 use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{Limits, PathTracker, Phase, RigCommand, RigDescription};
+use palpate_model::rig::{AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -113,6 +113,8 @@ pub(super) enum Activity {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct MoveInFlight {
     pub deadline: Nanos,
+    pub speed: MmPerS,
+    pub is_forward: bool,
 }
 
 /// Everything the engine remembers between inputs.
@@ -129,6 +131,8 @@ pub struct State {
     pub(super) path: PathTracker,
     pub(super) tick: u64,
     pub(super) pulses: i64,
+    /// Axis status of the newest sample.
+    pub(super) status: AxisStatus,
     pub(super) tare: Option<Tare>,
     pub(super) contact: Option<Contact>,
     pub(super) derived: Derived,
@@ -153,6 +157,7 @@ impl State {
             path: PathTracker::new(&config.rig),
             tick: 0,
             pulses: 0,
+            status: AxisStatus::default(),
             tare: None,
             contact: None,
             derived: Derived::default(),
@@ -272,6 +277,11 @@ impl State {
     #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
+    }
+
+    /// Whether commanded path and newest sample both say that the axis rests.
+    pub(super) fn is_at_rest(&self) -> bool {
+        self.path.is_at_rest() && !self.status.has(AxisStatus::MOVING)
     }
 
     /// Controller ticks of a span, rounded up.

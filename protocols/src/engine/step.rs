@@ -11,7 +11,7 @@ use super::stop;
 use super::tare::Taring;
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, PathTracker, Reading, RigCommand};
+use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Reading, RigCommand};
 use palpate_model::units::{Depth, Position, Seconds};
 
 /// Longest time a controller may take to acknowledge a command.
@@ -42,6 +42,9 @@ fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
         return on_fault(cx, &Fault::ControllerReset);
     }
     let path_error = derive(cx.state, reading);
+    if cx.state.holding().is_some() && reading.status.has(AxisStatus::MOVING) {
+        return stop::on_unasked_motion(cx);
+    }
     let trip = interlock::judge(cx.state, cx.now, reading, path_error);
     if let Some(trip) = trip.or_else(|| acknowledgement_trip(cx)) {
         return on_trip(cx, trip);
@@ -59,6 +62,7 @@ fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
 fn derive(state: &mut State, reading: &Reading) -> Option<String> {
     state.tick = reading.tick;
     state.pulses = reading.pulses;
+    state.status = reading.status;
     let (position, path_error) = match state.path.on_reading(reading) {
         Ok(position) => (position, None),
         Err(err) => (

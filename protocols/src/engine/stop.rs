@@ -5,6 +5,7 @@
 
 use super::context::Context;
 use super::input::{Effect, EndingKind, Outcome, Record};
+use super::interlock::Interlock;
 use super::state::{Activity, Power, State};
 use palpate_model::Nanos;
 use palpate_model::rig::{Phase, RigCommand};
@@ -54,6 +55,19 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
     };
 }
 
+/// The axis moves although the run has stopped: cut it and say so.
+pub(super) fn on_unasked_motion(cx: &mut Context<'_>) {
+    let Activity::Holding { ending } = cx.state.activity.clone() else {
+        return;
+    };
+    let reason = "the axis moves although it was stopped; check the controller".to_owned();
+    let interlock = Interlock::Path;
+    cx.record(Record::InterlockTripped { interlock, reason });
+    cut(cx);
+    let deadline = cx.now + Nanos::from_seconds(BRAKE_MAX);
+    cx.state.activity = Activity::Braking { ending, deadline };
+}
+
 /// Cuts the motion. A stepper cut at speed may lose steps, so its position is no longer known.
 fn cut(cx: &mut Context<'_>) {
     cx.state.is_halted = true;
@@ -71,7 +85,7 @@ pub(super) fn on_time(cx: &mut Context<'_>) {
     match cx.state.activity.clone() {
         Activity::Braking { ending, deadline } => {
             let is_late = cx.now > deadline;
-            if cx.state.path.is_at_rest() && (cx.state.unacknowledged.is_empty() || is_late) {
+            if cx.state.is_at_rest() && (cx.state.unacknowledged.is_empty() || is_late) {
                 cx.state.activity = Activity::Holding { ending };
             } else if is_late && !cx.state.is_halted {
                 // It should have stopped long ago: cut the motion, whatever that costs in steps.

@@ -104,8 +104,8 @@ impl Runner {
 
 impl Drop for Runner {
     fn drop(&mut self) {
-        // The thread ends on the request or, if the queue is full, on the closed channel.
-        let _ = self.requests.try_send(Request::Shutdown);
+        // The thread drains its queue, so this waits at most a moment; if it is gone there is no need.
+        let _ = self.requests.send(Request::Shutdown);
         let (closed, _) = sync_channel(1);
         self.requests = closed;
         if let Some(thread) = self.thread.take() {
@@ -243,6 +243,10 @@ impl MainLoop {
             }
             RigEventBody::Reading(reading) => {
                 self.is_sample_seen = true;
+                // A clock that runs back is a controller that restarted, also between runs.
+                if self.reading.is_some_and(|last| reading.tick <= last.tick) {
+                    self.is_homed = false;
+                }
                 self.reading = Some(reading);
                 self.feed(Input::Reading(reading));
             }
@@ -321,8 +325,8 @@ impl MainLoop {
             self.feed(Input::Operator {
                 choice: Operator::Stop,
             });
-            // Braking ends within its own time limit, a little over two seconds.
-            let give_up = self.now + Nanos::from_millis(3_000);
+            // Braking has two seconds, the halt after it two more.
+            let give_up = self.now + Nanos::from_millis(6_000);
             while self.is_running() && self.now < give_up {
                 self.advance(self.now + TICK);
                 let is_holding = self
