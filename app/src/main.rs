@@ -1,9 +1,7 @@
-//! The `palpate` program: arguments, then the window or one headless command.
+//! The `palpate` program: the window or one headless command.
 
-use clap::Parser;
-use palpate_app::cli::{self, Cli};
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    cli::main(Cli::parse())
+    palpate_app::cli::main()
 }

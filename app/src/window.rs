@@ -11,7 +11,8 @@ use crate::shell::activity::{Activity, Intent, run_in_progress};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use eframe::egui::{
-    CentralPanel, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder, vec2,
+    CentralPanel, Context, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder,
+    ViewportCommand, vec2,
 };
 use palpate_drivers::Rig;
 use palpate_drivers::sim::SimSettings;
@@ -68,9 +69,22 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
     eframe::run_native(
         "palpate",
         native,
-        Box::new(move |cc| Ok(Box::new(WorkbenchApp::new(options, &cc.egui_ctx)?))),
+        Box::new(move |cc| {
+            close_on_signals(&cc.egui_ctx);
+            Ok(Box::new(WorkbenchApp::new(options, &cc.egui_ctx)?))
+        }),
     )
     .map_err(|err| format!("the window cannot be opened ({err}); 'palpate run' needs no window"))
+}
+
+/// A signal closes the window as its button does: motion stops first, the session is closed.
+fn close_on_signals(ctx: &Context) {
+    let ctx = ctx.clone();
+    // Without a handler the signal still ends the program, only less politely.
+    let _ = ctrlc::set_handler(move || {
+        ctx.send_viewport_cmd(ViewportCommand::Close);
+        ctx.request_repaint();
+    });
 }
 
 fn frame(ui: &Ui, is_canvas: bool) -> Frame {

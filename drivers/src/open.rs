@@ -11,9 +11,12 @@ use palpate_model::rig::{RigCommand, RigDescription};
 /// caller's business.
 pub fn open(name: &str, settings: &SimSettings) -> Result<Box<dyn Rig>, RigError> {
     let is_sim = name == "sim"
-        || name
-            .strip_prefix("sim:")
-            .is_some_and(|own| !own.is_empty() && !own.chars().any(char::is_control));
+        || name.strip_prefix("sim:").is_some_and(|own| {
+            !own.is_empty()
+                && !own
+                    .chars()
+                    .any(|c| !(c.is_alphanumeric() || " _-".contains(c)))
+        });
     if is_sim {
         Ok(Box::new(SimRig::named(name, *settings)))
     } else {

@@ -166,12 +166,14 @@ impl Walk<'_> {
                 speed,
                 clearance_mm,
             } => {
+                self.check_sizes(phase, &[clearance_mm]);
                 self.check_speed(phase, speed);
                 let secs = self.move_secs(self.depth_now + clearance_mm, speed);
                 self.depth_now = -clearance_mm;
                 (secs, secs)
             }
             Step::Jog { distance_mm, speed } => {
+                self.check_sizes(phase, &[distance_mm]);
                 self.check_speed(phase, speed);
                 let secs = self.move_secs(distance_mm, speed);
                 (secs, secs)
@@ -185,6 +187,16 @@ impl Walk<'_> {
     }
 
     fn contact(&mut self, phase: Phase, search: &FindContact) -> (f64, f64) {
+        self.check_sizes(
+            phase,
+            &[
+                search.retreat_mm,
+                search.criterion.0,
+                search.pass_force.0,
+                search.std_error_mm_max,
+            ],
+        );
+        self.check_span(phase, search.recovery);
         self.check_speed(phase, search.approach_speed);
         self.check_speed(phase, search.pass_speed);
         let travel = self.limits.travel_max.0;
@@ -216,6 +228,18 @@ impl Walk<'_> {
     fn check_speed(&mut self, phase: Phase, speed: MmPerS) {
         if let Err(reason) = self.rig.check_speed(speed) {
             self.refusals.push(format!("{phase}: {reason}"));
+        }
+    }
+
+    /// Distances and forces of a plan are finite and no larger than any rig.
+    fn check_sizes(&mut self, phase: Phase, sizes: &[f64]) {
+        if let Some(size) = sizes
+            .iter()
+            .find(|size| size.is_nan() || size.abs() > 1000.0)
+        {
+            self.refusals.push(format!(
+                "{phase}: {size} is not possible; give a size up to 1000"
+            ));
         }
     }
 

@@ -104,6 +104,11 @@ pub struct ReplayReport {
 
 /// The blessings of a session, from `blessed.json` in its folder; none if there is no such file.
 pub fn blessings_of(folder: &Path) -> Result<Vec<Blessing>, String> {
+    let folder = if folder.is_file() {
+        folder.parent().unwrap_or(folder)
+    } else {
+        folder
+    };
     let path = folder.join("blessed.json");
     let Some(text) = palpate_sessions::text::read_if_present(&path)
         .map_err(|err| format!("the blessings cannot be read ({err}): {}", path.display()))?
@@ -380,7 +385,8 @@ impl Replay<'_> {
 
 /// Whether two live fits say the same.
 fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
-    let is_same_rmse = (a.rmse_n - b.rmse_n).abs() <= TOLERANCE_LIVE_RMSE * a.rmse_n.abs();
+    let is_same_rmse = (a.rmse_weighted_n - b.rmse_weighted_n).abs()
+        <= TOLERANCE_LIVE_RMSE * a.rmse_weighted_n.abs();
     let mut pairs = a.parameters.iter().zip(&b.parameters);
     a.samples == b.samples
         && is_same_rmse

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::{Args, ValueEnum};
-use palpate_sessions::export::{export_csv, export_parquet};
+use palpate_sessions::export::{ExportError, export_csv, export_parquet};
 use palpate_sessions::log::Session;
 use std::path::PathBuf;
 
@@ -48,7 +48,10 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         Format::Parquet => ("parquet", export_parquet),
     };
     let path = args.to.join(format!("{name}.{extension}"));
-    write(&session, &path).map_err(Failure::failed)?;
+    write(&session, &path).map_err(|err| match err {
+        ExportError::Exists { .. } => Failure::usage(err),
+        _ => Failure::failed(err),
+    })?;
     let object = serde_json::json!({
         "command": "export", "file": path, "rows": session.rows.len(), "format": extension,
     });

@@ -58,6 +58,19 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
 
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     let mut options = FitOptions::default();
+    let names = args.free.iter().map(|name| name.trim());
+    let held = args
+        .fixed
+        .iter()
+        .filter_map(|pair| pair.split('=').next().map(str::trim));
+    let mut names: Vec<&str> = names.chain(held).collect();
+    names.sort_unstable();
+    if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Failure::usage(format!(
+            "{} is given twice; say once what it shall be",
+            pair[0]
+        )));
+    }
     for name in &args.free {
         options.free(name).map_err(Failure::usage)?;
     }

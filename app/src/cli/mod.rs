@@ -8,6 +8,7 @@ mod replay;
 mod rig;
 mod run;
 
+use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
 use palpate_protocols::analysis::SourceError;
@@ -17,7 +18,7 @@ use std::process::ExitCode;
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version, propagate_version = true)]
-pub struct Cli {
+struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -71,9 +72,35 @@ impl Failure {
     }
 }
 
+/// Parses the arguments; a mistake gets one sentence, and one object with `--json`.
+fn parse() -> Result<Cli, ExitCode> {
+    Cli::try_parse().map_err(|err| {
+        if !err.use_stderr() || err.kind() == ErrorKind::DisplayHelpOnMissingArgumentOrSubcommand {
+            // Help and version print themselves; a closed pipe is the reader's choice.
+            let _ = err.print();
+            return ExitCode::from(err.exit_code().clamp(0, 2) as u8);
+        }
+        let is_json = std::env::args_os().any(|argument| argument == "--json");
+        let output = if is_json {
+            Output::json()
+        } else {
+            Output::text()
+        };
+        let text = err.to_string();
+        let sentence = text.lines().next().unwrap_or_default();
+        let sentence = sentence.strip_prefix("error: ").unwrap_or(sentence);
+        output.error(&format!("{sentence}; see 'palpate --help'"), 2);
+        ExitCode::from(2)
+    })
+}
+
 /// Runs what the arguments ask for.
 #[must_use]
-pub fn main(cli: Cli) -> ExitCode {
+pub fn main() -> ExitCode {
+    let cli = match parse() {
+        Ok(cli) => cli,
+        Err(code) => return code,
+    };
     let (output, result) = match cli.command {
         None => (Output::text(), rig::window(&rig::RigArgs::default())),
         Some(Command::Window(args)) => (Output::text(), rig::window(&args)),

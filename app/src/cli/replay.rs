@@ -98,7 +98,7 @@ fn text(replayed: &Replayed) -> String {
         );
     }
     let decisions = match (report.is_same_engine, report.blessed) {
-        (false, _) => "decisions not compared, the engine has a newer version".to_string(),
+        (false, _) => "decisions not compared, another engine version made them".to_string(),
         (true, 0) => format!("{} decisions identical", report.decisions),
         (true, blessed) => format!(
             "{} decisions, {blessed} of them differ as blessed",

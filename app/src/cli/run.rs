@@ -115,7 +115,10 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     );
     if args.preview {
         output.result(&preview, || preview_text(&preview));
-        return Ok(());
+        return match preview.refusals.first() {
+            Some(refusal) => Err(Failure::usage(refusal)),
+            None => Ok(()),
+        };
     }
     if let Err(reason) = preview.verdict(args.acknowledge) {
         let hint = if preview.refusals.is_empty() {

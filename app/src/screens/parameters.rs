@@ -44,7 +44,7 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     if let Some(live) = live {
         let text = format!(
             "residual {:.1} mN rms, {} samples",
-            live.rmse_n * 1e3,
+            live.rmse_weighted_n * 1e3,
             live.samples
         );
         ui.label(RichText::new(text).color(tokens.text_quiet).small());

@@ -71,9 +71,11 @@ pub fn run_in_progress(snapshot: &Snapshot) -> Option<&RunView> {
 /// Whether the axis moves or may begin to, in a run or without one.
 #[must_use]
 pub fn is_motion_possible(snapshot: &Snapshot) -> bool {
+    // What a lost link last said is no longer known; it must not hold the window open for ever.
     let is_axis_moving = snapshot
         .rig
         .reading
+        .filter(|_| snapshot.rig.link_error.is_none())
         .is_some_and(|reading| reading.status.has(AxisStatus::MOVING));
     is_axis_moving || run_in_progress(snapshot).is_some_and(|run| run.is_motion_possible)
 }

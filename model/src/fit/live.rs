@@ -78,7 +78,8 @@ pub struct LiveEstimate {
     /// identified yet.
     pub parameters: Vec<Parameter>,
     /// Weighted root mean square residual in N.
-    pub rmse_n: f64,
+    #[serde(alias = "rmse_n")]
+    pub rmse_weighted_n: f64,
     /// Samples taken.
     pub samples: u64,
 }
@@ -246,7 +247,7 @@ impl LiveFit {
                 .zip(values)
                 .map(parameter)
                 .collect(),
-            rmse_n: (residual / self.weight_sum).sqrt(),
+            rmse_weighted_n: (residual / self.weight_sum).sqrt(),
             samples: self.samples,
         })
     }

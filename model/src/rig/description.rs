@@ -64,11 +64,15 @@ impl RigDescription {
         // 1e-6 of a quantum forgives decimal rounding of the request, nothing more.
         if (multiple - multiple.round()).abs() > 1e-6 {
             let below = multiple.floor() * quantum;
+            let above = below + quantum;
+            let nearest = if above > self.speed_max.0 * (1.0 + 1e-9) {
+                format!("the nearest is {below:.4} mm/s")
+            } else {
+                format!("the nearest are {below:.4} and {above:.4} mm/s")
+            };
             return Err(format!(
-                "rig {} cannot make {speed}: its speeds are multiples of {}; the nearest are {below:.4} and {:.4} mm/s",
-                self.name,
-                self.speed_quantum,
-                below + quantum
+                "rig {} cannot make {speed}: its speeds are multiples of {}; {nearest}",
+                self.name, self.speed_quantum
             ));
         }
         Ok(())
