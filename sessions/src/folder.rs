@@ -6,7 +6,7 @@ use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
-/// Name of the log in a session folder.
+/// Name of the log in a session folder, or of its first segment.
 pub const LOG_FILE: &str = "000.mcap";
 /// Name of the lock in a session folder.
 pub const LOCK_FILE: &str = "lock";
@@ -101,7 +101,7 @@ impl SessionFolder {
         &self.path
     }
 
-    /// The log in the folder.
+    /// The log in the folder, or its first segment.
     #[must_use]
     pub fn log_path(&self) -> PathBuf {
         self.path.join(LOG_FILE)
@@ -115,6 +115,18 @@ fn holds_more_than_lock(path: &Path) -> io::Result<bool> {
         }
     }
     Ok(false)
+}
+
+/// Name of a segment of the log; number 0 is [`LOG_FILE`].
+#[must_use]
+pub fn segment_file(number: u32) -> String {
+    format!("{number:03}.mcap")
+}
+
+/// The number in a segment's name, if it is one.
+pub(crate) fn segment_number(name: &str) -> Option<u32> {
+    let number = name.strip_suffix(".mcap")?.parse().ok()?;
+    (segment_file(number) == name).then_some(number)
 }
 
 /// The folder of all sessions: `PALPATE_HOME`, or `palpate` in the user's home.
@@ -174,6 +186,17 @@ mod tests {
         let default = library_from(Some("".into()), home).unwrap();
         assert_eq!(default, Path::new("/home/ada/palpate"));
         assert!(library_from(None, None).is_err());
+    }
+
+    #[test]
+    fn only_names_the_writer_makes_are_segments() {
+        assert_eq!(segment_file(0), LOG_FILE);
+        for number in [0, 7, 42, 999, 1000] {
+            assert_eq!(segment_number(&segment_file(number)), Some(number));
+        }
+        for name in ["0001.mcap", "1.mcap", "+01.mcap", "001.mcap.bak", "a.mcap"] {
+            assert_eq!(segment_number(name), None, "{name}");
+        }
     }
 
     #[test]

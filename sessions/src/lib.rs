@@ -1,6 +1,7 @@
 //! Session logs on disk: write, read, export, import.
 //!
-//! A session is a folder with one log in the MCAP container (<https://mcap.dev/spec>). What was
+//! A session is a folder with one log in the MCAP container (<https://mcap.dev/spec>), a long one
+//! in segments. What was
 //! flushed survives a crash, and a damaged log is refused, never read wrong.
 //!
 //! This crate never commands a rig, decides nothing about a run and draws nothing. Time is the
@@ -22,9 +23,12 @@ pub mod text;
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,
-    library_folder, new_session_folder,
+    library_folder, new_session_folder, segment_file,
 };
 pub use import::{Table, TableError, parse_table, read_table};
-pub use log::{FileSink, LogError, LogWriter, Pace, ReadError, Session, SessionWriter, Sink};
+pub use log::{
+    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
+    SegmentSource, Session, SessionWriter, Sink,
+};
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use record::{EndRecord, Entry, EntryKind, Row};

@@ -1,7 +1,7 @@
 //! What the records of a session log say, taken in their order and checked as they come.
 
 use super::frames::{Fields, frame_at};
-use super::writer::PROFILE;
+use super::segment::PROFILE;
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{
     DaqBlock, DerivedBlock, EndRecord, Entry, EntryKind, EntryMessage, Row, rows_from_blocks,
@@ -20,11 +20,19 @@ pub(crate) enum Refusal {
     Newer(String, u64),
 }
 
-/// What has been read so far.
-#[derive(Default)]
+/// What has been read so far, over all segments.
 pub(crate) struct Content {
     topics: BTreeMap<u16, Option<Channel>>,
-    sequences: [u32; Channel::ALL.len()],
+    /// The next message of each channel; `None` where a lone later segment may begin anywhere.
+    sequences: [Option<u32>; Channel::ALL.len()],
+    /// Number of the first sample; `None` until a lone later segment says.
+    first_sample: Option<u64>,
+    /// Whether the segment being read has shown its manifest.
+    pub has_manifest: bool,
+    /// Whether what came before the first segment read is missing.
+    pub is_later_part: bool,
+    /// Whether the segment being read holds anything but its manifest.
+    pub has_data: bool,
     pub manifest: Option<Manifest>,
     pub refusal: Option<Refusal>,
     pub rows: Vec<Row>,
@@ -35,6 +43,35 @@ pub(crate) struct Content {
 }
 
 impl Content {
+    /// Nothing read yet. A file that is read alone may be a later segment.
+    pub fn new(is_alone: bool) -> Self {
+        let mut sequences = [Some(0); Channel::ALL.len()];
+        if is_alone {
+            sequences[Channel::Manifest as usize] = None;
+        }
+        Self {
+            topics: BTreeMap::new(),
+            sequences,
+            first_sample: Some(0),
+            has_manifest: false,
+            is_later_part: false,
+            has_data: false,
+            manifest: None,
+            refusal: None,
+            rows: Vec::new(),
+            raw: None,
+            entries: Vec::new(),
+            end: None,
+        }
+    }
+
+    /// Goes on with another file: everything counted goes on, its channels are named anew.
+    pub fn begin_segment(&mut self) {
+        self.topics.clear();
+        self.has_manifest = false;
+        self.has_data = false;
+    }
+
     /// Reads the file's header: `profile` tells whose file it is.
     pub fn take_header(&mut self, body: &[u8]) {
         if Fields(body).text() != Some(PROFILE) {
@@ -80,31 +117,33 @@ impl Content {
         let channel = match self.topics.get(&id) {
             Some(Some(channel)) => *channel,
             // A channel of another program, or of a later version that adds one.
-            Some(None) if self.manifest.is_some() => return Ok(()),
+            Some(None) if self.has_manifest => return Ok(()),
             Some(None) => {
                 self.refusal = Some(Refusal::Foreign);
                 return Ok(());
             }
             None => return Err("a message is on a channel that was never named".into()),
         };
-        if self.manifest.is_none() && channel != Channel::Manifest {
+        if !self.has_manifest && channel != Channel::Manifest {
             self.refusal = Some(Refusal::Foreign);
             return Ok(());
         }
-        let expected = &mut self.sequences[channel as usize];
-        if sequence != *expected {
+        let next = &mut self.sequences[channel as usize];
+        let expected = next.unwrap_or(sequence);
+        if sequence != expected {
             return Err(format!(
                 "message {expected} of {} is missing",
                 channel.topic()
             ));
         }
-        *expected = expected.wrapping_add(1);
+        *next = Some(expected.wrapping_add(1));
+        self.has_data |= channel != Channel::Manifest;
         if self.end.is_some() {
             return Err("something was recorded after the end".into());
         }
         let data = fields.0;
         match channel {
-            Channel::Manifest => self.take_manifest(data),
+            Channel::Manifest => self.take_manifest(sequence, data),
             Channel::Daq => self.take_raw(data),
             Channel::Derived => self.take_derived(data),
             Channel::Input => self.take_entry(EntryKind::Input, data),
@@ -119,9 +158,9 @@ impl Content {
         }
     }
 
-    fn take_manifest(&mut self, data: &[u8]) -> Result<(), String> {
+    fn take_manifest(&mut self, sequence: u32, data: &[u8]) -> Result<(), String> {
         let unreadable = |err: serde_json::Error| format!("the manifest is unreadable: {err}");
-        if self.manifest.is_some() {
+        if self.has_manifest {
             return Err("there is a second manifest".into());
         }
         // The version is read first: the rest of a newer manifest may not fit this program.
@@ -135,7 +174,23 @@ impl Content {
             self.refusal = Some(Refusal::Newer(software.into(), version));
             return Ok(());
         }
-        self.manifest = Some(serde_json::from_value(value).map_err(unreadable)?);
+        let manifest: Manifest = serde_json::from_value(value).map_err(unreadable)?;
+        match &self.manifest {
+            Some(first) if *first != manifest => {
+                return Err("its manifest is not that of the segments before".into());
+            }
+            Some(_) => {}
+            None if sequence > 0 => {
+                // The manifest's place tells a later segment: the other channels go on there too.
+                self.is_later_part = true;
+                self.sequences = [None; Channel::ALL.len()];
+                self.sequences[Channel::Manifest as usize] = Some(sequence.wrapping_add(1));
+                self.first_sample = None;
+            }
+            None => {}
+        }
+        self.manifest = Some(manifest);
+        self.has_manifest = true;
         Ok(())
     }
 
@@ -145,7 +200,8 @@ impl Content {
         if self.raw.is_some() {
             return Err("a block of raw samples has no derived ones".into());
         }
-        let expected = self.rows.len() as u64;
+        let first = *self.first_sample.get_or_insert(raw.first_sample);
+        let expected = first.saturating_add(self.rows.len() as u64);
         if raw.first_sample != expected {
             return Err(format!(
                 "sample {expected} is missing: the next block begins with sample {}",
@@ -196,8 +252,14 @@ impl Content {
         let Some(end) = &self.end else {
             return Ok(());
         };
-        let (samples, entries) = (self.rows.len() as u64, self.entries.len() as u64);
-        if self.raw.is_none() && end.samples == samples && end.entries == entries {
+        // What a lone later segment does not know of the ones before is not compared.
+        let first = self
+            .first_sample
+            .unwrap_or_else(|| end.samples.saturating_sub(self.rows.len() as u64));
+        let samples = first.saturating_add(self.rows.len() as u64);
+        let entries = self.entries.len() as u64;
+        let has_entries = end.entries == entries || (self.is_later_part && end.entries >= entries);
+        if self.raw.is_none() && end.samples == samples && has_entries {
             return Ok(());
         }
         Err(format!(

@@ -3,11 +3,13 @@
 mod content;
 mod frames;
 pub mod reader;
+mod segment;
 pub mod sink;
 pub mod thread;
+mod walk;
 pub mod writer;
 
 pub use reader::{ReadError, Session};
-pub use sink::{FileSink, Sink};
+pub use sink::{FileSink, FolderSegments, SegmentSource, Sink};
 pub use thread::{Pace, SessionWriter};
-pub use writer::{LogError, LogWriter};
+pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter};

@@ -3,15 +3,16 @@
 //! A finished log must be whole: every chunk's checksum, the checksum over all data and that of
 //! the index must be right. A log without an end, as a crash leaves it, opens with everything up
 //! to its last whole chunk and a note that says so.
+//!
+//! The segments of a long recording are read one after the other as if they were one file: sample
+//! numbers, message numbers and entries must go on where the segment before stopped.
 
 use super::content::{Content, Refusal};
-use super::frames::{
-    ChunkReader, FOOTER_BYTES, Fields, Frame, FrameError, frame_at, has_chunk_after,
-};
-use crate::folder::LOG_FILE;
+use super::frames::ChunkReader;
+use super::walk::{has_footer, is_barely_begun, may_hold_data, walk};
+use crate::folder::{LOG_FILE, segment_file, segment_number};
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{EndRecord, Entry, Row};
-use mcap::records::op;
 use palpate_model::Nanos;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -72,7 +73,7 @@ pub enum ReadError {
 /// A recorded session in memory.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Session {
-    /// The log it was read from.
+    /// The log it was read from, or its first segment.
     pub path: PathBuf,
     /// What the session says about itself.
     pub manifest: Manifest,
@@ -94,19 +95,17 @@ enum OnDamage {
 }
 
 impl Session {
-    /// Opens a session folder or its log.
+    /// Opens a session folder, or one file of it alone.
     ///
     /// A log that was never ended opens with everything in its whole chunks; one that is damaged
     /// anywhere else is refused.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        let (log, bytes) = read_log(path)?;
-        read_session(log, &bytes, OnDamage::Refuse)
+        Reader::new(path, OnDamage::Refuse)?.read()
     }
 
     /// Opens what stands before the first damage, with a note that says where it is.
     pub fn recover(path: &Path) -> Result<Self, ReadError> {
-        let (log, bytes) = read_log(path)?;
-        read_session(log, &bytes, OnDamage::StopBefore)
+        Reader::new(path, OnDamage::StopBefore)?.read()
     }
 
     /// Session time of the newest sample or entry.
@@ -118,213 +117,295 @@ impl Session {
     }
 }
 
-fn read_log(path: &Path) -> Result<(PathBuf, Vec<u8>), ReadError> {
+/// The files to read.
+fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.exists() {
         return Err(ReadError::Missing { path: path.into() });
     }
-    let log = if path.is_dir() {
-        path.join(LOG_FILE)
-    } else {
-        path.to_owned()
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let failed = |source| ReadError::Io {
+        path: path.into(),
+        source,
     };
-    if !log.is_file() {
-        return Err(ReadError::NotASession {
-            path: path.into(),
-            reason: format!("it holds no {LOG_FILE}"),
-        });
+    let mut numbers = Vec::new();
+    for item in std::fs::read_dir(path).map_err(failed)? {
+        let name = item.map_err(failed)?.file_name();
+        numbers.extend(name.to_str().and_then(segment_number));
     }
-    match std::fs::read(&log) {
-        Ok(bytes) => Ok((log, bytes)),
-        Err(source) => Err(ReadError::Io { path: log, source }),
-    }
+    numbers.sort_unstable();
+    let whole = (0..).zip(&numbers).take_while(|(i, n)| i == *n).count();
+    // With a gap, the first missing file is listed too: it will be looked for and not found.
+    let count = if whole < numbers.len() {
+        whole + 1
+    } else {
+        whole
+    };
+    Ok((0..count.max(1))
+        .map(|number| path.join(segment_file(number as u32)))
+        .collect())
 }
 
-/// Why the walk ended before the end of the data.
-struct Stop {
+/// What a segment adds to the session.
+enum Outcome {
+    /// The next segment goes on from here.
+    GoOn,
+    /// The segment was begun and holds nothing; it is the last.
+    Nothing,
+}
+
+/// Damage, and the file it is in.
+struct Damage {
+    path: PathBuf,
     offset: usize,
     reason: String,
-    /// Whether this is how an interrupted write looks, and not damage.
-    is_torn: bool,
 }
 
-fn read_session(path: PathBuf, bytes: &[u8], policy: OnDamage) -> Result<Session, ReadError> {
-    let not_a_session = |reason: &str| ReadError::NotASession {
-        path: path.clone(),
-        reason: reason.into(),
-    };
-    if bytes.is_empty() {
-        return Err(not_a_session("it is empty: nothing was ever recorded"));
-    }
-    if !bytes.starts_with(mcap::MAGIC) {
-        return Err(not_a_session("it does not begin like one"));
-    }
-    let mut chunks = ChunkReader::new().map_err(|source| ReadError::Io {
-        path: path.clone(),
-        source,
-    })?;
-    let mut content = Content::default();
-    let walked = match walk(bytes, &mut chunks, &mut content) {
-        Err(stop) if !stop.is_torn => Err(stop),
-        // However a file ends: once there is an end record, all it counted must be there.
-        Ok(()) | Err(_) => content.check_totals().map_err(|reason| Stop {
-            offset: bytes.len(),
-            reason,
-            is_torn: false,
-        }),
-    };
-    if let Some(refusal) = content.refusal {
-        return Err(match refusal {
-            Refusal::Foreign => not_a_session("its header names another program"),
-            Refusal::Newer(software_version, record_version) => ReadError::Newer {
-                path,
-                software_version,
-                record_version,
-            },
-        });
-    }
-    let mut notes = Vec::new();
-    let mut end = content.end;
-    match walked {
-        Ok(()) => {}
-        Err(stop) if policy == OnDamage::StopBefore => {
-            end = None;
-            notes.push(format!(
-                "the recording is damaged at byte {} ({}); everything after that place was left out",
-                stop.offset, stop.reason
-            ));
-        }
-        Err(stop) => {
-            return Err(ReadError::Damaged {
-                path,
-                offset: stop.offset as u64,
-                reason: stop.reason,
+/// Reads the files of one session in order.
+struct Reader {
+    files: Vec<PathBuf>,
+    is_folder: bool,
+    policy: OnDamage,
+    chunks: ChunkReader,
+    content: Content,
+    /// Where the segment before broke off, if something may be missing from it.
+    broken_off: Option<Damage>,
+    /// Name of the segment before, if it was not finished.
+    unfinished: Option<String>,
+    /// Whether the file read last has its data's checksum and its index.
+    is_finished: bool,
+    notes: Vec<String>,
+}
+
+impl Reader {
+    fn new(path: &Path, policy: OnDamage) -> Result<Self, ReadError> {
+        let files = find_files(path)?;
+        let is_folder = path.is_dir();
+        let first = &files[0];
+        if !first.is_file() && (files.len() == 1 || !is_folder) {
+            return Err(ReadError::NotASession {
+                path: path.into(),
+                reason: format!("it holds no {LOG_FILE}"),
             });
         }
+        let chunks = ChunkReader::new().map_err(|source| ReadError::Io {
+            path: first.clone(),
+            source,
+        })?;
+        Ok(Self {
+            files,
+            is_folder,
+            policy,
+            chunks,
+            content: Content::new(!is_folder),
+            broken_off: None,
+            unfinished: None,
+            is_finished: false,
+            notes: Vec::new(),
+        })
     }
-    let Some(manifest) = content.manifest else {
-        return Err(ReadError::Damaged {
+
+    fn read(mut self) -> Result<Session, ReadError> {
+        let files = std::mem::take(&mut self.files);
+        let mut damage = None;
+        for (number, file) in files.iter().enumerate() {
+            let is_last = number + 1 == files.len();
+            match self.read_file(file, number == 0, is_last)? {
+                Ok(Outcome::GoOn) => {}
+                Ok(Outcome::Nothing) => {
+                    let name = name_of(file);
+                    self.notes.push(format!(
+                        "{name} was begun but nothing was recorded in it before the interruption"
+                    ));
+                }
+                Err(found) => {
+                    damage = Some(found);
+                    break;
+                }
+            }
+        }
+        let path = files[0].clone();
+        let mut end = self.content.end.take();
+        if let Some(Damage {
             path,
-            offset: bytes.len() as u64,
-            reason: "the recording was interrupted before it began, or its beginning is lost"
-                .into(),
-        });
-    };
-    let mut session = Session {
-        path,
-        manifest,
-        rows: content.rows,
-        entries: content.entries,
-        end,
-        notes,
-    };
-    if session.end.is_none() {
-        let note = format!(
-            "no end record: the recording was interrupted at {:.1} s; everything before is complete",
-            session.last_time().seconds().0
-        );
-        session.notes.push(note);
-    } else if !has_footer(bytes) {
-        session
-            .notes
-            .push("the index at the end is missing; all samples and entries are there".into());
-    }
-    Ok(session)
-}
-
-/// Whether the file claims to be finished: a footer and the closing magic are in their place.
-fn has_footer(bytes: &[u8]) -> bool {
-    bytes.len() >= mcap::MAGIC.len() + FOOTER_BYTES
-        && bytes.ends_with(mcap::MAGIC)
-        && bytes[bytes.len() - FOOTER_BYTES] == op::FOOTER
-}
-
-/// Goes through all frames of the data section.
-fn walk(bytes: &[u8], chunks: &mut ChunkReader, content: &mut Content) -> Result<(), Stop> {
-    let is_finished = has_footer(bytes);
-    // Everything behind the last byte that is not zero may never have reached the disk.
-    let written = bytes
-        .iter()
-        .rposition(|&byte| byte != 0)
-        .map_or(0, |i| i + 1);
-    let mut offset = mcap::MAGIC.len();
-    while offset < bytes.len() {
-        let damage = |reason: String, frame_end: usize| Stop {
             offset,
             reason,
-            // Zeros from within this frame to the end of the file are what a power cut leaves.
-            is_torn: !is_finished && written <= frame_end && written < bytes.len(),
-        };
-        let frame = match frame_at(bytes, offset) {
-            Ok(frame) => frame,
-            Err(FrameError::TooLong) => {
-                return Err(damage("a record is longer than 64 MiB".into(), offset));
-            }
-            Err(FrameError::PastEnd) => {
-                return Err(Stop {
-                    offset,
-                    reason: "a record runs past the end of the file".into(),
-                    is_torn: !is_finished && !has_chunk_after(bytes, offset, chunks),
+        }) = damage
+        {
+            if self.policy == OnDamage::Refuse || self.content.manifest.is_none() {
+                return Err(ReadError::Damaged {
+                    path,
+                    offset: offset as u64,
+                    reason,
                 });
             }
+            end = None;
+            let place = if files.len() > 1 {
+                format!("byte {offset} of {}", name_of(&path))
+            } else {
+                format!("byte {offset}")
+            };
+            self.notes.insert(
+                0,
+                format!(
+                    "the recording is damaged at {place} ({reason}); everything after that place was left out"
+                ),
+            );
+        }
+        self.session(path, end)
+    }
+
+    fn session(mut self, path: PathBuf, end: Option<EndRecord>) -> Result<Session, ReadError> {
+        let Some(manifest) = self.content.manifest.take() else {
+            return Err(ReadError::Damaged {
+                path,
+                offset: 0,
+                reason: NOT_BEGUN.into(),
+            });
         };
-        match frame.opcode {
-            op::HEADER => content.take_header(frame.body),
-            op::MESSAGE_INDEX => {}
-            op::CHUNK => {
-                let records = chunks
-                    .open(frame.body)
-                    .map_err(|reason| damage(reason, frame.next))?;
-                content.take_chunk(records).map_err(|reason| Stop {
-                    offset,
-                    reason,
-                    is_torn: false,
-                })?;
+        let mut session = Session {
+            path,
+            manifest,
+            rows: self.content.rows,
+            entries: self.content.entries,
+            end,
+            notes: self.notes,
+        };
+        let last = session.last_time().seconds().0;
+        // Only a segment that others follow is finished without an end.
+        let goes_on = !self.is_folder && self.is_finished && session.end.is_none();
+        if goes_on {
+            session.notes.push(format!(
+                "no end record: this part of a recording goes to {last:.1} s; open the session's folder for what follows"
+            ));
+        } else if session.end.is_none() {
+            session.notes.push(format!(
+                "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
+            ));
+        } else if !self.is_finished {
+            session
+                .notes
+                .push("the index at the end is missing; all samples and entries are there".into());
+        }
+        if self.content.is_later_part {
+            session.notes.push(
+                "this is a later part of a recording; open the session's folder for what came before"
+                    .into(),
+            );
+        }
+        Ok(session)
+    }
+
+    /// Reads one file. The outer error is of a kind that even recovery cannot pass.
+    fn read_file(
+        &mut self,
+        path: &Path,
+        is_first: bool,
+        is_last: bool,
+    ) -> Result<Result<Outcome, Damage>, ReadError> {
+        let damage = |offset: usize, reason: String| Damage {
+            path: path.into(),
+            offset,
+            reason,
+        };
+        if !path.is_file() {
+            let reason = "this segment is missing, though a later one is there".to_owned();
+            return Ok(Err(damage(0, reason)));
+        }
+        let bytes = std::fs::read(path).map_err(|source| ReadError::Io {
+            path: path.into(),
+            source,
+        })?;
+        if is_first {
+            check_beginning(path, &bytes)?;
+        } else if self.content.end.is_some() {
+            let reason = "a segment follows the one that ended the recording".to_owned();
+            return Ok(Err(damage(0, reason)));
+        } else if is_last && is_barely_begun(&bytes) {
+            return Ok(Ok(Outcome::Nothing));
+        } else if !bytes.starts_with(mcap::MAGIC) {
+            return Ok(Err(damage(0, "it does not begin like a segment".into())));
+        }
+        self.content.begin_segment();
+        let (row_count, entry_count) = (self.content.rows.len(), self.content.entries.len());
+        let walked = walk(&bytes, &mut self.chunks, &mut self.content);
+        if let Some(refusal) = self.content.refusal.take() {
+            return Err(refused(path, refusal));
+        }
+        let torn = match walked {
+            Err(stop) if !stop.is_torn => return Ok(Err(damage(stop.offset, stop.reason))),
+            Err(stop) => Some(stop),
+            Ok(()) => None,
+        };
+        // However a file ends: once there is an end record, all it counted must be there.
+        if let Err(reason) = self.content.check_totals() {
+            return Ok(Err(damage(bytes.len(), reason)));
+        }
+        let is_finished = has_footer(&bytes);
+        if !self.content.has_manifest {
+            return Ok(if !is_first && is_last && !is_finished {
+                Ok(Outcome::Nothing)
+            } else {
+                Err(damage(bytes.len(), NOT_BEGUN.into()))
+            });
+        }
+        if self.content.has_data {
+            if let Some(broken_off) = self.broken_off.take() {
+                self.content.rows.truncate(row_count);
+                self.content.entries.truncate(entry_count);
+                return Ok(Err(broken_off));
             }
-            op::DATA_END => return check_end(bytes, offset, frame, content),
-            // Other tools may add these to a finished file, whose checksums prove them.
-            op::ATTACHMENT | op::METADATA | 0x80.. if is_finished => {}
-            _ => {
-                return Err(damage(
-                    "a record is of an unexpected kind".into(),
-                    frame.next,
+            if let Some(name) = self.unfinished.take() {
+                self.notes.push(format!(
+                    "{name} was not finished; the next segment goes on where it stops"
                 ));
             }
         }
-        if content.refusal.is_some() {
-            return Ok(());
+        self.is_finished = is_finished;
+        if !is_finished {
+            self.unfinished = Some(name_of(path));
         }
-        offset = frame.next;
+        if let Some(stop) = torn.filter(|stop| may_hold_data(&bytes, stop.offset)) {
+            self.broken_off = Some(damage(stop.offset, stop.reason));
+        }
+        Ok(Ok(Outcome::GoOn))
     }
-    Ok(())
 }
 
-/// Checks the checksums of the data and of the index.
-fn check_end(
-    bytes: &[u8],
-    offset: usize,
-    data_end: Frame<'_>,
-    content: &Content,
-) -> Result<(), Stop> {
-    let stop = |offset: usize, reason: &str| Stop {
-        offset,
-        reason: reason.into(),
-        is_torn: false,
+const NOT_BEGUN: &str = "the recording was interrupted before it began, or its beginning is lost";
+
+fn name_of(path: &Path) -> String {
+    path.file_name()
+        .unwrap_or(path.as_os_str())
+        .to_string_lossy()
+        .into_owned()
+}
+
+fn check_beginning(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
+    let reason = if bytes.is_empty() {
+        "it is empty: nothing was ever recorded"
+    } else if !bytes.starts_with(mcap::MAGIC) {
+        "it does not begin like one"
+    } else {
+        return Ok(());
     };
-    if Fields(data_end.body).u32() != Some(crc32fast::hash(&bytes[..offset])) {
-        return Err(stop(offset, "the checksum over all samples is wrong"));
+    Err(ReadError::NotASession {
+        path: path.into(),
+        reason: reason.into(),
+    })
+}
+
+fn refused(path: &Path, refusal: Refusal) -> ReadError {
+    match refusal {
+        Refusal::Foreign => ReadError::NotASession {
+            path: path.into(),
+            reason: "its header names another program".into(),
+        },
+        Refusal::Newer(software_version, record_version) => ReadError::Newer {
+            path: path.into(),
+            software_version,
+            record_version,
+        },
     }
-    if content.end.is_none() {
-        return Err(stop(offset, "the end record is missing"));
-    }
-    if has_footer(bytes) {
-        let footer = bytes.len() - FOOTER_BYTES;
-        let checksum = bytes.len() - mcap::MAGIC.len() - 4;
-        // The footer's own first two fields are part of the sum.
-        let summed = bytes.get(data_end.next..checksum).map(crc32fast::hash);
-        let is_right = summed.is_some() && Fields(&bytes[checksum..]).u32() == summed;
-        if !is_right {
-            return Err(stop(footer, "the checksum of the index is wrong"));
-        }
-    }
-    Ok(())
 }

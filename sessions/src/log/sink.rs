@@ -1,8 +1,9 @@
 //! The one door to the disk: appending bytes and making them durable.
 
+use crate::folder::segment_file;
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Takes bytes in order. After an error it is not used again.
 pub trait Sink: Send {
@@ -11,6 +12,46 @@ pub trait Sink: Send {
 
     /// Returns once everything appended survives a power cut.
     fn sync(&mut self) -> io::Result<()>;
+}
+
+/// Makes the files of a session that is written in segments.
+pub trait SegmentSource: Send {
+    /// What a segment is written to.
+    type Sink: Sink;
+
+    /// What errors call the segment.
+    fn path(&self, number: u32) -> String;
+
+    /// Makes the segment. Its first `sync` must make its name durable too.
+    fn create(&mut self, number: u32) -> io::Result<Self::Sink>;
+}
+
+/// Segments in a session folder: `000.mcap`, `001.mcap` and so on.
+#[derive(Debug)]
+pub struct FolderSegments {
+    folder: PathBuf,
+}
+
+impl FolderSegments {
+    /// Segments in this folder.
+    #[must_use]
+    pub fn new(folder: &Path) -> Self {
+        Self {
+            folder: folder.into(),
+        }
+    }
+}
+
+impl SegmentSource for FolderSegments {
+    type Sink = FileSink;
+
+    fn path(&self, number: u32) -> String {
+        self.folder.join(segment_file(number)).display().to_string()
+    }
+
+    fn create(&mut self, number: u32) -> io::Result<FileSink> {
+        FileSink::create(&self.folder.join(segment_file(number)))
+    }
 }
 
 /// A new file that is only ever appended to.

@@ -5,8 +5,8 @@
 //! pace handing over never waits: 30 s of batches fit in a bounded queue, and a queue that is
 //! full is a failure the caller sees, never a silent gap.
 
-use super::sink::{FileSink, Sink};
-use super::writer::{LogError, LogWriter, check_order};
+use super::sink::{FolderSegments, SegmentSource, Sink};
+use super::writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, check_order};
 use crate::folder::SessionFolder;
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
@@ -97,17 +97,25 @@ pub struct SessionWriter {
 impl SessionWriter {
     /// Starts a session in a folder. When this returns, the manifest survives a power cut.
     pub fn start(folder: SessionFolder, manifest: &Manifest, pace: Pace) -> Result<Self, LogError> {
-        let path = folder.log_path();
-        let sink = FileSink::create(&path).map_err(|err| LogError::Disk {
-            reason: err.to_string(),
-            path: path.display().to_string(),
-        })?;
-        let mut writer = Self::start_on(sink, &path.display().to_string(), manifest, pace)?;
+        let source = FolderSegments::new(folder.path());
+        let mut writer = Self::start_in_segments(source, BATCHES_PER_SEGMENT, manifest, pace)?;
         writer._folder = Some(folder);
         Ok(writer)
     }
 
-    /// Starts a session on any sink; `path` is only shown in errors.
+    /// Starts a session that goes on in a new segment after every so many batches.
+    pub fn start_in_segments<G: SegmentSource + 'static>(
+        source: G,
+        batches_per_segment: u32,
+        manifest: &Manifest,
+        pace: Pace,
+    ) -> Result<Self, LogError> {
+        let path = source.path(0);
+        let log = LogWriter::begin_in_segments(Box::new(source), batches_per_segment, manifest)?;
+        Self::start_log(log, &path, pace)
+    }
+
+    /// Starts a session on one sink, however long it gets; `path` is only shown in errors.
     pub fn start_on<S: Sink + 'static>(
         sink: S,
         path: &str,
@@ -115,6 +123,14 @@ impl SessionWriter {
         pace: Pace,
     ) -> Result<Self, LogError> {
         let log = LogWriter::begin(sink, path, manifest)?;
+        Self::start_log(log, path, pace)
+    }
+
+    fn start_log<S: Sink + 'static>(
+        log: LogWriter<S>,
+        path: &str,
+        pace: Pace,
+    ) -> Result<Self, LogError> {
         // A queue of none makes handing over wait until the thread is free.
         let (sender, receiver) = sync_channel(match pace {
             Pace::Virtual => 0,

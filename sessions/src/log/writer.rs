@@ -3,26 +3,32 @@
 //! The container is written in memory and handed to the [`Sink`] in one append per call, so the
 //! file on disk always ends with a whole chunk plus at most one torn one, and the system's own
 //! reason for a failed write is kept.
+//!
+//! The container keeps an index entry of about 600 bytes per chunk in memory until its file is
+//! finished. A log is therefore written in segments: after [`BATCHES_PER_SEGMENT`] batches a new
+//! file goes on where the old one stopped, and the old one's index is written and let go. No more
+//! than the index of one segment is ever held, so the memory of a run does not grow with its
+//! length.
 
-use super::sink::Sink;
+use super::segment::Segment;
+use super::sink::{SegmentSource, Sink};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, EntryMessageRef, Row, block_slices, blocks_from_rows};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use palpate_model::Nanos;
 use prost::Message;
-use std::io::{self, Seek, SeekFrom, Write};
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::io;
 use thiserror::Error;
 
-/// The profile in the file's header, which tells our files from other MCAP files.
-pub(crate) const PROFILE: &str = "palpate";
+/// Batches in one segment: ten minutes of batches of 100 ms. Each ends a chunk, whose index entry
+/// of about 600 bytes stays in memory until the segment is finished: under 4 MB in all. Shorter
+/// segments would save little more and leave many files.
+pub const BATCHES_PER_SEGMENT: u32 = 6000;
 /// Largest message the writer makes; the reader's limit for a whole chunk is four times this.
 pub(crate) const MESSAGE_BYTES_MAX: usize = 16 << 20;
 /// Deepest nesting of an entry; the JSON parser that reads it back stops at 128.
 const JSON_DEPTH_MAX: usize = 100;
-/// A chunk is cut when it grows beyond this.
-const CHUNK_BYTES: u64 = 4 << 20;
 
 /// A session could not be written.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
@@ -76,56 +82,33 @@ pub enum LogError {
     Closed,
 }
 
-/// The container's bytes on their way to the sink.
-#[derive(Clone, Default)]
-struct Tape(Arc<Mutex<TapeState>>);
-
-#[derive(Default)]
-struct TapeState {
-    bytes: Vec<u8>,
-    /// Bytes ever written, which is the place in the file.
-    position: u64,
-}
-
-impl Tape {
-    fn state(&self) -> MutexGuard<'_, TapeState> {
-        self.0.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-}
-
-impl Write for Tape {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let mut state = self.state();
-        state.bytes.extend_from_slice(bytes);
-        state.position += bytes.len() as u64;
-        Ok(bytes.len())
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        Ok(())
-    }
-}
-
-impl Seek for Tape {
-    fn seek(&mut self, to: SeekFrom) -> io::Result<u64> {
-        let position = self.state().position;
-        match to {
-            SeekFrom::Current(0) => Ok(position),
-            SeekFrom::Start(place) if place == position => Ok(position),
-            // The container is told not to seek; this keeps the file append-only if it tries.
-            _ => Err(io::Error::other("a session log is only ever appended to")),
+impl LogError {
+    pub(crate) fn disk(err: &io::Error, path: &str) -> Self {
+        Self::Disk {
+            reason: err.to_string(),
+            path: path.into(),
         }
     }
 }
 
+/// Where the next segments come from and when.
+struct Rotation<S: Sink> {
+    source: Box<dyn SegmentSource<Sink = S>>,
+    batches_per_segment: u32,
+}
+
 /// Writes one session log.
 pub struct LogWriter<S: Sink> {
-    container: mcap::Writer<Tape>,
-    tape: Tape,
-    sink: S,
-    /// Shown in errors.
-    path: String,
-    channel_ids: [u16; Channel::ALL.len()],
+    segment: Segment<S>,
+    /// `None` for a log that stays in one file.
+    rotation: Option<Rotation<S>>,
+    /// Number of the segment being written.
+    number: u32,
+    /// Batches in it.
+    batches: u32,
+    /// What every segment begins with.
+    manifest_json: Vec<u8>,
+    library: String,
     sequences: [u32; Channel::ALL.len()],
     started_ns: u64,
     tick_nanos: u64,
@@ -137,30 +120,19 @@ pub struct LogWriter<S: Sink> {
 }
 
 impl<S: Sink> LogWriter<S> {
-    /// Starts a log. When this returns, the manifest survives a power cut.
+    /// Starts a log that stays in one file. When this returns, the manifest survives a power cut.
     ///
     /// `path` is only shown in errors.
     pub fn begin(sink: S, path: &str, manifest: &Manifest) -> Result<Self, LogError> {
-        let tape = Tape::default();
-        let container = mcap::WriteOptions::new()
-            .profile(PROFILE)
-            .library(format!("palpate {}", manifest.software_version))
-            .compression(Some(mcap::Compression::Zstd))
-            // Level 1 is the cheapest; packed doubles hardly shrink further at higher ones.
-            .compression_level(1)
-            .compression_threads(0)
-            .chunk_size(Some(CHUNK_BYTES))
-            .disable_seeking(true)
-            .emit_message_indexes(true)
-            .create(tape.clone())
-            .map_err(encode_error("manifest"))?;
+        let library = format!("palpate {}", manifest.software_version);
         let started_ns = manifest.started_at.timestamp_nanos_opt().unwrap_or(0);
         let mut writer = Self {
-            container,
-            tape,
-            sink,
-            path: path.into(),
-            channel_ids: [0; Channel::ALL.len()],
+            segment: Segment::begin(sink, path.into(), &library)?,
+            rotation: None,
+            number: 0,
+            batches: 0,
+            manifest_json: readable_json("manifest", manifest)?,
+            library,
             sequences: [0; Channel::ALL.len()],
             started_ns: u64::try_from(started_ns).unwrap_or(0),
             tick_nanos: manifest.rig.tick_nanos,
@@ -170,32 +142,64 @@ impl<S: Sink> LogWriter<S> {
             last_order: None,
             failure: None,
         };
-        writer.add_channels()?;
-        let json = readable_json("manifest", manifest)?;
-        writer.put(Channel::Manifest, Nanos::ZERO, &json)?;
-        writer.flush()?;
-        writer.sync()?;
+        writer.put_manifest()?;
         Ok(writer)
     }
 
-    fn add_channels(&mut self) -> Result<(), LogError> {
-        for channel in Channel::ALL {
-            let (name, encoding) = (channel.schema_name(), channel.schema_encoding());
-            let id = self
-                .container
-                .add_schema(name, encoding, &channel.schema())
-                .and_then(|schema_id| {
-                    self.container.add_channel(
-                        schema_id,
-                        channel.topic(),
-                        channel.message_encoding(),
-                        &channel.metadata(),
-                    )
-                })
-                .map_err(encode_error("list of channels"))?;
-            self.channel_ids[channel as usize] = id;
+    /// Starts a log that goes on in a new segment after every so many batches. When this returns,
+    /// the manifest survives a power cut.
+    pub fn begin_in_segments(
+        mut source: Box<dyn SegmentSource<Sink = S>>,
+        batches_per_segment: u32,
+        manifest: &Manifest,
+    ) -> Result<Self, LogError> {
+        let path = source.path(0);
+        let sink = source
+            .create(0)
+            .map_err(|err| LogError::disk(&err, &path))?;
+        let mut writer = Self::begin(sink, &path, manifest)?;
+        writer.rotation = Some(Rotation {
+            source,
+            batches_per_segment,
+        });
+        Ok(writer)
+    }
+
+    /// Goes on in a new segment if the present one is full.
+    ///
+    /// The new one's manifest is durable before the old one is finished, and the old one is
+    /// durable before the new one gets any data: wherever this is cut short, nothing is lost.
+    fn rotate_if_full(&mut self) -> Result<(), LogError> {
+        let Some(rotation) = &mut self.rotation else {
+            return Ok(());
+        };
+        if self.batches < rotation.batches_per_segment {
+            return Ok(());
         }
-        Ok(())
+        let number = self.number + 1;
+        let path = rotation.source.path(number);
+        let outcome = rotation
+            .source
+            .create(number)
+            .map_err(|err| LogError::disk(&err, &path))
+            .and_then(|sink| Segment::begin(sink, path, &self.library));
+        let next = self.noted(outcome)?;
+        let mut former = std::mem::replace(&mut self.segment, next);
+        (self.number, self.batches) = (number, 0);
+        self.put_manifest()?;
+        let outcome = former.finish();
+        self.noted(outcome)
+    }
+
+    /// Begins the segment with the manifest and makes it durable.
+    fn put_manifest(&mut self) -> Result<(), LogError> {
+        let json = std::mem::take(&mut self.manifest_json);
+        // Timed at the session's start in every segment: it is the same manifest.
+        let outcome = self.put(Channel::Manifest, Nanos::ZERO, &json);
+        self.manifest_json = json;
+        outcome?;
+        self.flush()?;
+        self.sync()
     }
 
     /// Adds rows and entries and hands everything so far to the sink.
@@ -204,6 +208,10 @@ impl<S: Sink> LogWriter<S> {
     pub fn append(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
         self.check_alive()?;
         self.check_input(rows, entries)?;
+        if !rows.is_empty() || !entries.is_empty() {
+            self.rotate_if_full()?;
+            self.batches += 1;
+        }
         for slice in block_slices(rows) {
             let Some(last) = slice.last() else { continue };
             let (daq, derived) = blocks_from_rows(self.samples, slice);
@@ -224,8 +232,8 @@ impl<S: Sink> LogWriter<S> {
     /// Makes everything handed to the sink survive a power cut.
     pub fn sync(&mut self) -> Result<(), LogError> {
         self.check_alive()?;
-        let outcome = self.sink.sync();
-        self.disk(outcome)
+        let outcome = self.segment.sync();
+        self.noted(outcome)
     }
 
     /// Writes the end record and the index and makes them durable.
@@ -245,9 +253,7 @@ impl<S: Sink> LogWriter<S> {
         };
         let json = readable_json("end record", &end)?;
         self.put(Channel::End, end.ended_at, &json)?;
-        self.container.finish().map_err(encode_error("index"))?;
-        self.hand_over()?;
-        self.sync()
+        self.segment.finish()
     }
 
     /// Samples written so far.
@@ -283,44 +289,24 @@ impl<S: Sink> LogWriter<S> {
         }
         let index = channel as usize;
         let header = MessageHeader {
-            channel_id: self.channel_ids[index],
+            channel_id: 0,
             sequence: self.sequences[index],
             log_time: self.started_ns.saturating_add(at.0),
             publish_time: self.controller_ns,
         };
         // A gap in the sequence shows a reader that a message is missing.
         self.sequences[index] = self.sequences[index].wrapping_add(1);
-        self.container
-            .write_to_known_channel(&header, data)
-            .map_err(encode_error(channel.topic()))
+        self.segment.put(channel, header, data)
     }
 
     fn flush(&mut self) -> Result<(), LogError> {
-        self.container.flush().map_err(encode_error("chunk"))?;
-        self.hand_over()
+        let outcome = self.segment.flush();
+        self.noted(outcome)
     }
 
-    fn hand_over(&mut self) -> Result<(), LogError> {
-        let mut bytes = std::mem::take(&mut self.tape.state().bytes);
-        if bytes.is_empty() {
-            return Ok(());
-        }
-        let outcome = self.sink.append(&bytes);
-        bytes.clear();
-        // The buffer is handed back so that no flush has to grow a new one.
-        self.tape.state().bytes = bytes;
-        self.disk(outcome)
-    }
-
-    fn disk(&mut self, outcome: io::Result<()>) -> Result<(), LogError> {
-        outcome.map_err(|err| {
-            let failure = LogError::Disk {
-                reason: err.to_string(),
-                path: self.path.clone(),
-            };
-            self.failure = Some(failure.clone());
-            failure
-        })
+    /// Remembers a failure: nothing is written after it.
+    fn noted<T>(&mut self, outcome: Result<T, LogError>) -> Result<T, LogError> {
+        outcome.inspect_err(|err| self.failure = Some(err.clone()))
     }
 }
 
@@ -393,7 +379,7 @@ fn json_error(what: &'static str) -> impl Fn(serde_json::Error) -> LogError {
     }
 }
 
-fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> LogError {
+pub(crate) fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> LogError {
     move |err| LogError::Encode {
         what,
         reason: err.to_string(),

@@ -11,4 +11,6 @@ mod pace;
 #[cfg(test)]
 mod round_trip;
 #[cfg(test)]
+mod segments;
+#[cfg(test)]
 mod support;
