@@ -43,7 +43,7 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
     };
     if let Some(live) = live {
         let text = format!(
-            "residual {:.1} mN rms, {} samples",
+            "weighted residual {:.1} mN, {} samples",
             live.rmse_weighted_n * 1e3,
             live.samples
         );
