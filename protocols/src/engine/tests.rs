@@ -405,3 +405,77 @@ fn steps_are_pure() {
     assert_eq!(a, b);
     bench.sample(volts(0.0));
 }
+
+/// Self-tested and jogging 15 mm at 9 mm/s; the command was sent with the last sample.
+fn jogging() -> Bench {
+    let mut bench = Bench::new(vec![
+        Step::SelfTest {
+            duration: Seconds(0.1),
+        },
+        Step::Jog {
+            distance_mm: 15.0,
+            speed: MmPerS(9.0),
+        },
+    ]);
+    bench.start();
+    for _ in 0..200 {
+        let sent = commands(&bench.sample(volts(0.0)));
+        if let [command @ RigCommand::MoveTo(_)] = sent[..] {
+            bench.give(Input::Ack(Ack { command }));
+            return bench;
+        }
+    }
+    panic!("no jog: {:?}", bench.state());
+}
+
+#[test]
+fn silence_counts_at_the_commanded_speed_before_any_sample_shows_it() {
+    let mut bench = jogging();
+    assert_eq!(bench.state().derived().velocity, MmPerS(0.0));
+    // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms.
+    bench.now = bench.now + Nanos::from_millis(21);
+    assert_eq!(
+        tripped(&bench.give(Input::Tick)),
+        Some(Interlock::SampleAge)
+    );
+}
+
+#[test]
+fn a_lost_stop_is_followed_by_a_halt() {
+    let mut bench = jogging();
+    bench.status = AxisStatus::MOTOR_ON | AxisStatus::MOVING;
+    bench.sample(volts(0.0));
+    let detail = "unplugged".to_owned();
+    let effects = bench.give(Input::Fault(Fault::LinkLost { detail }));
+    assert_eq!(commands(&effects), [RigCommand::Stop]);
+    bench.now = bench.now + Nanos::from_millis(2_001);
+    assert_eq!(commands(&bench.give(Input::Tick)), [RigCommand::Halt]);
+    assert_eq!(bench.state().holding(), None);
+    bench.now = bench.now + Nanos::from_millis(2_001);
+    bench.give(Input::Tick);
+    assert_eq!(
+        bench.state().holding().unwrap().ending,
+        EndingKind::Interlock
+    );
+}
+
+#[test]
+fn an_axis_that_moves_after_a_stop_is_cut() {
+    let mut bench = Bench::holding(10.0);
+    let choice = Operator::Stop;
+    bench.give(Input::Operator { choice });
+    bench.settle();
+    bench.status = AxisStatus::MOTOR_ON | AxisStatus::MOVING;
+    let effects = bench.sample(volts(0.0));
+    assert_eq!(tripped(&effects), Some(Interlock::Path));
+    assert_eq!(commands(&effects), [RigCommand::Halt]);
+    assert!(!bench.state().is_homed());
+}
+
+#[test]
+fn a_motor_without_current_trips() {
+    let mut bench = Bench::holding(10.0);
+    bench.status = AxisStatus::default();
+    assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Motor));
+    assert!(!bench.state().is_homed());
+}
