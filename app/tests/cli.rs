@@ -311,6 +311,19 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     let log = log_file(&at.join("whole"));
     let bytes = std::fs::read(&log).unwrap();
 
+    let mut manifest = palpate_sessions::Session::open(&log).unwrap().manifest;
+    manifest.record_version = palpate_sessions::RECORD_VERSION + 1;
+    let newer = palpate_sessions::SessionFolder::create(&at.join("newer")).unwrap();
+    let pace = palpate_sessions::Pace::Virtual;
+    drop(palpate_sessions::SessionWriter::start(newer, &manifest, pace).unwrap());
+    let output = palpate(at, &["info", "newer"]);
+    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
+    assert!(
+        stderr(&output).contains("update palpate"),
+        "{}",
+        stderr(&output)
+    );
+
     let truncated = at.join("truncated.mcap");
     std::fs::write(&truncated, &bytes[..bytes.len() * 2 / 3]).unwrap();
     let info = palpate(at, &["info", "truncated.mcap", "--json"]);
