@@ -193,11 +193,12 @@ fn trip(interlock: Interlock, reason: String) -> Option<Trip> {
     Some(Trip { interlock, reason })
 }
 
-/// A closed limit switch trips unless the axis leaves it, or has not been homed and only stands
-/// there: otherwise a probe parked on a switch could never come home.
+/// A closed limit switch trips unless the axis leaves it, or only stands there before it homes or
+/// retracts: otherwise a probe on a switch could never leave it.
 fn travel_trip(state: &State, reading: &Reading, limits: &Limits) -> Option<Trip> {
     let position = state.derived.position;
-    let is_parked = state.phase == Phase::SelfTest && !state.is_homed;
+    let is_parked = state.in_flight.is_none()
+        && (state.phase == Phase::SelfTest && !state.is_homed || state.phase == Phase::Retract);
     for (bit, which, is_forward) in [
         (AxisStatus::FORWARD_LIMIT, "far", true),
         (AxisStatus::REVERSE_LIMIT, "rear", false),

@@ -479,3 +479,32 @@ fn a_motor_without_current_trips() {
     assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Motor));
     assert!(!bench.state().is_homed());
 }
+
+#[test]
+fn a_probe_on_the_far_switch_may_leave_it_but_not_press_on() {
+    let mut bench = jogging();
+    bench.status = AxisStatus::MOTOR_ON | AxisStatus::MOVING | AxisStatus::FORWARD_LIMIT;
+    assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Travel));
+
+    let mut bench = Bench::holding(10.0);
+    let state = bench.state.as_mut().unwrap();
+    state.contact = Some(Contact {
+        position: Position(0.0),
+        std_error_mm: 0.01,
+    });
+    bench.pulses = 8000;
+    bench.status = AxisStatus::MOTOR_ON | AxisStatus::FORWARD_LIMIT;
+    bench.state.as_mut().unwrap().path.on_define(8000);
+    assert_eq!(tripped(&bench.sample(volts(0.0))), Some(Interlock::Travel));
+    bench.give(Input::Ack(Ack {
+        command: RigCommand::Stop,
+    }));
+    bench.sample(volts(0.0));
+    let choice = Operator::Retract;
+    bench.give(Input::Operator { choice });
+    assert_eq!(tripped(&bench.sample(volts(0.0))), None);
+    let command = RigCommand::EnableMotor;
+    let sent = commands(&bench.give(Input::Ack(Ack { command })));
+    assert!(matches!(sent[..], [RigCommand::MoveTo(command)] if command.target_pulses == 0));
+    assert_eq!(tripped(&bench.sample(volts(0.0))), None);
+}
