@@ -43,9 +43,20 @@ pub struct FitReport {
     pub samples: usize,
     /// What a reader of the numbers must know, one sentence each.
     pub warnings: Vec<String>,
+    /// What the fit found besides numbers, one sentence each: the memory of the noise, depths at
+    /// which the body is unstable or returns energy.
+    pub findings: Vec<String>,
 }
 
 impl FitReport {
+    /// Warnings, then findings: what window, command line and files say in the same words.
+    pub fn sentences(&self) -> impl Iterator<Item = &str> {
+        self.warnings
+            .iter()
+            .chain(&self.findings)
+            .map(String::as_str)
+    }
+
     /// The value of a parameter, in its unit; `None` for a name that is not one.
     #[must_use]
     pub fn value(&self, name: &str) -> Option<f64> {

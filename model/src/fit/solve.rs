@@ -185,6 +185,7 @@ fn report(
         rmse_n: residuals.rmse_n,
         samples: problem.samples.len(),
         warnings,
+        findings: Vec::new(),
     }
 }
 
