@@ -15,6 +15,7 @@ pub mod rig;
 pub mod signal;
 pub mod time;
 pub mod units;
+mod vectors;
 pub mod viscoelastic;
 
 pub use time::Nanos;

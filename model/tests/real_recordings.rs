@@ -53,8 +53,9 @@ fn perineal_indentation_is_explained() {
         report
             .warnings
             .iter()
-            .any(|text| text.contains("correlated"))
+            .any(|text| text.contains("long memory"))
     );
+    assert!(report.noise.unwrap().effective_samples < 30.0);
 
     let report = fit(&samples, &FitOptions::default()).unwrap();
     println!("{report:#?}");

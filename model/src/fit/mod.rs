@@ -4,21 +4,29 @@
 //! linear in everything else, so the fit is a search over one number with a small least-squares
 //! problem inside.
 
+mod bootstrap;
 mod design;
 mod identify;
 mod live;
 mod live_stencil;
+mod noise;
 mod options;
-mod problem;
+mod profile;
 mod refine;
 mod report;
 mod sample;
 mod scan;
+mod sentences;
 mod solve;
+mod system;
+mod thin;
 mod triangle;
+mod uncertainty;
 
+pub use bootstrap::{Bootstrap, BootstrapInterval};
 pub use live::{LiveEstimate, LiveFit};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
-pub use report::{FitReport, MODEL_NAME, Parameter};
+pub use profile::ProfileInterval;
+pub use report::{FitReport, JointReport, MODEL_NAME, NamedReport, NoiseFound, Parameter};
 pub use sample::{FitError, FitSample};
-pub use solve::fit;
+pub use solve::{Fitted, fit, fit_joint};

@@ -1,11 +1,14 @@
 //! Gauss-Newton on the projected problem (Kaufman, BIT 15 (1975) 49-57), on all samples.
 
-use super::problem::{Outer, Problem, Scaled};
-use super::scan::Start;
-use super::triangle::Factor;
+use super::options::{CONTACT, TAU};
+use super::system::{Outer, Pass, Point, System};
 
-/// Steps of the outer parameters below this end the iteration.
-const STEP_MIN: f64 = 1e-12;
+/// A step of the outer parameters below this is rounding.
+const STEP_ZERO: f64 = 1e-13;
+/// Below this a step that no longer shrinks is rounding too.
+const STEP_MIN: f64 = 1e-9;
+/// A step below this share of its standard error leaves its square and a share of noise of that.
+const STEP_SHARE: f64 = 1e-3;
 /// Iterations and step halvings together.
 const PASSES_MAX: usize = 60;
 /// Longest single step of `ln tau` and of the scaled contact.
@@ -13,7 +16,7 @@ const STEP_MAX: [f64; 2] = [1.0, 0.08];
 /// Rounding level of a sum of squares, relative to that of the forces.
 const ROUNDING: f64 = 1e-26;
 
-/// Where the outer parameters may go.
+/// Where the outer parameters of a record may go.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Ranges {
     pub log_tau: (f64, f64),
@@ -24,89 +27,117 @@ pub(super) struct Ranges {
 /// The end of the iteration.
 #[derive(Clone, Debug)]
 pub(super) struct Refined {
-    pub outer: Outer,
-    pub scaled: Scaled,
-    /// Triangle at the end: free columns, free outer parameters, force.
-    pub factor: Factor,
+    pub points: Vec<Point>,
+    /// The triangles within one last small step of the end.
+    pub pass: Pass,
     /// Weighted sum of squares left.
     pub sum: f64,
     pub is_converged: bool,
 }
 
 /// Follows a start to the minimum of the weighted sum of squares.
-pub(super) fn refine(problem: &Problem<'_>, start: &Start, ranges: Ranges) -> Refined {
-    let free = problem.basis.len();
-    let all = free + problem.outer_free();
-    let mut outer = start.outer;
-    let mut scaled = start.scaled;
+pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) -> Refined {
+    let (linear, all) = (system.linear, system.unknowns.len());
+    let mut points = start.to_vec();
     let mut best: Option<Refined> = None;
     // The step that led from the best point to the present one.
-    let mut step: [f64; 2] = [0.0; 2];
+    let mut step = vec![0.0; all - linear];
+    // Length of the step before.
+    let mut before = f64::INFINITY;
     for _ in 0..PASSES_MAX {
-        let factor = problem.exact_factor(outer, &scaled);
-        let sum = factor.residual_sum(free);
-        let solution = factor.solve(all);
+        let pass = system.pass(&points);
+        let sum = pass.joint.residual_sum(linear);
+        let solution = pass.joint.solve(all);
         let is_usable = sum.is_finite() && solution.iter().all(|value| value.is_finite());
         if let Some(best) = &mut best {
-            let allowed = best.sum * (1.0 + 1e-10) + ROUNDING * factor.residual_sum(0);
+            let allowed = best.sum * (1.0 + 1e-10) + ROUNDING * pass.joint.residual_sum(0);
             if !is_usable || sum > allowed {
-                step = [0.5 * step[0], 0.5 * step[1]];
-                if step[0].abs().max(step[1].abs()) < STEP_MIN {
+                step.iter_mut().for_each(|step| *step *= 0.5);
+                if length(&step) < STEP_ZERO {
                     best.is_converged = true;
                     break;
                 }
-                outer = moved(best.outer, step, ranges);
+                points = moved(system, &best.points, &step, ranges).0;
                 continue;
             }
         } else if !is_usable {
             return Refined {
-                outer,
-                scaled,
-                factor,
+                points,
+                pass,
                 sum,
                 is_converged: false,
             };
         }
-        let mut outer_step = solution[free..].iter();
-        let mut next = |is_free: bool, max: f64| -> f64 {
-            let wanted = if is_free { outer_step.next() } else { None };
-            wanted.copied().unwrap_or(0.0).clamp(-max, max)
+        let wanted: Vec<f64> = solution[linear..]
+            .iter()
+            .zip(&system.unknowns[linear..])
+            .map(|(step, unknown)| {
+                let longest = STEP_MAX[usize::from(unknown.parameter == CONTACT)];
+                step.clamp(-longest, longest)
+            })
+            .collect();
+        let (mut target, taken) = moved(system, &points, &wanted, ranges);
+        let is_whole = taken == solution[linear..];
+        step = taken;
+        // Coefficients that go with the step to first order; where it was cut short, those of here.
+        let coefficients = if is_whole {
+            solution
+        } else {
+            pass.joint.solve(linear)
         };
-        let wanted = [
-            next(problem.fixed_tau.is_none(), STEP_MAX[0]),
-            next(problem.fixed_contact.is_none(), STEP_MAX[1]),
-        ];
-        let target = moved(outer, wanted, ranges);
-        step = [
-            target.log_tau - outer.log_tau,
-            target.contact - outer.contact,
-        ];
-        let is_converged = step[0].abs().max(step[1].abs()) < STEP_MIN;
-        // The derivative columns were taken at the coefficients of the point before; with them
-        // renewed at this point the iteration converges as if they were exact.
-        scaled = problem.scaled(&factor.solve(free));
+        for (record, point) in target.iter_mut().enumerate() {
+            point.at = system.coefficients(record, &coefficients[..linear]);
+        }
+        let scatter = (sum / (system.measured() - all).max(1) as f64).sqrt();
+        let is_lost_in_noise = step.iter().enumerate().all(|(i, step)| {
+            let mut outer = vec![0.0; all];
+            outer[linear + i] = 1.0;
+            let error = pass.joint.deviation(&outer) * scatter;
+            step.abs() < (STEP_SHARE * error).min(STEP_SHARE)
+        });
+        let is_rounding =
+            length(&step) < STEP_ZERO || (length(&step) < STEP_MIN && 2.0 * length(&step) > before);
+        let is_converged = is_rounding || (is_whole && is_lost_in_noise);
+        before = length(&step);
+        let mut here = std::mem::replace(&mut points, target);
+        let at_here = pass.joint.solve(linear);
+        for (record, point) in here.iter_mut().enumerate() {
+            point.at = system.coefficients(record, &at_here);
+        }
         best = Some(Refined {
-            outer,
-            scaled,
-            factor,
-            sum,
+            points: if is_converged { points.clone() } else { here },
+            sum: if is_converged && is_whole {
+                pass.joint.residual_sum(all)
+            } else {
+                sum
+            },
+            pass,
             is_converged,
         });
         if is_converged {
             break;
         }
-        outer = target;
     }
     best.unwrap_or_else(|| Refined {
-        outer,
-        scaled,
-        factor: problem.exact_factor(outer, &scaled),
+        pass: system.pass(&points),
+        points,
         sum: f64::NAN,
         is_converged: false,
     })
 }
 
-fn moved(from: Outer, step: [f64; 2], ranges: Ranges) -> Outer {
+fn length(step: &[f64]) -> f64 {
+    step.iter()
+        .fold(0.0, |longest, step| longest.max(step.abs()))
+}
+
+/// The points after a step of the outer unknowns, and the step as far as the ranges allow it.
+fn moved(
+    system: &System<'_>,
+    from: &[Point],
+    step: &[f64],
+    ranges: &[Ranges],
+) -> (Vec<Point>, Vec<f64>) {
     // A fixed value may lie outside the searched range.
     let within = |from: f64, step: f64, (low, high): (f64, f64)| {
         if step == 0.0 {
@@ -115,8 +146,40 @@ fn moved(from: Outer, step: [f64; 2], ranges: Ranges) -> Outer {
             (from + step).clamp(low, high)
         }
     };
-    Outer {
-        log_tau: within(from.log_tau, step[0], ranges.log_tau),
-        contact: within(from.contact, step[1], ranges.contact),
-    }
+    let outer = &system.unknowns[system.linear..];
+    let mut taken = step.to_vec();
+    let points: Vec<Point> = from
+        .iter()
+        .enumerate()
+        .map(|(record, point)| {
+            let Outer {
+                mut tau,
+                mut contact,
+            } = point.outer;
+            for ((unknown, step), taken) in outer.iter().zip(step).zip(&mut taken) {
+                if unknown.record.is_some_and(|own| own != record) {
+                    continue;
+                }
+                if unknown.parameter == TAU {
+                    let log_tau = tau.ln();
+                    let allowed = within(log_tau, *step, ranges[record].log_tau);
+                    if allowed != log_tau + step {
+                        *taken = allowed - log_tau;
+                    }
+                    tau += tau * taken.exp_m1();
+                } else {
+                    let target = within(contact, *step, ranges[record].contact);
+                    if target != contact + step {
+                        *taken = target - contact;
+                    }
+                    contact = target;
+                }
+            }
+            Point {
+                outer: Outer { tau, contact },
+                ..*point
+            }
+        })
+        .collect();
+    (points, taken)
 }

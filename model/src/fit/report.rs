@@ -1,9 +1,13 @@
 //! What a fit found.
 
-use super::design::Columns;
-use super::options::{CONTACT, LINEAR, PARAMETER_NAMES, TAU};
-use super::problem::{Outer, Problem, linear_units, product, walk};
+use super::design::walk;
+use super::noise::Memory;
+use super::options::{CONTACT, LINEAR, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
 use super::sample::FitSample;
+use super::solve::Fitted;
+use super::system::{Point, Record};
+use super::uncertainty::{Error, Uncertainty};
+use super::{design::Scale, design::powers_from_legendre, sentences};
 use crate::units::Newtons;
 use crate::viscoelastic::ModifiedKelvin;
 use serde::{Deserialize, Serialize};
@@ -20,15 +24,27 @@ pub struct Parameter {
     pub value: f64,
     /// The unit of value, error and interval.
     pub unit: String,
-    /// Standard error for independent force noise; `None` where it was fixed or not determined.
+    /// Standard error, the memory of the residuals allowed for; `None` where it was fixed or not
+    /// determined.
     pub std_error: Option<f64>,
-    /// 95 % interval from Student's t, under the same assumption.
+    /// 95 % interval from Student's t.
     pub ci95: Option<[f64; 2]>,
     /// Whether it was kept at a given value.
     pub is_fixed: bool,
 }
 
-/// The result of [`super::fit`].
+/// What the residuals remember.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct NoiseFound {
+    /// Share of the residual variance that lasts longer than a sample, 0..=1.
+    pub slow_share: f64,
+    /// Time in s within which the lasting part forgets all but 1/e; `None` without memory.
+    pub correlation_time_s: Option<f64>,
+    /// How many independent samples would tell as much.
+    pub effective_samples: f64,
+}
+
+/// The result of [`super::fit()`].
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct FitReport {
     /// The model fitted.
@@ -41,11 +57,33 @@ pub struct FitReport {
     pub rmse_n: f64,
     /// Samples used.
     pub samples: usize,
+    /// Samples whose force was left out, being censored.
+    pub censored: usize,
+    /// What the residuals remember; `None` where the record is too short to tell.
+    pub noise: Option<NoiseFound>,
     /// What a reader of the numbers must know, one sentence each.
     pub warnings: Vec<String>,
     /// What the fit found besides numbers, one sentence each: the memory of the noise, depths at
     /// which the body is unstable or returns energy.
     pub findings: Vec<String>,
+}
+
+/// The result of [`super::fit_joint`].
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct JointReport {
+    /// The parameters that are the same in all records.
+    pub shared: Vec<String>,
+    /// One report for each record, in the order given.
+    pub records: Vec<NamedReport>,
+}
+
+/// One record's part of a joint fit.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NamedReport {
+    /// The record.
+    pub record: String,
+    /// Its parameters, shared ones included.
+    pub report: FitReport,
 }
 
 impl FitReport {
@@ -87,117 +125,187 @@ impl FitReport {
     #[must_use]
     pub fn predict(&self, samples: &[FitSample]) -> Vec<Newtons> {
         let value = |index: usize| self.parameters[index].value;
-        let outer = Outer {
-            log_tau: value(TAU).ln(),
+        // Depth scale 1: scaled and physical coefficients are the same.
+        let scale = Scale {
+            depth_mm: 1.0,
             contact: value(CONTACT),
         };
         let scaled = std::array::from_fn(|k| value(LINEAR + k));
         let mut forces = Vec::with_capacity(samples.len());
         let mut before = f64::NEG_INFINITY;
         let mut is_valid = true;
-        // Depth scale 1: scaled and physical coefficients are the same.
-        walk(samples, 1.0, outer, |sample, columns: &Columns<true>| {
-            is_valid &= sample.t.0 > before && sample.depth.is_finite() && sample.t.is_finite();
-            before = sample.t.0;
-            forces.push(Newtons(if is_valid {
-                product(&columns.row(), &scaled)
-            } else {
-                f64::NAN
-            }));
+        walk::<false>(samples, scale, value(TAU), |block, rows| {
+            let force = rows.force(&scaled);
+            for (sample, force) in block.iter().zip(force) {
+                is_valid &= sample.t.0 > before && sample.depth.is_finite() && sample.t.is_finite();
+                before = sample.t.0;
+                forces.push(Newtons(if is_valid { force } else { f64::NAN }));
+            }
         });
         forces
     }
 }
 
-/// Everything a report is made from.
-pub(super) struct Findings {
-    /// Physical values in the order of [`PARAMETER_NAMES`].
-    pub values: [f64; 8],
-    pub std_errors: [Option<f64>; 8],
-    pub is_fixed: [bool; 8],
-    pub degrees_of_freedom: usize,
-}
+impl Fitted<'_> {
+    /// The report of a fit of one record; of several, that of the first.
+    #[must_use]
+    pub fn report(&self) -> FitReport {
+        self.record_report(&Uncertainty::of(&self.system, &self.refined), 0)
+    }
 
-impl Findings {
-    pub fn parameters(&self) -> Vec<Parameter> {
-        let quantile = student_t975(self.degrees_of_freedom);
-        (0..PARAMETER_NAMES.len())
-            .map(|index| {
-                let value = self.values[index];
-                let std_error = self.std_errors[index].filter(|error| error.is_finite());
-                Parameter {
-                    name: PARAMETER_NAMES[index].to_owned(),
-                    value,
-                    unit: super::options::PARAMETER_UNITS[index].to_owned(),
-                    std_error,
-                    ci95: std_error.map(|error| {
-                        let half = quantile * error;
-                        [value - half, value + half]
-                    }),
-                    is_fixed: self.is_fixed[index],
+    /// The reports of all records.
+    #[must_use]
+    pub fn joint_report(&self) -> JointReport {
+        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        JointReport {
+            shared: (0..PARAMETER_NAMES.len())
+                .filter(|&k| self.system.is_shared(k))
+                .map(|k| PARAMETER_NAMES[k].to_owned())
+                .collect(),
+            records: (0..self.system.records.len())
+                .map(|record| NamedReport {
+                    record: self.system.records[record].name.to_owned(),
+                    report: self.record_report(&uncertainty, record),
+                })
+                .collect(),
+        }
+    }
+
+    fn record_report(&self, uncertainty: &Uncertainty, record: usize) -> FitReport {
+        let samples = self.system.records[record].samples;
+        let measured = self.system.records[record].measured;
+        let point = &self.refined.points[record];
+        let residuals = self.residuals(record);
+        let errors = self.errors(uncertainty, record);
+        let parameters = parameters(&self.system.physical(point), &errors, |k| {
+            self.system.fixed(k).is_some()
+        });
+        let noise = uncertainty.memories[record].map(|memory| {
+            let scatter = uncertainty.scatter.unwrap_or(0.0);
+            let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
+            let interval = length / (samples.len() - 1) as f64;
+            let block = uncertainty.block_length(record);
+            noise_found(&memory, scatter * scatter, interval, block, measured)
+        });
+        let mut report = FitReport {
+            model: MODEL_NAME.to_owned(),
+            parameters,
+            r2: residuals.r2,
+            rmse_n: residuals.rmse_n,
+            samples: measured,
+            censored: samples.len() - measured,
+            noise,
+            warnings: Vec::new(),
+            findings: Vec::new(),
+        };
+        report.warnings = sentences::warnings(self, record, &report);
+        report.findings = sentences::findings(self, record, &report);
+        report
+    }
+
+    /// Unweighted residuals of the final model in one pass.
+    fn residuals(&self, record: usize) -> Residuals {
+        let Record { samples, .. } = &self.system.records[record];
+        let point = &self.refined.points[record];
+        let scaled = scaled_powers(point);
+        let measured = || samples.iter().filter(|sample| sample.is_measured());
+        let count = self.system.records[record].measured as f64;
+        let mean = measured().map(|sample| sample.force.0).sum::<f64>() / count;
+        let (mut sum, mut total) = (0.0, 0.0);
+        let scale = self.system.scale(point.outer);
+        walk::<false>(samples, scale, point.outer.tau, |block, rows| {
+            let model = rows.force(&scaled);
+            for (sample, model) in block.iter().zip(model) {
+                if sample.is_measured() {
+                    sum += (sample.force.0 - model).powi(2);
+                    total += (sample.force.0 - mean).powi(2);
                 }
-            })
-            .collect()
+            }
+        });
+        Residuals {
+            r2: if total > 0.0 {
+                1.0 - sum / total
+            } else {
+                f64::NAN
+            },
+            rmse_n: (sum / count).sqrt(),
+        }
     }
 }
 
-/// Residuals of the final model in one pass.
-pub(super) struct Residuals {
-    pub r2: f64,
-    pub rmse_n: f64,
-    /// Correlation of neighbouring weighted residuals.
-    pub lag_one: f64,
+struct Residuals {
+    r2: f64,
+    rmse_n: f64,
 }
 
-pub(super) fn residuals(problem: &Problem<'_>, outer: Outer, scaled: &[f64; 6]) -> Residuals {
-    let count = problem.samples.len() as f64;
-    let mean = problem.samples.iter().map(|s| s.force.0).sum::<f64>() / count;
-    let (mut sum, mut total, mut weighted, mut lagged) = (0.0, 0.0, 0.0, 0.0);
-    let mut before = 0.0;
-    problem.visit(outer, |sample, columns| {
-        let residual = sample.force.0 - product(&columns.row(), scaled);
-        sum += residual * residual;
-        total += (sample.force.0 - mean).powi(2);
-        let here = residual * problem.weight(sample);
-        weighted += here * here;
-        lagged += here * before;
-        before = here;
-    });
-    Residuals {
-        r2: if total > 0.0 {
-            1.0 - sum / total
-        } else {
-            f64::NAN
-        },
-        rmse_n: (sum / count).sqrt(),
-        lag_one: if weighted > 0.0 {
-            lagged / weighted
-        } else {
-            0.0
-        },
+/// Coefficients of the bare powers of scaled depth.
+pub(super) fn scaled_powers(point: &Point) -> [f64; 6] {
+    let [p1, p2, p3] = powers_from_legendre(&point.at);
+    [p1, p2, p3, point.at[3], point.at[4], point.at[5]]
+}
+
+/// Values with their errors and intervals.
+pub(super) fn parameters(
+    values: &[f64; 8],
+    errors: &[Option<Error>; 8],
+    is_fixed: impl Fn(usize) -> bool,
+) -> Vec<Parameter> {
+    (0..PARAMETER_NAMES.len())
+        .map(|index| {
+            let value = values[index];
+            Parameter {
+                name: PARAMETER_NAMES[index].to_owned(),
+                value,
+                unit: PARAMETER_UNITS[index].to_owned(),
+                std_error: errors[index].map(|error| error.std_error),
+                ci95: errors[index].map(|error| {
+                    let half = student_t975(error.freedom) * error.std_error;
+                    [value - half, value + half]
+                }),
+                is_fixed: is_fixed(index),
+            }
+        })
+        .collect()
+}
+
+/// Memory in blocks as time and shares. The lasting part of variance `A` forgets as
+/// `exp(-t / theta)`; neighbouring sums of `m` samples then have the covariance
+/// `A m^2 ((1 - e^-r) / r)^2`, `r` being the length of a block over theta.
+fn noise_found(
+    memory: &Memory,
+    white: f64,
+    interval: f64,
+    block: f64,
+    samples: usize,
+) -> NoiseFound {
+    let effective_samples = (samples as f64 * white / memory.long_run()).clamp(1.0, samples as f64);
+    if memory.neighbour <= 0.0 || white <= 0.0 {
+        return NoiseFound {
+            slow_share: 0.0,
+            correlation_time_s: None,
+            effective_samples: samples as f64,
+        };
     }
-}
-
-/// Scaled coefficients and outer parameters as physical values.
-pub(super) fn physical(outer: Outer, scaled: &[f64; 6], depth_scale: f64) -> [f64; 8] {
-    let units = linear_units(depth_scale);
-    std::array::from_fn(|index| match index {
-        TAU => outer.tau(),
-        CONTACT => outer.contact * depth_scale,
-        _ => scaled[index - LINEAR] / units[index - LINEAR],
-    })
+    let r = -memory.forgetting.ln();
+    let lost = -(-r).exp_m1();
+    let slow = memory.level * memory.neighbour * (r / lost).powi(2) / block;
+    NoiseFound {
+        slow_share: (slow / white).min(1.0),
+        correlation_time_s: Some(block * interval / r),
+        effective_samples,
+    }
 }
 
 /// The 97.5 % point of Student's t: exact for 1 and 2 degrees of freedom, else the expansion of
 /// Abramowitz & Stegun 26.7.5, good to 1e-2 at 3 and to 1e-4 from 6 on.
-fn student_t975(degrees_of_freedom: usize) -> f64 {
+pub(super) fn student_t975(degrees_of_freedom: f64) -> f64 {
     let z: f64 = 1.959_963_984_540_054;
-    match degrees_of_freedom {
-        0 => f64::NAN,
-        1 => 12.706_204_736,
-        2 => 4.302_652_730,
+    match degrees_of_freedom.floor() {
+        ..1.0 => f64::NAN,
+        ..2.0 => 12.706_204_736,
+        ..3.0 => 4.302_652_730,
         _ => {
-            let n = degrees_of_freedom as f64;
+            let n = degrees_of_freedom;
             let (z3, z5) = (z.powi(3), z.powi(5));
             let (z7, z9) = (z.powi(7), z.powi(9));
             z + (z3 + z) / (4.0 * n)
@@ -216,11 +324,11 @@ mod tests {
     #[test]
     fn student_quantiles_match_the_table() {
         for (n, exact, allowed) in [
-            (3, 3.182_446, 1.5e-2),
-            (6, 2.446_912, 1e-3),
-            (10, 2.228_139, 1e-4),
-            (30, 2.042_272, 1e-6),
-            (1000, 1.962_339, 1e-6),
+            (3.0, 3.182_446, 1.5e-2),
+            (6.0, 2.446_912, 1e-3),
+            (10.0, 2.228_139, 1e-4),
+            (30.0, 2.042_272, 1e-6),
+            (1000.0, 1.962_339, 1e-6),
         ] {
             assert!((student_t975(n) - exact).abs() < allowed, "{n}");
         }

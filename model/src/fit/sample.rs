@@ -12,8 +12,18 @@ pub struct FitSample {
     pub depth: Depth,
     /// Measured force.
     pub force: Newtons,
-    /// Standard deviation of this force; the sample weighs `1 / sigma^2`.
+    /// Standard deviation of this force; the sample weighs `1 / sigma^2`. Infinite for a censored
+    /// sample, one whose force is not known (a saturated load cell, a reading distrusted by an
+    /// interlock): its depth counts, its force does not and may be anything.
     pub sigma: Newtons,
+}
+
+impl FitSample {
+    /// Whether its force counts.
+    #[must_use]
+    pub fn is_measured(&self) -> bool {
+        self.sigma.0 < f64::INFINITY
+    }
 }
 
 /// A fit could not be made; the text says what to change.
@@ -22,10 +32,10 @@ pub struct FitSample {
 pub enum FitError {
     /// Fewer samples than free parameters, or none at all.
     #[error(
-        "the record has {samples} sample(s) and the fit {parameters} free parameter(s); record more samples or fix parameters"
+        "the record has {samples} sample(s) with a force and the fit {parameters} free parameter(s); record more samples or fix parameters"
     )]
     TooFewSamples {
-        /// Samples given.
+        /// Samples whose force counts.
         samples: usize,
         /// Parameters left free.
         parameters: usize,
@@ -78,6 +88,27 @@ pub enum FitError {
         /// Why, and which record could.
         advice: String,
     },
+    /// One record of several could not be fitted.
+    #[error("{reason}, in {record}")]
+    InRecord {
+        /// Its name.
+        record: String,
+        /// Why.
+        reason: Box<FitError>,
+    },
+    /// A parameter that records cannot share.
+    #[error(
+        "{name} belongs to one recording and cannot be shared; share any of tau_eps, mu1, mu2, mu3, tau_sig"
+    )]
+    NotShareable {
+        /// The parameter.
+        name: String,
+    },
+    /// A profile over more than one dimension.
+    #[error(
+        "profile intervals need one relaxation time and a fixed contact; fix x_contact, or share tau_eps"
+    )]
+    ProfileTooWide,
     /// A parameter that the model does not have.
     #[error("the model has no parameter called '{name}'; it has {known}")]
     UnknownParameter {
@@ -120,12 +151,16 @@ pub(super) fn check_samples(samples: &[FitSample]) -> Result<(), FitError> {
             ("time", sample.t.0),
             ("depth", sample.depth.0),
             ("force", sample.force.0),
-            ("force uncertainty", sample.sigma.0),
         ];
-        if let Some((what, value)) = named.into_iter().find(|(_, value)| !value.is_finite()) {
+        // The force of a censored sample means nothing.
+        let counted = if sample.is_measured() { 3 } else { 2 };
+        let bad = named[..counted]
+            .iter()
+            .find(|(_, value)| !value.is_finite());
+        if let Some(&(what, value)) = bad {
             return Err(FitError::NotFinite { index, what, value });
         }
-        if sample.sigma.0 <= 0.0 {
+        if sample.sigma.0.is_nan() || sample.sigma.0 <= 0.0 {
             return Err(FitError::SigmaNotPositive {
                 index,
                 sigma: sample.sigma.0,

@@ -4,8 +4,8 @@
 //! Computations", 4th ed., section 6.5.3): the design is never held and never squared, so a
 //! condition of 1e2 costs two digits and not four.
 
-/// Rows gathered before they are rotated into the triangle.
-const BLOCK: usize = 64;
+use super::design::{LANES, Lane};
+use crate::vectors::wide;
 
 /// The upper triangle of all rows so far.
 #[derive(Clone, Debug)]
@@ -14,7 +14,7 @@ pub(crate) struct Triangle {
     /// `r[i * width + j]`, zero below the diagonal.
     r: Vec<f64>,
     /// Column-major block of waiting rows.
-    block: Vec<[f64; BLOCK]>,
+    block: Vec<Lane>,
     waiting: usize,
 }
 
@@ -24,7 +24,7 @@ impl Triangle {
         Self {
             width,
             r: vec![0.0; width * width],
-            block: vec![[0.0; BLOCK]; width],
+            block: vec![[0.0; LANES]; width],
             waiting: 0,
         }
     }
@@ -36,21 +36,32 @@ impl Triangle {
             column[self.waiting] = value * weight;
         }
         self.waiting += 1;
-        if self.waiting == BLOCK {
-            self.reduce();
+        if self.waiting == LANES {
+            self.flush();
         }
+    }
+
+    /// Adds the first `count` rows of whole columns, which are used up.
+    #[inline(always)]
+    pub fn push_lanes(&mut self, columns: &mut [Lane], count: usize) {
+        if count < LANES {
+            for column in columns.iter_mut() {
+                column[count..].fill(0.0);
+            }
+        }
+        reduce(&mut self.r, self.width, columns);
     }
 
     /// The finished triangle, `width` by `width`, row by row.
     pub fn finish(mut self) -> Factor {
-        self.reduce();
+        self.flush();
         Factor {
             width: self.width,
             r: self.r,
         }
     }
 
-    fn reduce(&mut self) {
+    fn flush(&mut self) {
         if self.waiting == 0 {
             return;
         }
@@ -58,39 +69,48 @@ impl Triangle {
             column[self.waiting..].fill(0.0);
         }
         self.waiting = 0;
-        for j in 0..self.width {
-            let (done, rest) = self.block.split_at_mut(j + 1);
-            let v = &mut done[j];
-            let below = dot(v, v);
-            if below == 0.0 {
-                continue;
-            }
-            let diagonal = self.r[j * self.width + j];
-            let norm = (diagonal * diagonal + below).sqrt();
-            let new_diagonal = if diagonal > 0.0 { -norm } else { norm };
-            let head = diagonal - new_diagonal;
-            // Reflection I - tau w w' with w = (1, v / head).
-            let tau = -head / new_diagonal;
-            let over_head = 1.0 / head;
-            for value in v.iter_mut() {
-                *value *= over_head;
-            }
-            self.r[j * self.width + j] = new_diagonal;
-            for (offset, column) in rest.iter_mut().enumerate() {
-                let top = &mut self.r[j * self.width + j + 1 + offset];
-                let share = tau * (*top + dot(v, column));
-                *top -= share;
-                for (value, v) in column.iter_mut().zip(v.iter()) {
-                    *value -= share * v;
-                }
+        wide(
+            #[inline(always)]
+            || reduce(&mut self.r, self.width, &mut self.block),
+        );
+    }
+}
+
+/// Rotates a block of rows, given by columns, into the triangle `r`.
+#[inline(always)]
+fn reduce(r: &mut [f64], width: usize, block: &mut [Lane]) {
+    for j in 0..width.min(block.len()) {
+        let (done, rest) = block.split_at_mut(j + 1);
+        let v = &mut done[j];
+        let below = dot(v, v);
+        if below == 0.0 {
+            continue;
+        }
+        let diagonal = r[j * width + j];
+        let norm = (diagonal * diagonal + below).sqrt();
+        let new_diagonal = if diagonal > 0.0 { -norm } else { norm };
+        let head = diagonal - new_diagonal;
+        // Reflection I - tau w w' with w = (1, v / head).
+        let tau = -head / new_diagonal;
+        let over_head = 1.0 / head;
+        for value in v.iter_mut() {
+            *value *= over_head;
+        }
+        r[j * width + j] = new_diagonal;
+        for (offset, column) in rest.iter_mut().enumerate() {
+            let top = &mut r[j * width + j + 1 + offset];
+            let share = tau * (*top + dot(v, column));
+            *top -= share;
+            for (value, v) in column.iter_mut().zip(v.iter()) {
+                *value -= share * v;
             }
         }
     }
 }
 
 /// Eight partial sums, so that the additions do not wait for each other.
-#[inline]
-fn dot(a: &[f64; BLOCK], b: &[f64; BLOCK]) -> f64 {
+#[inline(always)]
+fn dot(a: &Lane, b: &Lane) -> f64 {
     let mut sums = [0.0; 8];
     for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
         for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
@@ -108,6 +128,16 @@ pub(crate) struct Factor {
 }
 
 impl Factor {
+    /// How many columns, the force included.
+    pub fn width(&self) -> usize {
+        self.width
+    }
+
+    /// Row `i`.
+    pub fn row(&self, i: usize) -> &[f64] {
+        &self.r[i * self.width..(i + 1) * self.width]
+    }
+
     fn at(&self, i: usize, j: usize) -> f64 {
         self.r[i * self.width + j]
     }
@@ -129,15 +159,33 @@ impl Factor {
         solution
     }
 
-    /// `|R^-T l|` over the first `columns` columns: the standard deviation of the combination `l`
-    /// of coefficients, for residuals of unit variance.
+    /// `|R^-T l|` over the first columns: the standard deviation of the combination `l` of
+    /// coefficients, for residuals of unit variance.
     pub fn deviation(&self, combination: &[f64]) -> f64 {
+        let y = self.forward(combination);
+        y.iter().map(|y| y * y).sum::<f64>().sqrt()
+    }
+
+    /// `(R'R)^-1 l` over the first columns: how the estimate of the combination `l` of
+    /// coefficients weighs the columns.
+    pub fn influence(&self, combination: &[f64]) -> Vec<f64> {
+        let y = self.forward(combination);
+        let mut solution = vec![0.0; y.len()];
+        for i in (0..y.len()).rev() {
+            let known: f64 = (i + 1..y.len()).map(|j| self.at(i, j) * solution[j]).sum();
+            solution[i] = (y[i] - known) / self.at(i, i);
+        }
+        solution
+    }
+
+    /// `R^-T l`.
+    fn forward(&self, combination: &[f64]) -> Vec<f64> {
         let mut y = vec![0.0; combination.len()];
         for i in 0..combination.len() {
             let known: f64 = (0..i).map(|j| self.at(j, i) * y[j]).sum();
             y[i] = (combination[i] - known) / self.at(i, i);
         }
-        y.iter().map(|y| y * y).sum::<f64>().sqrt()
+        y
     }
 
     /// Singular values of the first `columns` columns, each scaled to unit length, with the right

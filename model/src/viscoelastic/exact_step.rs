@@ -17,7 +17,9 @@ use super::psi::{PSI_COUNT, psi_all};
 /// Far below the last digit of any force (1e-16 of 1e-3 N), far above the subnormal numbers.
 pub(crate) const NEGLIGIBLE: f64 = 1e-200;
 
-/// A running sum with its rounding error carried along (Knuth's two-sum).
+/// A running sum with its rounding error carried along (Dekker's fast two-sum, Numer. Math. 18 (1971)
+/// 224-242: exact where the sum outweighs the increment, and where it does not, there is little to
+/// lose yet).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct Compensated {
     /// The sum.
@@ -36,8 +38,7 @@ impl Compensated {
     pub fn add(&mut self, increment: f64) {
         let increment = increment + self.carry;
         let sum = self.value + increment;
-        let part = sum - self.value;
-        self.carry = (self.value - (sum - part)) + (increment - part);
+        self.carry = increment - (sum - self.value);
         self.value = sum;
     }
 

@@ -1,5 +1,6 @@
 //! Viscoelastic force models.
 
+pub mod admissibility;
 mod exact_step;
 mod kelvin;
 mod psi;

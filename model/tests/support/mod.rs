@@ -76,3 +76,28 @@ pub fn noisy(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
         })
         .collect()
 }
+
+/// The same samples with slow noise (standard deviation `slow`, exponential memory of `memory` s) and
+/// white noise (standard deviation `white`), in N.
+pub fn remembering(
+    samples: &[FitSample],
+    seed: u64,
+    (slow, memory, white): (f64, f64, f64),
+) -> Vec<FitSample> {
+    let mut noise = Noise::seeded(seed);
+    let mut state = noise.normal();
+    let mut before = samples[0].t.0;
+    samples
+        .iter()
+        .map(|sample| {
+            let kept = (-(sample.t.0 - before) / memory).exp();
+            state = kept * state + (1.0 - kept * kept).sqrt() * noise.normal();
+            before = sample.t.0;
+            let error = slow * state + white * noise.normal();
+            FitSample {
+                force: Newtons(sample.force.0 + error),
+                ..*sample
+            }
+        })
+        .collect()
+}

@@ -1,0 +1,203 @@
+//! Block bootstrap: the fit repeated on its own residuals, shuffled in blocks.
+//!
+//! Blocks longer than the memory keep it; what lies within a block stays together (Kunsch, Ann.
+//! Stat. 17 (1989) 1217-1241). It assumes neither a shape of the noise nor a parabola of the sum of
+//! squares, and takes hundreds of fits.
+
+use super::design::walk;
+use super::options::{CONTACT, PARAMETER_NAMES};
+use super::refine::refine;
+use super::report::scaled_powers;
+use super::sample::FitSample;
+use super::solve::Fitted;
+use super::system::Record;
+use super::uncertainty::Uncertainty;
+use crate::units::Newtons;
+use serde::{Deserialize, Serialize};
+
+/// Correlation times in a block; beyond three the ends of blocks hardly matter.
+const MEMORIES: f64 = 4.0;
+
+/// What to repeat.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Bootstrap {
+    /// Seed of the shuffling: the same seed gives the same intervals on any machine.
+    pub seed: u64,
+    /// Fits; 200 give the ends of a 95 % interval to about a tenth of its width.
+    pub repeats: usize,
+}
+
+/// A 95 % interval from the percentiles of repeated fits.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct BootstrapInterval {
+    /// The parameter.
+    pub name: String,
+    /// Standard deviation of the repeated fits, in the parameter's unit.
+    pub std_dev: f64,
+    /// 2.5 % and 97.5 % points.
+    pub ci95: [f64; 2],
+}
+
+impl Fitted<'_> {
+    /// Bootstrap intervals of the free parameters of one record; `progress` hears how many fits are
+    /// done.
+    pub fn bootstrap(
+        &self,
+        record: usize,
+        choice: Bootstrap,
+        mut progress: impl FnMut(usize),
+    ) -> Vec<BootstrapInterval> {
+        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        let sources: Vec<Residuals> = (0..self.system.records.len())
+            .map(|record| self.residual_source(&uncertainty, record))
+            .collect();
+        let free: Vec<usize> = (0..=CONTACT)
+            .filter(|&k| self.system.fixed(k).is_none())
+            .collect();
+        let mut random = SplitMix(choice.seed);
+        let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(choice.repeats); free.len()];
+        for done in 0..choice.repeats {
+            let shuffled: Vec<Vec<FitSample>> = sources
+                .iter()
+                .zip(&self.system.records)
+                .map(|(source, record)| source.shuffled(record.samples, &mut random))
+                .collect();
+            let mut system = self.system.clone();
+            system.records = self
+                .system
+                .records
+                .iter()
+                .zip(&shuffled)
+                .map(|(record, samples)| Record {
+                    samples,
+                    ..record.clone()
+                })
+                .collect();
+            let refined = refine(&system, &self.refined.points, &self.ranges);
+            let values = system.physical(&refined.points[record]);
+            for (list, &parameter) in found.iter_mut().zip(&free) {
+                list.push(values[parameter]);
+            }
+            progress(done + 1);
+        }
+        free.iter()
+            .zip(found)
+            .filter(|(_, list)| list.len() > 1)
+            .map(|(&parameter, mut list)| {
+                list.sort_by(f64::total_cmp);
+                let count = list.len() as f64;
+                let mean = list.iter().sum::<f64>() / count;
+                let square: f64 = list.iter().map(|value| (value - mean).powi(2)).sum();
+                BootstrapInterval {
+                    name: PARAMETER_NAMES[parameter].to_owned(),
+                    std_dev: (square / (count - 1.0)).sqrt(),
+                    ci95: [0.025, 0.975].map(|share| quantile(&list, share)),
+                }
+            })
+            .collect()
+    }
+
+    /// Model and residuals of a record, the latter in units of each sample's sigma and widened by
+    /// what the fit has taken out of them.
+    fn residual_source(&self, uncertainty: &Uncertainty, record: usize) -> Residuals {
+        let Record {
+            samples, measured, ..
+        } = self.system.records[record].clone();
+        let point = &self.refined.points[record];
+        let scaled = scaled_powers(point);
+        let (mut model, mut residuals) = (Vec::with_capacity(samples.len()), Vec::new());
+        walk::<false>(
+            samples,
+            self.system.scale(point.outer),
+            point.outer.tau,
+            |block, rows| {
+                for (sample, force) in block.iter().zip(rows.force(&scaled)) {
+                    model.push(force);
+                    if sample.is_measured() {
+                        residuals.push((sample.force.0 - force) / sample.sigma.0);
+                    }
+                }
+            },
+        );
+        let block = uncertainty.block_length(record);
+        let memory = uncertainty.memories[record];
+        let remembered = memory
+            .filter(|memory| memory.neighbour > 0.0)
+            .map_or(0.0, |memory| block / -memory.forgetting.ln());
+        let white = uncertainty.scatter.unwrap_or(0.0).powi(2);
+        let effective = memory
+            .filter(|memory| memory.long_run() > 0.0)
+            .map_or(measured as f64, |memory| {
+                measured as f64 * white / memory.long_run()
+            })
+            .clamp(1.0, measured as f64);
+        let taken = self.system.unknowns.len() as f64;
+        let widened = (effective / (effective - taken).max(1.0)).sqrt();
+        residuals
+            .iter_mut()
+            .for_each(|residual| *residual *= widened);
+        // The cube root of the count is the usual length for noise without memory.
+        let length = (MEMORIES * remembered).max((measured as f64).cbrt()) as usize;
+        Residuals {
+            model,
+            length: length.clamp(1, residuals.len().max(1)),
+            residuals,
+        }
+    }
+}
+
+struct Residuals {
+    model: Vec<f64>,
+    residuals: Vec<f64>,
+    length: usize,
+}
+
+impl Residuals {
+    fn shuffled(&self, samples: &[FitSample], random: &mut SplitMix) -> Vec<FitSample> {
+        let starts = self.residuals.len() - self.length + 1;
+        let (mut at, mut left) = (0, 0);
+        samples
+            .iter()
+            .zip(&self.model)
+            .map(|(sample, model)| {
+                if !sample.is_measured() {
+                    return *sample;
+                }
+                if left == 0 {
+                    (at, left) = (random.below(starts), self.length);
+                }
+                let residual = self.residuals[at] * sample.sigma.0;
+                (at, left) = (at + 1, left - 1);
+                FitSample {
+                    force: Newtons(model + residual),
+                    ..*sample
+                }
+            })
+            .collect()
+    }
+}
+
+fn quantile(sorted: &[f64], share: f64) -> f64 {
+    let place = share * (sorted.len() - 1) as f64;
+    let below = place.floor() as usize;
+    let above = (below + 1).min(sorted.len() - 1);
+    sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
+}
+
+/// SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
+struct SplitMix(u64);
+
+impl SplitMix {
+    fn next(&mut self) -> u64 {
+        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
+        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
+        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
+        z ^ (z >> 31)
+    }
+
+    /// Uniform below `count`, which is far below 2^53.
+    fn below(&mut self, count: usize) -> usize {
+        let share = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
+        ((share * count as f64) as usize).min(count - 1)
+    }
+}

@@ -1,0 +1,270 @@
+//! Profile-likelihood intervals: how far one parameter can go while all others make up for it.
+//!
+//! Given the relaxation time the sum of squares is an exact parabola in every linear parameter, so
+//! a handful of relaxation times tells all profiles at once: with `S(tau)` the smallest sum,
+//! `b(tau)` the value of a parameter there and `d(tau)` its standard deviation for unit noise, the
+//! values within a rise `T` of the smallest sum reach up to
+//! `max over tau of b + d sqrt(T - (S - S_min))`. Between the relaxation times (Chebyshev points) the
+//! three functions are polynomials.
+
+use super::options::{CONTACT, PARAMETER_NAMES, TAU};
+use super::report::student_t975;
+use super::sample::FitError;
+use super::solve::Fitted;
+use super::system::{Outer, Point};
+use super::uncertainty::{Error, Uncertainty};
+use serde::{Deserialize, Serialize};
+
+/// Relaxation times evaluated; polynomials of degree ten over four standard errors each way.
+const NODES: usize = 11;
+/// The first range, in half-widths of the symmetric interval.
+const REACH: f64 = 1.3;
+/// Times the range is widened before an end counts as open.
+const WIDENINGS: usize = 6;
+/// Relaxation times at which the maximum is looked for before it is refined.
+const LOOKS: usize = 400;
+
+/// A 95 % interval from the profile likelihood; an end is missing where it is open.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ProfileInterval {
+    /// The parameter.
+    pub name: String,
+    /// Lower end, in the parameter's unit.
+    pub low: Option<f64>,
+    /// Upper end.
+    pub high: Option<f64>,
+}
+
+/// The smallest sum and the linear parameters of one record over the relaxation time.
+struct Profile {
+    /// `ln tau` from that of the fit.
+    offsets: Vec<f64>,
+    sums: Vec<f64>,
+    /// Per parameter asked for, value and unit standard deviation at every node.
+    values: Vec<Vec<f64>>,
+    deviations: Vec<Vec<f64>>,
+    /// Whether the ends are those of the searched range.
+    is_limit: [bool; 2],
+}
+
+impl Fitted<'_> {
+    /// Profile-likelihood 95 % intervals of the free parameters of one record, the memory of the
+    /// residuals allowed for as in the standard errors.
+    ///
+    /// Refused with a free contact or several relaxation times: the profile would have more than
+    /// one dimension.
+    pub fn profile(&self, record: usize) -> Result<Vec<ProfileInterval>, FitError> {
+        let outer = &self.system.unknowns[self.system.linear..];
+        if outer.len() > 1 || outer.iter().any(|unknown| unknown.parameter == CONTACT) {
+            return Err(FitError::ProfileTooWide);
+        }
+        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        let errors = self.errors(&uncertainty, record);
+        let asked: Vec<usize> = (0..CONTACT)
+            .filter(|&k| self.system.fixed(k).is_none())
+            .collect();
+        let scatter = uncertainty.scatter.unwrap_or(0.0);
+        // Without an error of its own (at an edge) a parameter is judged as under white noise.
+        let rise = |parameter: usize| {
+            let (freedom, inflation) = errors[parameter]
+                .map_or((1e9, 1.0), |error: Error| (error.freedom, error.inflation));
+            (student_t975(freedom) * scatter).powi(2) * inflation
+        };
+        let highest = asked.iter().map(|&k| rise(k)).fold(0.0, f64::max);
+        let profile = self.walk_profile(record, &asked, highest, !outer.is_empty());
+        Ok(asked
+            .iter()
+            .enumerate()
+            .map(|(index, &parameter)| {
+                let tau = self.refined.points[record].outer.tau;
+                let [low, high] = if parameter == TAU {
+                    profile
+                        .reach(rise(TAU))
+                        .map(|end| end.map(|offset| tau * offset.exp()))
+                } else {
+                    [-1.0, 1.0].map(|side| profile.end(index, rise(parameter), side))
+                };
+                ProfileInterval {
+                    name: PARAMETER_NAMES[parameter].to_owned(),
+                    low,
+                    high,
+                }
+            })
+            .collect())
+    }
+
+    /// The profile over relaxation times wide enough for a rise of the sum.
+    fn walk_profile(&self, record: usize, asked: &[usize], rise: f64, is_free: bool) -> Profile {
+        let (all, linear) = (self.system.unknowns.len(), self.system.linear);
+        let centre = self.refined.points[record].outer.tau;
+        if !is_free {
+            return self.nodes(record, asked, &[0.0], [true; 2]);
+        }
+        let mut outer = vec![0.0; all];
+        outer[linear] = 1.0;
+        let unit = self.refined.pass.joint.deviation(&outer);
+        let (low, high) = self.ranges[record].log_tau;
+        let limits = (low - centre.ln(), high - centre.ln());
+        let first = REACH * rise.sqrt() * unit;
+        let mut reach = [-first, first];
+        for _ in 0..WIDENINGS {
+            let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
+            let is_limit = [reach[0] <= limits.0, reach[1] >= limits.1];
+            let profile = self.nodes(record, asked, &chebyshev(ends), is_limit);
+            let allowed = profile.lowest() + rise;
+            let is_high =
+                [profile.sums[0], profile.sums[profile.sums.len() - 1]].map(|sum| sum > allowed);
+            if (0..2).all(|side| is_high[side] || is_limit[side]) {
+                return profile;
+            }
+            for side in 0..2 {
+                if !is_high[side] {
+                    reach[side] *= 2.5;
+                }
+            }
+        }
+        let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
+        self.nodes(record, asked, &chebyshev(ends), [true; 2])
+    }
+
+    fn nodes(
+        &self,
+        record: usize,
+        asked: &[usize],
+        offsets: &[f64],
+        is_limit: [bool; 2],
+    ) -> Profile {
+        let linear = self.system.linear;
+        let mut profile = Profile {
+            offsets: offsets.to_vec(),
+            sums: Vec::new(),
+            values: vec![Vec::new(); asked.len()],
+            deviations: vec![Vec::new(); asked.len()],
+            is_limit,
+        };
+        for offset in offsets {
+            let outers: Vec<Outer> = self
+                .refined
+                .points
+                .iter()
+                .map(|point| Outer {
+                    tau: point.outer.tau * offset.exp(),
+                    ..point.outer
+                })
+                .collect();
+            let factor = self.system.values_pass(&outers);
+            let solution = factor.solve(linear);
+            let point = Point {
+                outer: outers[record],
+                at: self.system.coefficients(record, &solution),
+            };
+            let values = self.system.physical(&point);
+            profile.sums.push(factor.residual_sum(linear));
+            for (index, &parameter) in asked.iter().enumerate() {
+                let combination = self.system.combination(record, parameter, &point);
+                profile.values[index].push(values[parameter]);
+                profile.deviations[index].push(factor.deviation(&combination[..linear]));
+            }
+        }
+        profile
+    }
+}
+
+impl Profile {
+    fn lowest(&self) -> f64 {
+        self.sums.iter().copied().fold(f64::INFINITY, f64::min)
+    }
+
+    /// The polynomial through the nodes (barycentric; Berrut & Trefethen, SIAM Rev. 46 (2004)
+    /// 501-517).
+    fn at(&self, values: &[f64], offset: f64) -> f64 {
+        if values.len() == 1 {
+            return values[0];
+        }
+        let last = values.len() - 1;
+        let (mut top, mut bottom) = (0.0, 0.0);
+        for (i, (value, node)) in values.iter().zip(&self.offsets).enumerate() {
+            if offset == *node {
+                return *value;
+            }
+            let sign = if i % 2 == 0 { 1.0 } else { -1.0 };
+            let half = if i == 0 || i == last { 0.5 } else { 1.0 };
+            let weight = sign * half / (offset - node);
+            top += weight * value;
+            bottom += weight;
+        }
+        top / bottom
+    }
+
+    fn smallest_sum(&self) -> f64 {
+        // The fit's own relaxation time is offset zero and the minimum.
+        self.at(&self.sums, 0.0).min(self.lowest())
+    }
+
+    /// How far `ln tau` goes within a rise of the sum; open where that is the searched range.
+    fn reach(&self, rise: f64) -> [Option<f64>; 2] {
+        let allowed = self.smallest_sum() + rise;
+        let last = self.offsets.len() - 1;
+        [self.offsets[0], self.offsets[last]].map(|end| {
+            if self.at(&self.sums, end) <= allowed {
+                // Within the range nothing stops it.
+                return None;
+            }
+            let (mut inside, mut outside) = (0.0, end);
+            for _ in 0..60 {
+                let middle = 0.5 * (inside + outside);
+                if self.at(&self.sums, middle) <= allowed {
+                    inside = middle;
+                } else {
+                    outside = middle;
+                }
+            }
+            Some(inside)
+        })
+    }
+
+    /// The highest (`side` 1) or lowest (-1) value of a linear parameter within a rise; open where
+    /// the relaxation time that goes with it is the end of the searched range.
+    fn end(&self, index: usize, rise: f64, side: f64) -> Option<f64> {
+        let smallest = self.smallest_sum();
+        let value = |offset: f64| {
+            let left = rise - (self.at(&self.sums, offset) - smallest);
+            let spread = self.at(&self.deviations[index], offset) * left.max(0.0).sqrt();
+            let value = side * self.at(&self.values[index], offset) + spread;
+            if left < 0.0 { f64::NEG_INFINITY } else { value }
+        };
+        let last = self.offsets.len() - 1;
+        let (from, to) = (self.offsets[0], self.offsets[last]);
+        if last == 0 {
+            return Some(side * value(from));
+        }
+        let step = (to - from) / LOOKS as f64;
+        let look = |i: usize| from + step * i as f64;
+        let best = (0..=LOOKS).max_by(|&a, &b| value(look(a)).total_cmp(&value(look(b))))?;
+        let is_open = (best == 0 && self.is_limit[0]) || (best == LOOKS && self.is_limit[1]);
+        if is_open {
+            return None;
+        }
+        // Ternary search between the neighbours, where the function has one hump.
+        let (mut low, mut high) = (look(best.saturating_sub(1)), look((best + 1).min(LOOKS)));
+        for _ in 0..60 {
+            let (left, right) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
+            if value(left) < value(right) {
+                low = left;
+            } else {
+                high = right;
+            }
+        }
+        Some(side * value(0.5 * (low + high)))
+    }
+}
+
+/// Chebyshev points of the second kind from one end to the other.
+fn chebyshev([from, to]: [f64; 2]) -> Vec<f64> {
+    (0..NODES)
+        .map(|i| {
+            let angle = std::f64::consts::PI * i as f64 / (NODES - 1) as f64;
+            0.5 * (from + to) - 0.5 * (to - from) * angle.cos()
+        })
+        .collect()
+}

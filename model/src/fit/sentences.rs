@@ -1,0 +1,104 @@
+//! What a fit says in words; window, command line and files use the same sentences.
+
+use super::report::FitReport;
+use super::solve::Fitted;
+use crate::viscoelastic::admissibility;
+
+/// Correlation times this many relaxation times long blur the model itself.
+const MEMORY_LONG: f64 = 1.0;
+/// Fewer effective samples than this for every unknown make any interval rough.
+const EFFECTIVE_MIN: f64 = 10.0;
+/// A relaxation time less certain than this share of its value is hardly known.
+const UNCERTAIN_SHARE: f64 = 0.5;
+
+/// What a reader of the numbers must know.
+pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
+    let mut warnings = Vec::new();
+    if let Some(edge) = fitted.edge(record) {
+        let (low, high) = fitted.ranges[record].log_tau;
+        warnings.push(format!(
+            "tau_eps lies at the {edge} end of what this record can show ({:.3e} s to {:.3e} s); \
+             the other parameters are conditional on it",
+            low.exp(),
+            high.exp()
+        ));
+    }
+    if fitted.is_contact_at_start(record) {
+        warnings.push(
+            "contact lies at or before the shallowest depth recorded, where it cannot be told \
+             from the elastic coefficients; record the approach as well"
+                .to_owned(),
+        );
+    }
+    if !fitted.refined.is_converged {
+        warnings.push(
+            "the iteration did not settle; the parameters depend on each other too strongly"
+                .to_owned(),
+        );
+    }
+    let tau = &report.parameters[0];
+    if tau
+        .std_error
+        .is_some_and(|error| error > UNCERTAIN_SHARE * tau.value)
+    {
+        warnings.push(
+            "tau_eps is uncertain by more than half its value; record a longer hold".to_owned(),
+        );
+    }
+    if let Some(noise) = &report.noise {
+        let unknowns = fitted.system.unknowns.len() as f64;
+        let is_long = noise
+            .correlation_time_s
+            .is_some_and(|time| time > MEMORY_LONG * tau.value);
+        if is_long || noise.effective_samples < EFFECTIVE_MIN * unknowns {
+            warnings.push(format!(
+                "the residuals have a long memory: this body does not describe the record to within \
+                 its noise, and intervals from about {:.0} independent samples are rough",
+                noise.effective_samples
+            ));
+        }
+    }
+    warnings
+}
+
+/// What the fit found besides numbers.
+pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
+    let mut findings = Vec::new();
+    if report.censored > 0 {
+        findings.push(format!(
+            "the forces of {} censored samples were left out; their depths count",
+            report.censored
+        ));
+    }
+    if let Some(noise) = &report.noise
+        && let Some(time) = noise.correlation_time_s
+    {
+        findings.push(format!(
+            "the residuals have memory: {:.0} % of their variance lasts about {}; {} samples tell as \
+             much as {:.0} independent ones, and the intervals allow for it",
+            100.0 * noise.slow_share,
+            span(time),
+            report.samples,
+            noise.effective_samples
+        ));
+    }
+    let deepest = fitted.system.records[record]
+        .samples
+        .iter()
+        .map(|sample| sample.depth.0)
+        .fold(0.0, f64::max);
+    let contact = report.parameters[7].value;
+    findings.extend(admissibility::sentences(&report.body(), deepest - contact));
+    findings
+}
+
+/// A time in words of its size.
+fn span(seconds: f64) -> String {
+    if seconds < 0.1 {
+        format!("{:.0} ms", 1e3 * seconds)
+    } else if seconds < 10.0 {
+        format!("{seconds:.2} s")
+    } else {
+        format!("{seconds:.0} s")
+    }
+}
