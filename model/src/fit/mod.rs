@@ -8,6 +8,7 @@ mod design;
 mod identify;
 mod live;
 mod live_stencil;
+mod maxwell;
 mod options;
 mod problem;
 mod refine;
@@ -18,6 +19,7 @@ mod solve;
 mod triangle;
 
 pub use live::{LiveEstimate, LiveFit};
+pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use report::{FitReport, MODEL_NAME, Parameter};
 pub use sample::{FitError, FitSample};
