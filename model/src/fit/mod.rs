@@ -9,6 +9,7 @@ mod design;
 mod identify;
 mod live;
 mod live_stencil;
+mod maxwell;
 mod noise;
 mod options;
 mod profile;
@@ -25,6 +26,7 @@ mod uncertainty;
 
 pub use bootstrap::{Bootstrap, BootstrapInterval};
 pub use live::{LiveEstimate, LiveFit};
+pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use profile::ProfileInterval;
 pub use report::{FitReport, JointReport, MODEL_NAME, NamedReport, NoiseFound, Parameter};

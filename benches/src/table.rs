@@ -1,0 +1,137 @@
+//! The printed tables.
+
+use crate::Report;
+use crate::record::NOISE_N;
+use crate::result::Fit;
+
+/// Parameters of a peer and of palpate must agree this well, relative, or the peer is called wrong.
+const AGREEMENT: f64 = 1e-6;
+
+/// Prints everything; false if a peer is missing or wrong.
+pub fn print(report: &Report) -> bool {
+    let pinned = if report.is_pinned {
+        "pinned to one core"
+    } else {
+        "NOT pinned: no taskset"
+    };
+    println!(
+        "{} samples of the thesis protocol, seven free parameters, {pinned}",
+        report.samples
+    );
+    if let Ok(peers) = &report.peers {
+        let (python, numpy) = (&peers.python, &peers.numpy);
+        let (scipy, lmfit) = (&peers.scipy, &peers.lmfit);
+        println!(
+            "Python {python}, numpy {numpy}, scipy {scipy}, lmfit {lmfit}; varpro crate 0.14.0"
+        );
+    }
+    let mut is_good = true;
+    for (which, title) in ["noiseless", "noisy"].into_iter().enumerate() {
+        let noise = if which == 0 { 0.0 } else { NOISE_N };
+        println!("\n{title}, {noise} N of noise");
+        println!(
+            "{:22}{:>12}{:>10}{:>16}",
+            "",
+            "seconds",
+            "ratio",
+            error_title(which)
+        );
+        let palpate = &report.palpate[which];
+        line("palpate", palpate, palpate, which);
+        match &report.varpro[which] {
+            Ok(fit) => is_good &= line("varpro", fit, palpate, which),
+            Err(text) => {
+                println!("{:22}failed: {text}", "varpro");
+                is_good = false;
+            }
+        }
+        if let Ok(peers) = &report.peers {
+            for peer in peers.fits.iter().filter(|peer| peer.record == title) {
+                is_good &= line(&peer.name, &peer.fit, palpate, which);
+            }
+        }
+    }
+    if let Err(text) = &report.peers {
+        println!("\nno Python peers: {text}");
+        is_good = false;
+    }
+    intervals(report);
+    let live = &report.live;
+    println!(
+        "\nlive fit: {:.0} ns a sample, {:.1} us an estimate",
+        live.push_s * 1e9,
+        live.estimate_s * 1e6
+    );
+    println!(
+        "  its last answer is off the exact fit by {:.1e} relative (noiseless), {:.1e} standard errors (noisy)",
+        live.off_noiseless, live.off_noisy_sigmas
+    );
+    println!("\ncold fit against number of samples, noiseless");
+    for (samples, seconds) in &report.scaling.points {
+        println!(
+            "{samples:>12}{seconds:>12.5} s{:>10.1} ns a sample",
+            seconds * 1e9 / *samples as f64
+        );
+    }
+    println!(
+        "cost goes as samples^{:.3}; from 1e5 samples on ^{:.3}",
+        report.scaling.exponent, report.scaling.exponent_large
+    );
+    is_good
+}
+
+fn error_title(which: usize) -> &'static str {
+    ["worst error", "off palpate"][which]
+}
+
+/// One participant; false if it does not agree with palpate.
+fn line(name: &str, fit: &Fit, palpate: &Fit, which: usize) -> bool {
+    let shown = [fit.error(), fit.difference(palpate)][which];
+    let is_wrong = !(fit.difference(palpate) <= AGREEMENT);
+    let remark = if is_wrong {
+        "  WRONG: parameters differ by more than 1e-6"
+    } else {
+        ""
+    };
+    let ratio = fit.seconds / palpate.seconds;
+    println!(
+        "{name:22}{:>12.5}{ratio:>10.1}{shown:>16.1e}{remark}",
+        fit.seconds
+    );
+    !is_wrong
+}
+
+fn intervals(report: &Report) {
+    println!(
+        "\nfive profile intervals, two sigma, initial force and offset fixed at 0, noisy record"
+    );
+    match &report.profile {
+        Some((seconds, _)) => println!("{:22}{seconds:>12.5}", "palpate"),
+        None => println!(
+            "{:22}not measured: the model crate has no profile intervals yet",
+            "palpate"
+        ),
+    }
+    let lmfit = report
+        .peers
+        .as_ref()
+        .ok()
+        .and_then(|peers| peers.intervals.as_ref());
+    let Some(lmfit) = lmfit else {
+        println!("{:22}not run", "lmfit conf_interval");
+        return;
+    };
+    let seconds = lmfit.seconds;
+    match &report.profile {
+        Some((ours, bounds)) => {
+            let off = bounds.iter().flatten().zip(lmfit.bounds.iter().flatten());
+            let worst = off.map(|(a, b)| (a / b - 1.0).abs()).fold(0.0, f64::max);
+            println!(
+                "{:22}{seconds:>12.5}{:>10.1}  bounds differ by {worst:.1e}",
+                "lmfit conf_interval",
+                seconds / ours
+            );
+        }
+        None => println!("{:22}{seconds:>12.5}", "lmfit conf_interval"),
+    }
+}
