@@ -7,7 +7,6 @@
 mod design;
 mod identify;
 mod live;
-mod live_stencil;
 mod options;
 mod problem;
 mod refine;
@@ -17,7 +16,7 @@ mod scan;
 mod solve;
 mod triangle;
 
-pub use live::{LiveEstimate, LiveFit};
+pub use live::{LiveEstimate, LiveFit, ResidualBlocks, Verdict};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use report::{FitReport, MODEL_NAME, Parameter};
 pub use sample::{FitError, FitSample};
