@@ -28,6 +28,10 @@ pub const TOLERANCE_DERIVED: f64 = 1e-9;
 /// Residuals of the live fit; relative. Its Gram matrices keep about eight digits.
 pub const TOLERANCE_LIVE_RMSE: f64 = 1e-6;
 
+/// The same for answers recorded before there were verdicts, which came from a coarser
+/// interpolation between relaxation times: 4e-6 off in the recorded session of the lab profile.
+pub const TOLERANCE_LIVE_RMSE_OLD: f64 = 1e-5;
+
 /// Parameters of the live fit, in standard errors: what nobody could see on the display. A
 /// parameter that is not identified has no value to agree on.
 pub const TOLERANCE_LIVE_SIGMAS: f64 = 0.01;
@@ -398,10 +402,14 @@ impl Replay<'_> {
 
 /// Whether two live fits say the same.
 fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
-    let is_same_rmse = (a.rmse_weighted_n - b.rmse_weighted_n).abs()
-        <= TOLERANCE_LIVE_RMSE * a.rmse_weighted_n.abs();
-    // A session from before there were verdicts has none, and intervals by another formula.
     let has_verdicts = !a.verdicts.is_empty();
+    let tolerance = if has_verdicts {
+        TOLERANCE_LIVE_RMSE
+    } else {
+        TOLERANCE_LIVE_RMSE_OLD
+    };
+    let is_same_rmse =
+        (a.rmse_weighted_n - b.rmse_weighted_n).abs() <= tolerance * a.rmse_weighted_n.abs();
     let mut pairs = a.parameters.iter().zip(&b.parameters);
     a.samples == b.samples
         && is_same_rmse
