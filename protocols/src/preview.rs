@@ -1,6 +1,6 @@
 //! Dry run of a plan: limits, duration, force band and storage, before anything moves.
 
-use crate::plans::{FindContact, Plan, Step};
+use crate::plans::{FindContact, HoldUntil, Plan, Step};
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, Profile, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
@@ -78,11 +78,12 @@ pub fn preview(
         rig,
         limits,
         refusals: Vec::new(),
+        notes: Vec::new(),
         depth_now: 0.0,
         is_homed,
     };
     let steps: Vec<StepPreview> = plan.steps.iter().map(|step| walk.step(step)).collect();
-    let mut refusals = walk.refusals;
+    let (mut refusals, mut notes) = (walk.refusals, walk.notes);
     if plan.steps.is_empty() {
         refusals.push("the plan has no steps".into());
     }
@@ -102,7 +103,6 @@ pub fn preview(
             force_band[0], force_band[1]
         ));
     }
-    let mut notes = Vec::new();
     if force_band[1] > limits.force_max {
         notes.push(format!(
             "a stiff specimen may reach {:.1}; the interlock stops the run at {:.1}",
@@ -125,6 +125,7 @@ struct Walk<'a> {
     rig: &'a RigDescription,
     limits: &'a Limits,
     refusals: Vec<String>,
+    notes: Vec<String>,
     /// Depth the plan has reached, in mm from contact.
     depth_now: f64,
     is_homed: bool,
@@ -135,8 +136,14 @@ impl Walk<'_> {
         let travel = self.limits.travel_max.0;
         let phase = step.phase();
         let (expected, longest) = match *step {
-            Step::SelfTest { duration } | Step::Tare { duration } | Step::Hold { duration } => {
+            Step::SelfTest { duration } | Step::Tare { duration } | Step::Hold { duration, .. } => {
                 self.check_span(phase, duration);
+                if let Step::Hold {
+                    until: Some(rule), ..
+                } = step
+                {
+                    self.check_rule(phase, rule, duration);
+                }
                 (duration.0, duration.0)
             }
             Step::Home { speed, touch_speed } => {
@@ -249,6 +256,20 @@ impl Walk<'_> {
             self.refusals.push(format!(
                 "{phase}: a duration of {span} is not possible; give 0 to 86400 s"
             ));
+        }
+    }
+
+    fn check_rule(&mut self, phase: Phase, rule: &HoldUntil, duration: Seconds) {
+        match rule.check() {
+            Err(reason) => self.refusals.push(format!("{phase}: {reason}")),
+            Ok(()) if rule.at_least < duration => self.notes.push(format!(
+                "the hold ends as soon as {rule}, after {:.0} at the earliest",
+                rule.at_least
+            )),
+            Ok(()) => self.notes.push(format!(
+                "the hold is too short to end early: that takes {:.0} at least",
+                rule.at_least
+            )),
         }
     }
 

@@ -28,9 +28,17 @@ pub const TOLERANCE_DERIVED: f64 = 1e-9;
 /// Residuals of the live fit; relative. Its Gram matrices keep about eight digits.
 pub const TOLERANCE_LIVE_RMSE: f64 = 1e-6;
 
+/// The same for answers recorded before there were verdicts, which came from a coarser
+/// interpolation between relaxation times: 4e-6 off in the recorded session of the lab profile.
+pub const TOLERANCE_LIVE_RMSE_OLD: f64 = 1e-5;
+
 /// Parameters of the live fit, in standard errors: what nobody could see on the display. A
 /// parameter that is not identified has no value to agree on.
 pub const TOLERANCE_LIVE_SIGMAS: f64 = 0.01;
+
+/// Standard errors of the live fit; relative. They are curvatures of the residual sum, which keep
+/// about four digits less than the sum itself.
+pub const TOLERANCE_LIVE_ERROR: f64 = 1e-4;
 
 /// A session cannot be replayed at all.
 #[derive(Debug, Error)]
@@ -232,6 +240,15 @@ impl Replay<'_> {
     fn feed_inputs(&mut self, inputs: &mut VecDeque<RecordedInput>, index: u64) {
         while let Some(next) = inputs.pop_front_if(|next| next.after_sample <= index) {
             if let Input::LiveFit(estimate) = &next.input {
+                // Before there were verdicts, an answer waited until all parameters were known.
+                while estimate.verdicts.is_empty()
+                    && self
+                        .expected_live
+                        .front()
+                        .is_some_and(|again| again.samples < estimate.samples)
+                {
+                    self.expected_live.pop_front();
+                }
                 let recomputed = self.expected_live.pop_front();
                 if !recomputed
                     .as_ref()
@@ -385,14 +402,23 @@ impl Replay<'_> {
 
 /// Whether two live fits say the same.
 fn is_same_fit(a: &LiveEstimate, b: &LiveEstimate) -> bool {
-    let is_same_rmse = (a.rmse_weighted_n - b.rmse_weighted_n).abs()
-        <= TOLERANCE_LIVE_RMSE * a.rmse_weighted_n.abs();
+    let has_verdicts = !a.verdicts.is_empty();
+    let tolerance = if has_verdicts {
+        TOLERANCE_LIVE_RMSE
+    } else {
+        TOLERANCE_LIVE_RMSE_OLD
+    };
+    let is_same_rmse =
+        (a.rmse_weighted_n - b.rmse_weighted_n).abs() <= tolerance * a.rmse_weighted_n.abs();
     let mut pairs = a.parameters.iter().zip(&b.parameters);
     a.samples == b.samples
         && is_same_rmse
+        && (!has_verdicts || a.verdicts == b.verdicts)
         && pairs.all(|(a, b)| match (a.std_error, b.std_error) {
-            (Some(error), Some(_)) => {
-                a.name == b.name && (a.value - b.value).abs() <= TOLERANCE_LIVE_SIGMAS * error
+            (Some(error), Some(again)) => {
+                a.name == b.name
+                    && (a.value - b.value).abs() <= TOLERANCE_LIVE_SIGMAS * error
+                    && (!has_verdicts || (error - again).abs() <= TOLERANCE_LIVE_ERROR * error)
             }
             _ => a.name == b.name,
         })

@@ -12,6 +12,7 @@ fn short() -> RampHold {
         speed: MmPerS(3.0),
         depth: Depth(12.0),
         hold: Seconds(2.0),
+        until: None,
     }
 }
 

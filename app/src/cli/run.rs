@@ -6,7 +6,7 @@ use super::rig::RigArgs;
 use clap::{Args, Subcommand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
-use palpate_protocols::plans::RampHold;
+use palpate_protocols::plans::{HoldUntil, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
@@ -37,6 +37,9 @@ pub struct RampHoldArgs {
     /// Time at depth in s
     #[arg(long, default_value = "50", value_parser = number, allow_negative_numbers = true)]
     hold: f64,
+    /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
+    #[arg(long, value_name = "PARAMETER=SHARE", value_parser = HoldUntil::parse)]
+    hold_until: Option<HoldUntil>,
     #[command(flatten)]
     rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
@@ -90,6 +93,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         speed: MmPerS(args.speed),
         depth: Depth(args.depth),
         hold: Seconds(args.hold),
+        until: args.hold_until,
     };
     let bench = super::rig::open(&args.rig)?;
     let request = RunRequest {

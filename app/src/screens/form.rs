@@ -4,7 +4,7 @@ use crate::widgets::quantity_input::QuantityField;
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Seconds};
-use palpate_protocols::plans::RampHold;
+use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{AfterStop, Labels, RunRequest};
 use std::path::{Path, PathBuf};
@@ -37,6 +37,8 @@ pub struct ProtocolForm {
     pub depth: QuantityField,
     /// Time at depth in s.
     pub hold: QuantityField,
+    /// End the hold when tau is known to so many percent; empty for the whole hold.
+    pub until: QuantityField,
     /// Folder for new sessions; empty for the library.
     pub folder: String,
     acknowledged: Vec<String>,
@@ -44,7 +46,7 @@ pub struct ProtocolForm {
 }
 
 /// What a preview depends on: the texts and whether the axis is homed.
-type CheckKey = ([String; 3], bool);
+type CheckKey = ([String; 4], bool);
 
 /// A plan whose fields are all valid numbers, with its preview.
 #[derive(Clone, Debug)]
@@ -67,6 +69,7 @@ impl Default for ProtocolForm {
             speed: QuantityField::new(params.speed.0),
             depth: QuantityField::new(params.depth.0),
             hold: QuantityField::new(params.hold.0),
+            until: no_rule(),
             folder: String::new(),
             acknowledged: Vec::new(),
             checked: None,
@@ -77,7 +80,8 @@ impl Default for ProtocolForm {
 impl ProtocolForm {
     /// Checks the fields and previews the plan again, if anything it depends on changed.
     pub fn refresh(&mut self, rig: &RigDescription, bench: &Bench, is_homed: bool) {
-        let texts = [&self.speed, &self.depth, &self.hold].map(|field| field.text.clone());
+        let texts =
+            [&self.speed, &self.depth, &self.hold, &self.until].map(|field| field.text.clone());
         let key = (texts, is_homed);
         if self.checked.as_ref().is_some_and(|(old, _)| *old == key) {
             return;
@@ -86,6 +90,11 @@ impl ProtocolForm {
         self.depth
             .check(|depth| check_depth(depth, rig, &bench.limits));
         self.hold.check(check_hold);
+        if self.until.text.trim().is_empty() {
+            self.until = no_rule();
+        } else {
+            self.until.check(|percent| rule(percent).check());
+        }
         let checked = self.params().map(|params| Checked {
             preview: preview(&params.plan(), rig, &bench.limits, &bench.curve, is_homed),
             params,
@@ -99,6 +108,10 @@ impl ProtocolForm {
             speed: MmPerS(value(&self.speed)?),
             depth: Depth(value(&self.depth)?),
             hold: Seconds(value(&self.hold)?),
+            until: match value(&self.until)? {
+                percent if self.until.text.is_empty() && percent == 0.0 => None,
+                percent => Some(rule(percent)),
+            },
         })
     }
 
@@ -133,6 +146,7 @@ impl ProtocolForm {
             ("speed", &self.speed),
             ("depth", &self.depth),
             ("hold", &self.hold),
+            ("end of the hold", &self.until),
         ] {
             if field.value.is_err() {
                 return Err(format!("correct the {name} first"));
@@ -179,6 +193,18 @@ impl ProtocolForm {
             .find(|path| !path.exists())
             .or(Some(numbered(SESSIONS_MAX)))
     }
+}
+
+/// The empty field: the hold takes its whole time.
+fn no_rule() -> QuantityField {
+    QuantityField {
+        text: String::new(),
+        value: Ok(0.0),
+    }
+}
+
+fn rule(percent: f64) -> HoldUntil {
+    HoldUntil::new(BodyParameter::TauEps, 0.01 * percent)
 }
 
 fn check_depth(depth: f64, rig: &RigDescription, limits: &Limits) -> Result<(), String> {
@@ -256,6 +282,35 @@ mod tests {
             assert!(reason.contains(word), "{reason}");
             assert!(form.request(&bench).is_none());
             assert!(form.checked().is_none());
+        }
+    }
+
+    #[test]
+    fn an_empty_rule_holds_the_whole_time_and_a_wrong_one_refuses() {
+        let (rig, bench) = bench();
+        let mut form = ProtocolForm::default();
+        for (text, wanted) in [
+            ("", Ok(None)),
+            ("  ", Ok(None)),
+            ("1.5", Ok(Some(0.015))),
+            ("0", Err("above 0")),
+            ("100", Err("below 100")),
+            ("soon", Err("not a finite number")),
+        ] {
+            form.until.text = text.into();
+            form.refresh(&rig, &bench, false);
+            match wanted {
+                Ok(share) => {
+                    let until = form.checked().unwrap().params.until;
+                    assert_eq!(until.map(|rule| rule.relative), share, "{text}");
+                    assert_eq!(form.verdict(), Ok(()));
+                }
+                Err(words) => {
+                    let reason = form.until.value.clone().unwrap_err();
+                    assert!(reason.contains(words), "{reason}");
+                    assert!(form.verdict().unwrap_err().contains("end of the hold"));
+                }
+            }
         }
     }
 

@@ -8,7 +8,6 @@ mod bootstrap;
 mod design;
 mod identify;
 mod live;
-mod live_stencil;
 mod maxwell;
 mod noise;
 mod options;
@@ -25,7 +24,7 @@ mod triangle;
 mod uncertainty;
 
 pub use bootstrap::{Bootstrap, BootstrapInterval};
-pub use live::{LiveEstimate, LiveFit};
+pub use live::{LiveEstimate, LiveFit, ResidualBlocks, Verdict};
 pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
 pub use profile::ProfileInterval;

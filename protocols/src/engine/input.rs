@@ -1,9 +1,11 @@
 //! The two closed enums of the engine: what it sees and what it does.
 
 use super::interlock::Interlock;
+use crate::plans::BodyParameter;
+use crate::plans::hold_until::percent;
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{Ack, Fault, Phase, Reading, RigCommand};
-use palpate_model::units::{Newtons, Position, Volts};
+use palpate_model::units::{Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -101,6 +103,17 @@ pub enum Record {
         /// Standard error in mm.
         std_error_mm: f64,
     },
+    /// The live fit knows enough: the hold ends before its planned duration.
+    HoldEndedEarly {
+        /// The parameter waited for.
+        parameter: BodyParameter,
+        /// Half of its 95 % interval as a share of its value.
+        relative: f64,
+        /// The share that was wanted.
+        wanted: f64,
+        /// Time at depth so far.
+        held: Seconds,
+    },
     /// An interlock tripped.
     InterlockTripped {
         /// Which.
@@ -189,6 +202,18 @@ impl fmt::Display for Record {
             } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
             }
+            Self::HoldEndedEarly {
+                parameter,
+                relative,
+                wanted,
+                held,
+            } => write!(
+                f,
+                "hold ended after {held:.1}: {} is known to {} %, {} % was wanted",
+                parameter.name(),
+                percent(*relative),
+                percent(*wanted)
+            ),
             Self::InterlockTripped { interlock, reason } => {
                 write!(f, "{interlock} interlock: {reason}")
             }

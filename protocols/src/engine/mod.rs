@@ -6,6 +6,7 @@
 
 mod contact;
 mod context;
+mod hold;
 mod home;
 mod input;
 mod interlock;

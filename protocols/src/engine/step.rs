@@ -2,6 +2,7 @@
 
 use super::contact::ContactSearch;
 use super::context::{Context, Progress};
+use super::hold;
 use super::home::Homing;
 use super::input::{Effect, EndingKind, Input, Operator, Outcome, Record};
 use super::interlock::{self, Interlock, Trip};
@@ -32,7 +33,10 @@ pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) 
         Input::Ack(ack) => on_ack(&mut cx, ack),
         Input::Fault(fault) => on_fault(&mut cx, &fault),
         Input::Operator { choice } => on_operator(&mut cx, choice),
-        Input::LiveFit(estimate) => cx.state.live = Some(estimate),
+        Input::LiveFit(estimate) => {
+            cx.state.live = Some(estimate);
+            hold::on_live_fit(&mut cx);
+        }
     }
     (state, effects)
 }
@@ -152,7 +156,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             cx.move_to(target, speed)?;
             Active::Move
         }
-        Step::Hold { duration } => Active::Hold {
+        Step::Hold { duration, .. } => Active::Hold {
             until_tick: cx.state.tick + cx.state.ticks(duration),
         },
         Step::Retract {

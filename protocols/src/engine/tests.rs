@@ -1,7 +1,9 @@
 //! Engine tables: given a state and an input, the phase and the effects.
 
+mod hold;
+
 use super::*;
-use crate::plans::{Plan, Step};
+use crate::plans::{HoldUntil, Plan, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
@@ -67,6 +69,11 @@ impl Bench {
 
     /// Self-tested, tared and inside a hold of `hold` seconds.
     fn holding(hold: f64) -> Self {
+        Self::holding_until(hold, None)
+    }
+
+    /// The same with a rule that may end the hold before.
+    fn holding_until(hold: f64, until: Option<HoldUntil>) -> Self {
         let mut bench = Self::new(vec![
             Step::SelfTest {
                 duration: Seconds(0.1),
@@ -76,6 +83,7 @@ impl Bench {
             },
             Step::Hold {
                 duration: Seconds(hold),
+                until,
             },
         ]);
         bench.start();

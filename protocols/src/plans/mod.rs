@@ -1,11 +1,13 @@
 //! Plans: serialisable lists of typed steps. A plan never moves anything.
 
+pub mod hold_until;
 pub mod ramp_hold;
 
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 
+pub use hold_until::{BodyParameter, HoldUntil};
 pub use ramp_hold::RampHold;
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
@@ -51,8 +53,11 @@ pub enum Step {
     },
     /// Stay at depth while the force relaxes.
     Hold {
-        /// How long.
+        /// How long, at most.
         duration: Seconds,
+        /// What may end it before.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        until: Option<HoldUntil>,
     },
     /// Leave the tissue.
     Retract {

@@ -1,6 +1,6 @@
 //! Ramp and hold: find the tissue, indent at constant speed, hold while the force relaxes.
 
-use super::{FindContact, Plan, Step};
+use super::{FindContact, HoldUntil, Plan, Step};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use serde::{Deserialize, Serialize};
 
@@ -11,8 +11,11 @@ pub struct RampHold {
     pub speed: MmPerS,
     /// Depth from contact.
     pub depth: Depth,
-    /// Time at depth.
+    /// Time at depth, at most.
     pub hold: Seconds,
+    /// What may end the hold before.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub until: Option<HoldUntil>,
 }
 
 impl Default for RampHold {
@@ -22,6 +25,7 @@ impl Default for RampHold {
             speed: MmPerS(0.75),
             depth: Depth(30.0),
             hold: Seconds(50.0),
+            until: None,
         }
     }
 }
@@ -51,6 +55,7 @@ impl RampHold {
                 },
                 Step::Hold {
                     duration: self.hold,
+                    until: self.until,
                 },
                 Step::Retract {
                     speed: MmPerS(6.0),

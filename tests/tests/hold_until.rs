@@ -1,0 +1,140 @@
+//! A hold that ends when the live fit knows enough: through the runner, and again in replay.
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
+
+use palpate_drivers::Rig;
+use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_model::rig::{Limits, Phase};
+use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_protocols::engine::{EndingKind, Record};
+use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
+use palpate_protocols::replay::replay;
+use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
+use palpate_sessions::{EntryKind, Session};
+use serde_json::json;
+use std::sync::mpsc::sync_channel;
+
+/// A run with a rule for tau, up to 20 s of hold, and its session.
+fn run_until(relative: f64) -> Session {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("session");
+    let rig = SimRig::new(SimSettings::default());
+    let params = RampHold {
+        speed: MmPerS(3.0),
+        depth: Depth(12.0),
+        hold: Seconds(20.0),
+        until: Some(HoldUntil::new(BodyParameter::TauEps, relative)),
+    };
+    let request = RunRequest {
+        plan: params.plan(),
+        calibration: rig.calibration(),
+        limits: Limits::for_travel(rig.description().travel),
+        out: Some(out.clone()),
+        labels: Labels::default(),
+        is_acknowledged: false,
+        after_stop: AfterStop::Close,
+    };
+    let (reply, answer) = sync_channel(1);
+    let (wake, woken) = sync_channel(1);
+    let first = Request::Run(Box::new(request), reply);
+    let runner = Runner::start(Box::new(rig), TimeScale::Max, Some(first), move || {
+        let _ = wake.try_send(());
+    })
+    .unwrap();
+    answer.recv().unwrap().unwrap();
+    loop {
+        let snapshot = runner.snapshot();
+        if let Some(outcome) = snapshot.run.as_ref().and_then(|run| run.outcome.as_ref()) {
+            assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
+            break;
+        }
+        woken
+            .recv_timeout(std::time::Duration::from_secs(60))
+            .expect("the run does not end");
+    }
+    drop(runner);
+    Session::open(&out).unwrap()
+}
+
+fn held_secs(session: &Session) -> f64 {
+    let held = session.rows.iter().filter(|row| row.phase == Phase::Hold);
+    held.count() as f64 * session.manifest.rig.tick().0
+}
+
+fn early_ends(session: &Session) -> Vec<Record> {
+    let decisions = session.entries.iter();
+    decisions
+        .filter(|entry| entry.kind == EntryKind::Decision)
+        .filter(|entry| entry.body["record"] == "hold_ended_early")
+        .map(|entry| serde_json::from_value(entry.body.clone()).unwrap())
+        .collect()
+}
+
+#[test]
+fn a_hold_ends_early_with_its_reason_and_replays_exactly() {
+    let mut session = run_until(0.0005);
+    let held = held_secs(&session);
+    let ends = early_ends(&session);
+    let [
+        Record::HoldEndedEarly {
+            relative, held: at, ..
+        },
+    ] = ends[..]
+    else {
+        panic!("{ends:?}");
+    };
+    println!("ended after {held:.3} s at {relative:.4}");
+    assert!(relative <= 0.0005, "{relative}");
+    assert!((5.0..19.0).contains(&held), "{held}");
+    // It ends with the sample after the answer.
+    assert!((at.0 - held).abs() < 0.01, "{at:?} {held}");
+    let report = replay(&session, &[]).unwrap();
+    assert_eq!(report.first_difference, None);
+
+    // The decision comes from the recorded answer: without it the hold would go on.
+    let place = session
+        .entries
+        .iter()
+        .rposition(|entry| entry.kind == EntryKind::Fit)
+        .unwrap();
+    session.entries[place].body["parameters"][0]["ci95"] = json!([0.5, 1.5]);
+    let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
+    // The first thing seen is a sample that the recording counts to the retract.
+    assert_eq!(
+        (difference.what.as_str(), difference.now),
+        ("phase", json!("hold"))
+    );
+}
+
+#[test]
+fn a_rule_that_cannot_be_met_holds_the_whole_time() {
+    let session = run_until(1e-6);
+    assert_eq!(early_ends(&session), []);
+    let held = held_secs(&session);
+    assert!((held - 20.0).abs() < 0.01, "{held}");
+    assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
+}
+
+#[test]
+fn a_changed_verdict_or_standard_error_is_noticed() {
+    let session = run_until(0.0005);
+    let place = session
+        .entries
+        .iter()
+        .rposition(|entry| entry.kind == EntryKind::Fit)
+        .unwrap();
+    for (pointer, value) in [
+        ("/verdicts/0/is_identified", json!(false)),
+        ("/verdicts/1/reason", json!("because")),
+        ("/parameters/2/std_error", json!(1.0)),
+    ] {
+        let mut changed = session.clone();
+        let body = &mut changed.entries[place].body;
+        if let Some(slot) = body.pointer_mut(pointer) {
+            *slot = value;
+        } else {
+            body["verdicts"][1]["reason"] = value;
+        }
+        let difference = replay(&changed, &[]).unwrap().first_difference.unwrap();
+        assert_eq!(difference.what, "live fit", "{pointer}");
+    }
+}
