@@ -1,12 +1,11 @@
 //! The force and its derivatives by every unknown, exactly, at the points where they are summed.
 //!
-//! A sum over samples is taken as an integral times the sampling rate. Behind every corner of the
-//! path the force is a polynomial plus exponentials, so the stretch behind it is cut into blocks that
-//! double in length, the first as long as the shortest time constant, and each block gets Gauss's
-//! eight points (exact to degree 15). Where sum and integral differ, because a press has fewer than
-//! [`DIRECT_MAX`] samples or the body relaxes within [`STEPS_PER_TAU`] of them, all samples are
-//! visited instead. What remains is the end of the sum, at most one sample in two thousand, and the
-//! midpoint rule, `(dt / tau)^2 / 6`, at most 0.3 %: half of that in an interval.
+//! A sum over samples is taken as an integral times the sampling rate, plus half of the first and the
+//! last sample. Behind every corner of the path the force is a polynomial plus exponentials, so the
+//! stretch behind it is cut into blocks that double in length, the first as long as the shortest time
+//! constant, and each block gets Gauss's eight points (exact to degree 15). What remains (Euler and
+//! Maclaurin) is `(dt / tau)^2 / 6` of a sum, half of that in an interval. Where a body relaxes within
+//! [`STEPS_PER_TAU`] samples, or a press has fewer than [`DIRECT_MAX`], all samples are visited.
 
 use super::noise::{Noise, Unknowns};
 use super::protocol::{Piece, duration_of};
@@ -156,6 +155,21 @@ impl Press<'_> {
             let half = 0.5 / (rate * time);
             rate * time * half / half.tanh()
         });
+        let first = self.row(1.0, 1.0, [0.0; 4], [0.0; 4]);
+        // Slow noise at a sample and all before it: the integral, and half of the first sample.
+        let at = |state: &State| {
+            let mut point = self.point(state);
+            let kept = memory.map_or(0.0, |time| (-state.elapsed / time).exp());
+            for (lagged, first) in point.lagged.iter_mut().zip(first) {
+                *lagged = lag_scale * *lagged + 0.5 * kept * first;
+            }
+            point
+        };
+        let end = duration_of(self.pieces) * (1.0 - 1e-12);
+        take(Point {
+            weight: 0.5,
+            ..at(&State::default())
+        });
         self.walk(|start, x0, speed, duration| {
             let mut from = 0.0;
             while from < duration {
@@ -168,16 +182,21 @@ impl Press<'_> {
                 };
                 let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
                 for (abscissa, weight) in GAUSS {
-                    for at in [middle - half * abscissa, middle + half * abscissa] {
-                        let mut point = self.point(&self.after(start, x0, speed, at));
-                        point.weight = weight * half * rate;
-                        point.lagged = point.lagged.map(|lagged| lag_scale * lagged);
-                        take(point);
+                    for since in [middle - half * abscissa, middle + half * abscissa] {
+                        take(Point {
+                            weight: weight * half * rate,
+                            ..at(&self.after(start, x0, speed, since))
+                        });
                     }
                 }
                 from = to;
             }
-            take(self.point(&self.after(start, x0, speed, duration)));
+            let corner = self.after(start, x0, speed, duration);
+            let weight = if corner.elapsed < end { 0.0 } else { 0.5 };
+            take(Point {
+                weight,
+                ..at(&corner)
+            });
         });
     }
 
