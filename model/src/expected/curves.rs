@@ -3,19 +3,21 @@
 use super::information::{ExpectedError, intervals};
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
-use super::search::{Rig, allowed_speeds};
+use super::search::{Rig, allowed_speeds, shallowest_turn};
 use crate::units::{Depth, MmPerS, Seconds};
 use crate::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
 
-/// Points of a curve over hold or rate.
-const POINTS: usize = 33;
-/// Holds go from this to that many relaxation times.
-const HOLD_TAUS: [f64; 2] = [0.1, 100.0];
+/// Ten numbers a decade that are easy to read (Renard's series R10, ISO 3).
+const DECADE: [f64; 10] = [1.0, 1.25, 1.6, 2.0, 2.5, 3.15, 4.0, 5.0, 6.3, 8.0];
+/// Decades of a curve over hold or rate.
+const DECADES: i32 = 3;
+/// Holds begin at the decade of so many relaxation times.
+const HOLD_TAUS: f64 = 0.1;
 /// Most cycles drawn.
 const CYCLES: usize = 12;
-/// Rates go from this to that many samples per second.
-const RATES_HZ: [f64; 2] = [10.0, 10_000.0];
+/// Rates begin at so many samples per second.
+const RATE_HZ: f64 = 10.0;
 /// From the fastest allowed speed to the next one drawn.
 const SPEED_RATIO: usize = 3;
 /// Speeds drawn.
@@ -38,10 +40,14 @@ pub struct Curve {
 pub struct Curves {
     /// Ramp and hold: against the hold in s, at several speeds.
     pub hold: Vec<Curve>,
-    /// Cycles between half the depth and the depth: against their number, at several speeds.
+    /// Cycles: against their number, at several speeds.
     pub cycles: Vec<Curve>,
+    /// Their turning points: the shallowest that keep the probe in contact at all these speeds.
+    pub between: [Depth; 2],
     /// The ramp and hold asked about: against samples per second.
     pub rate: Curve,
+    /// Its hold in s.
+    pub rate_hold: Seconds,
 }
 
 /// Curves for a body on a rig; those over the sampling rate for a ramp and hold of this speed and
@@ -68,11 +74,11 @@ pub fn curves(
     };
     let (depth, rate) = (rig.depth, rig.sample_rate_hz);
     let counts: Vec<f64> = (1..=CYCLES).map(|count| count as f64).collect();
-    let between = [Depth(0.5 * depth.0), depth];
+    let between = [shallowest_turn(body, rig, speeds[0]), depth];
     Ok(Curves {
         hold: drawn()
             .map(|speed| {
-                curve(speed, spaced(HOLD_TAUS.map(|taus| taus * tau)), &|hold| {
+                curve(speed, decades(HOLD_TAUS * tau), &|hold| {
                     Protocol::ramp_hold(speed, depth, Seconds(hold), rate)
                 })
             })
@@ -84,15 +90,41 @@ pub fn curves(
                 })
             })
             .collect(),
-        rate: curve(speed, spaced(RATES_HZ), &|rate| {
+        between,
+        rate: curve(speed, decades(RATE_HZ), &|rate| {
             Protocol::ramp_hold(speed, depth, hold, rate)
         }),
+        rate_hold: hold,
     })
 }
 
-/// Equal ratios from one number to another, both included.
-fn spaced([from, to]: [f64; 2]) -> Vec<f64> {
-    (0..POINTS)
-        .map(|i| from * (to / from).powf(i as f64 / (POINTS - 1) as f64))
-        .collect()
+/// Easy numbers from the decade of `from` on, the last a whole decade.
+fn decades(from: f64) -> Vec<f64> {
+    // Rounding must not cost a decade.
+    let first = (from.log10() + 1e-9).floor() as i32;
+    let values = (first..first + DECADES).flat_map(|decade| {
+        // Negative powers of ten have no exact number; quotients by positive ones are the nearest.
+        DECADE.map(|value| {
+            if decade < 0 {
+                value / 10f64.powi(-decade)
+            } else {
+                value * 10f64.powi(decade)
+            }
+        })
+    });
+    let last = 10f64.powi(first + DECADES);
+    values.chain([last]).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn decades_are_easy_numbers() {
+        let values = decades(0.1023);
+        assert_eq!(values.len(), 31);
+        assert_eq!((values[0], values[3], values[30]), (0.1, 0.2, 100.0));
+        assert_eq!(decades(10.0)[0], 10.0);
+    }
 }

@@ -270,6 +270,34 @@ fn peak(body: &ModifiedKelvin, depth: Depth, speed: MmPerS) -> f64 {
     ramp.fold(body.elastic(depth).0, f64::max)
 }
 
+/// Whether the force of one press falls below zero anywhere.
+fn pulls(body: &ModifiedKelvin, protocol: &Protocol) -> bool {
+    let mut state = KelvinState::at_rest();
+    let mut depth = 0.0;
+    protocol.presses[0].iter().any(|piece| {
+        let from = std::mem::replace(&mut depth, piece.to.0);
+        let dt = Seconds(piece.duration.0 / f64::from(PEAK_STEPS));
+        (1..=PEAK_STEPS).any(|i| {
+            let share = f64::from(i) / f64::from(PEAK_STEPS);
+            state.step(body, Depth(from + (depth - from) * share), dt).0 < 0.0
+        })
+    })
+}
+
+/// Where cycles at a speed can turn back with the probe still in contact.
+pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &Rig, speed: MmPerS) -> Depth {
+    let turns = TURNS.map(|share| Depth(share * rig.depth.0));
+    let presses = |turn: &Depth| {
+        // The second cycle does what all later ones do.
+        let twice = Protocol::cycles(speed, [*turn, rig.depth], 2, rig.sample_rate_hz);
+        !pulls(body, &twice)
+    };
+    turns
+        .into_iter()
+        .find(presses)
+        .unwrap_or(turns[TURNS.len() - 1])
+}
+
 struct Search<'a> {
     body: &'a ModifiedKelvin,
     noise: &'a Noise,
@@ -324,7 +352,7 @@ impl Search<'_> {
         }
         let (family, expected) = best?;
         let reason = format!(
-            "{}; both records are fitted together, and the rest of {:.3} s between them counts",
+            "{}; both records are fitted together, and the rest of {:.1} s between them counts",
             self.decides(&expected),
             rest.0
         );
@@ -346,9 +374,8 @@ impl Search<'_> {
         }
         let (family, expected) = best?;
         let reason = format!(
-            "{}; it turns back where the probe still presses, with {:.2} N at least",
-            self.decides(&expected),
-            expected.force_min.0.max(0.0)
+            "{}; it turns back while the probe still presses, since tissue lets go of a probe that pulls",
+            self.decides(&expected)
         );
         Some(Proposal {
             family,
@@ -398,11 +425,7 @@ impl Search<'_> {
             count,
         };
         let secs = |count| family(count).protocol(self.rig).duration().0;
-        // The force of the first cycles says whether the probe stays in contact.
-        let pulls = self
-            .expected(family(2))
-            .is_none_or(|expected| expected.force_min.0 < 0.0);
-        if pulls || secs(1) > limit {
+        if pulls(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
             return None;
         }
         let per_cycle = secs(2) - secs(1);
@@ -467,7 +490,7 @@ impl Search<'_> {
             format!("{} mm/s is the rig's fastest speed", shown(speed))
         } else {
             format!(
-                "{} mm/s is the fastest speed that stays under {} N",
+                "{} mm/s is the fastest speed that stays under {:.2} N",
                 shown(speed),
                 self.rig.force_max.0
             )

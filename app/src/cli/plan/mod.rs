@@ -16,12 +16,13 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::analysis;
 use palpate_protocols::plans::RampHold;
-use palpate_protocols::preview::preview;
+use palpate_protocols::preview::{Preview, preview};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Share of the interlock's force that a plan may use: a tenth is left for a stiffer specimen.
-const FORCE_SHARE: f64 = 0.9;
+/// How much stiffer than the assumed body a specimen may be, as in the preview of a run, before the
+/// interlock stops it.
+const STIFFER: f64 = 1.35;
 /// The white noise of the simulated rig's straight cell, in N.
 const NOISE_ASSUMED: Newtons = Newtons(0.02);
 
@@ -49,7 +50,7 @@ pub struct PlanArgs {
     /// Depth from contact in mm
     #[arg(long, value_name = "MM", default_value = "30")]
     depth: f64,
-    /// Highest force in N; without it nine tenths of the rig's interlock
+    /// Highest force in N; without it what leaves a specimen a third stiffer below the interlock
     #[arg(long, value_name = "N")]
     force_max: Option<f64>,
     /// Fastest speed in mm/s; without it the rig's
@@ -93,6 +94,8 @@ struct Offer {
     proposal: Proposal,
     /// One for every press; none where no plan exists.
     commands: Vec<String>,
+    /// What the runs will ask to be acknowledged.
+    acknowledgements: Vec<String>,
     /// With homing, finding contact and leaving the tissue, in s; none where no plan exists.
     run_s: Option<f64>,
 }
@@ -213,7 +216,7 @@ fn rig_of(args: &PlanArgs, bench: &OpenRig) -> Result<Rig, Failure> {
         depth: Depth(args.depth),
         force_max: args
             .force_max
-            .map_or(Newtons(FORCE_SHARE * interlock.0), Newtons),
+            .map_or(Newtons(interlock.0 / STIFFER), Newtons),
         duration_max: Seconds(args.time_max),
         sample_rate_hz: args.rate,
     };
@@ -287,20 +290,28 @@ fn offer(proposal: Proposal, bench: &OpenRig, depth: Depth) -> Offer {
         Family::TwoSpeeds { speeds, hold, .. } => speeds.map(|speed| (speed, hold)).to_vec(),
         Family::Cycles { .. } => Vec::new(),
     };
-    let runs: Option<Vec<(String, f64)>> = presses
+    let runs: Option<Vec<(String, Preview)>> = presses
         .into_iter()
         .map(|(speed, hold)| run_of(RampHold { speed, depth, hold }, bench))
         .collect();
-    let runs = runs.unwrap_or_default();
+    let (commands, previews): (Vec<String>, Vec<Preview>) =
+        runs.unwrap_or_default().into_iter().unzip();
+    let mut acknowledgements: Vec<String> = previews
+        .iter()
+        .flat_map(|preview| preview.acknowledgements.clone())
+        .collect();
+    acknowledgements.dedup();
+    let secs = previews.iter().map(|preview| preview.expected.0);
     Offer {
-        run_s: (!runs.is_empty()).then(|| runs.iter().map(|run| run.1).sum()),
-        commands: runs.into_iter().map(|run| run.0).collect(),
+        run_s: (!previews.is_empty()).then(|| secs.sum()),
+        commands,
+        acknowledgements,
         proposal,
     }
 }
 
-/// The command of one press and its whole duration, unless the rig would refuse it.
-fn run_of(params: RampHold, bench: &OpenRig) -> Option<(String, f64)> {
+/// The command of one press and its preview, unless the rig would refuse it.
+fn run_of(params: RampHold, bench: &OpenRig) -> Option<(String, Preview)> {
     let curve = bench.calibration.curve().ok()?;
     let rig = bench.rig.description();
     let preview = preview(&params.plan(), rig, &bench.limits, &curve, false);
@@ -310,8 +321,5 @@ fn run_of(params: RampHold, bench: &OpenRig) -> Option<(String, f64)> {
         text::plain(params.depth.0),
         text::plain(params.hold.0)
     );
-    preview
-        .refusals
-        .is_empty()
-        .then_some((command, preview.expected.0))
+    preview.refusals.is_empty().then_some((command, preview))
 }

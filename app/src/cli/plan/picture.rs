@@ -27,7 +27,7 @@ struct Line {
 }
 
 struct Panel {
-    title: &'static str,
+    title: String,
     axis: &'static str,
     lines: Vec<Line>,
     /// The proposal of this kind.
@@ -108,21 +108,22 @@ fn panels(report: &PlanReport, k: usize) -> Vec<Panel> {
         }
     });
     let rate = report.rig.sample_rate_hz;
+    let [top, bottom] = curves.between;
     vec![
         Panel {
-            title: "ramp and hold",
+            title: "ramp and hold".into(),
             axis: "hold in s",
             lines: by_speed(&curves.hold),
             mark: proposed,
         },
         Panel {
-            title: "cycles, half depth to depth",
+            title: format!("cycles from {} to {} mm", plain(top.0), plain(bottom.0)),
             axis: "number of cycles",
             lines: by_speed(&curves.cycles),
             mark: None,
         },
         Panel {
-            title: "the same ramp and hold",
+            title: format!("ramp and hold of {} s", plain(curves.rate_hold.0)),
             axis: "samples per second",
             lines: by_speed(std::slice::from_ref(&curves.rate)),
             mark: proposed.map(|(_, percent)| (rate, percent)),
@@ -174,7 +175,7 @@ fn draw(out: &mut String, panel: &Panel, left: f64, percents: Scale, wanted: f64
         from: xs().map(|point| point.0).fold(f64::INFINITY, f64::min),
         to: xs().map(|point| point.0).fold(0.0, f64::max),
     };
-    text(out, left, TOP - 16.0, "start", 14, panel.title);
+    text(out, left, TOP - 16.0, "start", 14, &panel.title);
     text(
         out,
         left + 0.5 * width,

@@ -3,9 +3,8 @@
 use super::{Offer, PlanReport};
 use palpate_model::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
 
-/// Every how many points of a curve the table shows one.
-const HOLD_STRIDE: usize = 4;
-const RATE_STRIDE: usize = 8;
+/// Of ten points a decade, 1, 2 and 5.
+const SHOWN: [usize; 3] = [0, 3, 7];
 /// Numbers of cycles the table shows.
 const CYCLES_SHOWN: [usize; 6] = [1, 2, 3, 5, 8, 12];
 
@@ -24,8 +23,13 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
     let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig];
     let body: Vec<String> = (0..values.len())
         .map(|k| {
-            let value = digits(values[k], 4);
-            format!("{} {value} {}", PARAMETER_NAMES[k], PARAMETER_UNITS[k])
+            let value: f64 = format!("{:.3e}", values[k]).parse().unwrap_or(values[k]);
+            format!(
+                "{} {} {}",
+                PARAMETER_NAMES[k],
+                plain(value),
+                PARAMETER_UNITS[k]
+            )
         })
         .collect();
     let noise = &report.noise;
@@ -52,7 +56,7 @@ fn assumptions(report: &PlanReport) -> Vec<String> {
         format!(
             "limits  {} mm deep, at most {} N and {} mm/s",
             plain(report.rig.depth.0),
-            plain(report.rig.force_max.0),
+            digits(report.rig.force_max.0, 3),
             plain(report.rig.speed_max.0)
         ),
         format!("wanted  {} (95 % interval)", wanted.join(", ")),
@@ -106,6 +110,8 @@ fn how(offer: &Offer) -> Vec<String> {
         .iter()
         .map(|command| format!("   {command}"))
         .collect();
+    let asks = offer.acknowledgements.iter();
+    lines.extend(asks.map(|ask| format!("   with --acknowledge, because {ask}")));
     lines.push(format!(
         "   about {secs:.0} s in all, with homing and finding contact"
     ));
@@ -146,25 +152,28 @@ fn tables(report: &PlanReport) -> Vec<String> {
         .position(|name| *name == wanted)
         .unwrap_or(0);
     let curves = &report.curves;
-    let every = |curve: &Curve, stride: usize| (0..curve.x.len()).step_by(stride).collect();
-    let shown: Vec<usize> = CYCLES_SHOWN.iter().map(|count| count - 1).collect();
+    let easy = |curve: &Curve| -> Vec<usize> {
+        let all = 0..curve.x.len();
+        all.filter(|i| SHOWN.contains(&(i % 10))).collect()
+    };
+    let counts = |_: &Curve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
     let mut lines = vec![format!(
         "{wanted} in % (95 % interval), ramp and hold, against the hold"
     )];
-    lines.extend(table("hold s", &curves.hold, k, |curve| {
-        every(curve, HOLD_STRIDE)
-    }));
+    lines.extend(table("hold s", &curves.hold, k, easy));
+    let [top, bottom] = curves.between;
     lines.push(format!(
-        "{wanted} in %, cycles between half depth and depth, against their number"
+        "{wanted} in %, cycles from {} to {} mm, against their number",
+        plain(top.0),
+        plain(bottom.0)
     ));
-    lines.extend(table("cycles", &curves.cycles, k, |_| shown.clone()));
+    lines.extend(table("cycles", &curves.cycles, k, counts));
     lines.push(format!(
-        "{wanted} in %, ramp and hold 1, against samples per second"
+        "{wanted} in %, ramp and hold of {} s, against samples per second",
+        plain(curves.rate_hold.0)
     ));
     let rate = std::slice::from_ref(&curves.rate);
-    lines.extend(table("per second", rate, k, |curve| {
-        every(curve, RATE_STRIDE)
-    }));
+    lines.extend(table("per second", rate, k, easy));
     lines
 }
 
@@ -182,7 +191,7 @@ fn table(
         format!("  {label:<12}{cells}")
     };
     let shown = shown(first);
-    let heads = shown.iter().map(|&i| digits(first.x[i], 3)).collect();
+    let heads = shown.iter().map(|&i| plain(first.x[i])).collect();
     let mut lines = vec![cells(head.to_owned(), heads)];
     for curve in curves {
         let values = shown
