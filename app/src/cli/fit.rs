@@ -42,6 +42,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let report = fit(&samples, &options)
         .map_err(|err| Failure::failed(format!("{err}, in {}", args.source.display())))?;
     let seconds = watch.seconds();
+    super::last_fit::remember(&report, &args.source, output);
     report
         .warnings
         .iter()

@@ -3,7 +3,9 @@
 mod export;
 mod fit;
 mod info;
+mod last_fit;
 mod output;
+mod plan;
 mod replay;
 mod rig;
 mod run;
@@ -32,6 +34,8 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Propose the shortest protocol that will tell what is wanted
+    Plan(plan::PlanArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
     /// Write a session's samples as a table
@@ -108,6 +112,7 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),

@@ -1,0 +1,157 @@
+//! The last fit, remembered between commands: `palpate plan` assumes its body.
+
+use super::Failure;
+use super::output::Output;
+use palpate_model::fit::{FitReport, Parameter};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use serde::{Deserialize, Serialize};
+use std::ffi::OsString;
+use std::path::{Path, PathBuf};
+use std::{fs, io};
+
+const FILE: &str = "last-fit.json";
+
+#[derive(Serialize)]
+struct Remembered<'a> {
+    source: String,
+    #[serde(flatten)]
+    report: &'a FitReport,
+}
+
+/// What is needed of a fit that was written as JSON, by [`remember`] or by `palpate fit --json`.
+#[derive(Debug, Deserialize)]
+pub(super) struct KnownFit {
+    /// What was fitted, if that was written.
+    pub source: Option<String>,
+    /// Root mean square of the residuals in N.
+    pub rmse_n: f64,
+    parameters: Vec<Parameter>,
+}
+
+impl KnownFit {
+    /// The body found; a name that is missing is named.
+    pub fn body(&self) -> Result<ModifiedKelvin, String> {
+        let value = |name: &str| {
+            let mut all = self.parameters.iter();
+            all.find(|parameter| parameter.name == name)
+                .map(|parameter| parameter.value)
+                .ok_or_else(|| format!("the fit has no parameter {name}"))
+        };
+        Ok(ModifiedKelvin {
+            tau_eps: value("tau_eps")?,
+            mu: [value("mu1")?, value("mu2")?, value("mu3")?],
+            tau_sig: value("tau_sig")?,
+        })
+    }
+}
+
+/// Keeps a fit for later commands. That it cannot be kept is worth a note and nothing more.
+pub(super) fn remember(report: &FitReport, source: &Path, output: &Output) {
+    let Some(file) = state_file() else {
+        return;
+    };
+    let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
+    let remembered = Remembered {
+        source: source.display().to_string(),
+        report,
+    };
+    if let Err(err) = write(&file, &remembered) {
+        output.note(&format!(
+            "this fit will not be remembered for 'palpate plan': {err}, {}",
+            file.display()
+        ));
+    }
+}
+
+/// The last fit; `None` if there was none.
+pub(super) fn recall() -> Result<Option<KnownFit>, Failure> {
+    match state_file() {
+        Some(file) if file.exists() => read(&file).map(Some),
+        _ => Ok(None),
+    }
+}
+
+/// A fit in a file, as `palpate fit --json` prints it.
+pub(super) fn read(file: &Path) -> Result<KnownFit, Failure> {
+    let bad = |err: &dyn std::fmt::Display| {
+        Failure::usage(format!(
+            "this is not a fit that 'palpate fit --json' wrote: {err}, {}",
+            file.display()
+        ))
+    };
+    let text = fs::read_to_string(file).map_err(|err| bad(&err))?;
+    serde_json::from_str(&text).map_err(|err| bad(&err))
+}
+
+/// Under another name first, so that the file is whole whenever it is there.
+fn write(file: &Path, remembered: &Remembered<'_>) -> io::Result<()> {
+    if let Some(folder) = file.parent() {
+        fs::create_dir_all(folder)?;
+    }
+    let hidden = file.with_file_name(format!(".{FILE}.{}.tmp", std::process::id()));
+    let result = fs::write(&hidden, serde_json::to_vec(remembered)?)
+        .and_then(|()| fs::rename(&hidden, file));
+    if result.is_err() {
+        // What is left of it helps nobody; the error already says what happened.
+        let _ = fs::remove_file(&hidden);
+    }
+    result
+}
+
+fn state_file() -> Option<PathBuf> {
+    state_file_from(|name| std::env::var_os(name), std::env::home_dir())
+}
+
+/// Beside the sessions where `PALPATE_HOME` says where those are; else where the system keeps what
+/// programs remember (XDG Base Directory Specification, `XDG_STATE_HOME`).
+fn state_file_from(
+    variable: impl Fn(&str) -> Option<OsString>,
+    home: Option<PathBuf>,
+) -> Option<PathBuf> {
+    let folder = |name: &str| {
+        variable(name)
+            .map(PathBuf::from)
+            .filter(|path| !path.as_os_str().is_empty())
+    };
+    if let Some(library) = folder("PALPATE_HOME") {
+        return Some(library.join(FILE));
+    }
+    let state = if cfg!(windows) {
+        folder("LOCALAPPDATA")
+    } else {
+        // The specification has relative paths ignored.
+        folder("XDG_STATE_HOME")
+            .filter(|path| path.is_absolute())
+            .or_else(|| home.map(|home| home.join(".local/state")))
+    };
+    Some(state?.join("palpate").join(FILE))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[cfg(not(windows))]
+    #[test]
+    fn the_place_follows_the_environment() {
+        let with = |set: &[(&str, &str)]| {
+            let set: Vec<(String, OsString)> = set
+                .iter()
+                .map(|(name, value)| ((*name).to_owned(), OsString::from(value)))
+                .collect();
+            let get = move |name: &str| {
+                let mut all = set.iter();
+                all.find(|one| one.0 == name).map(|one| one.1.clone())
+            };
+            state_file_from(get, Some(PathBuf::from("/home/me")))
+        };
+        let path = |text: &str| Some(PathBuf::from(text));
+        let default = path("/home/me/.local/state/palpate/last-fit.json");
+        assert_eq!(with(&[]), default);
+        assert_eq!(with(&[("XDG_STATE_HOME", "not/absolute")]), default);
+        let state = ("XDG_STATE_HOME", "/state");
+        assert_eq!(with(&[state]), path("/state/palpate/last-fit.json"));
+        let library = ("PALPATE_HOME", "/library");
+        assert_eq!(with(&[state, library]), path("/library/last-fit.json"));
+    }
+}

@@ -1,0 +1,247 @@
+//! The plan as people read it.
+
+use super::{Offer, PlanReport};
+use palpate_model::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
+
+/// Of ten points a decade, 1, 2 and 5.
+const SHOWN: [usize; 3] = [0, 3, 7];
+/// Numbers of cycles the table shows.
+const CYCLES_SHOWN: [usize; 6] = [1, 2, 3, 5, 8, 12];
+
+pub(super) fn text(report: &PlanReport) -> String {
+    let mut lines = assumptions(report);
+    lines.push(String::new());
+    lines.extend(proposals(report));
+    lines.push(String::new());
+    lines.extend(tables(report));
+    lines.join("\n")
+}
+
+fn assumptions(report: &PlanReport) -> Vec<String> {
+    let body = &report.body;
+    let [mu1, mu2, mu3] = body.mu;
+    let values = [body.tau_eps, mu1, mu2, mu3, body.tau_sig];
+    let body: Vec<String> = (0..values.len())
+        .map(|k| {
+            let value: f64 = format!("{:.3e}", values[k]).parse().unwrap_or(values[k]);
+            format!(
+                "{} {} {}",
+                PARAMETER_NAMES[k],
+                plain(value),
+                PARAMETER_UNITS[k]
+            )
+        })
+        .collect();
+    let noise = &report.noise;
+    let slow = noise.memory.map_or(String::new(), |memory| {
+        format!(
+            ", and {} mN that lasts {} s",
+            plain(memory.sd.0 * 1e3),
+            plain(memory.time.0)
+        )
+    });
+    let wanted: Vec<String> = report
+        .targets
+        .iter()
+        .map(|target| format!("{} within {} %", target.parameter, plain(target.percent)))
+        .collect();
+    vec![
+        format!("body    {}", report.body_source),
+        format!("        {}", body.join(", ")),
+        format!(
+            "noise   {} mN in every sample{slow}; {} samples per second",
+            digits(noise.white.0 * 1e3, 3),
+            plain(report.rig.sample_rate_hz)
+        ),
+        format!(
+            "limits  {} mm deep, at most {} N and {} mm/s",
+            plain(report.rig.depth.0),
+            digits(report.rig.force_max.0, 3),
+            plain(report.rig.speed_max.0)
+        ),
+        format!("wanted  {} (95 % interval)", wanted.join(", ")),
+    ]
+}
+
+fn proposals(report: &PlanReport) -> Vec<String> {
+    let titles: Vec<String> = report
+        .proposals
+        .iter()
+        .map(|offer| title(&offer.proposal.family))
+        .collect();
+    let width = titles.iter().map(String::len).max().unwrap_or(0);
+    let names: String = PARAMETER_NAMES
+        .iter()
+        .map(|name| format!("{name:>9}"))
+        .collect();
+    let mut lines = vec![format!(
+        "   {:width$} {:>8}{names}{:>8}",
+        "", "time", "peak"
+    )];
+    for (index, (offer, title)) in report.proposals.iter().zip(&titles).enumerate() {
+        let expected = &offer.proposal.expected;
+        let percents: String = expected
+            .parameters
+            .iter()
+            .map(|parameter| format!("{:>9}", percent(parameter.percent)))
+            .collect();
+        lines.push(format!(
+            "{}  {title:width$} {:>6.1} s{percents}{:>6.2} N",
+            index + 1,
+            expected.duration.0,
+            expected.force_max.0
+        ));
+    }
+    for (index, offer) in report.proposals.iter().enumerate() {
+        lines.push(String::new());
+        lines.push(format!("{}  {}", index + 1, offer.proposal.reason));
+        lines.extend(how(offer));
+    }
+    lines
+}
+
+/// How to run it, if that is possible.
+fn how(offer: &Offer) -> Vec<String> {
+    let Some(secs) = offer.run_s else {
+        return vec!["   there is no command for this yet".into()];
+    };
+    let mut lines: Vec<String> = offer
+        .commands
+        .iter()
+        .map(|command| format!("   {command}"))
+        .collect();
+    let asks = offer.acknowledgements.iter();
+    lines.extend(asks.map(|ask| format!("   with --acknowledge, because {ask}")));
+    lines.push(format!(
+        "   about {secs:.0} s in all, with homing and finding contact"
+    ));
+    lines
+}
+
+fn title(family: &Family) -> String {
+    match family {
+        Family::RampHold { speed, hold } => format!(
+            "ramp and hold: {} mm/s, {} s",
+            plain(speed.0),
+            plain(hold.0)
+        ),
+        Family::TwoSpeeds { speeds, hold, .. } => format!(
+            "two speeds: {} and {} mm/s, {} s each",
+            plain(speeds[0].0),
+            plain(speeds[1].0),
+            plain(hold.0)
+        ),
+        Family::Cycles {
+            speed,
+            between,
+            count,
+        } => format!(
+            "{count} cycle{}: {} mm/s, {} to {} mm",
+            if *count == 1 { "" } else { "s" },
+            plain(speed.0),
+            plain(between[0].0),
+            plain(between[1].0)
+        ),
+    }
+}
+
+fn tables(report: &PlanReport) -> Vec<String> {
+    let wanted = report.targets[0].parameter;
+    let k = PARAMETER_NAMES
+        .iter()
+        .position(|name| *name == wanted)
+        .unwrap_or(0);
+    let curves = &report.curves;
+    let easy = |curve: &Curve| -> Vec<usize> {
+        let all = 0..curve.x.len();
+        all.filter(|i| SHOWN.contains(&(i % 10))).collect()
+    };
+    let counts = |_: &Curve| CYCLES_SHOWN.map(|count| count - 1).to_vec();
+    let mut lines = vec![format!(
+        "{wanted} in % (95 % interval), ramp and hold, against the hold"
+    )];
+    lines.extend(table("hold s", &curves.hold, k, easy));
+    let [top, bottom] = curves.between;
+    lines.push(format!(
+        "{wanted} in %, cycles from {} to {} mm, against their number",
+        plain(top.0),
+        plain(bottom.0)
+    ));
+    lines.extend(table("cycles", &curves.cycles, k, counts));
+    lines.push(format!(
+        "{wanted} in %, ramp and hold of {} s, against samples per second",
+        plain(curves.rate_hold.0)
+    ));
+    let rate = std::slice::from_ref(&curves.rate);
+    lines.extend(table("per second", rate, k, easy));
+    lines
+}
+
+fn table(
+    head: &str,
+    curves: &[Curve],
+    parameter: usize,
+    shown: impl Fn(&Curve) -> Vec<usize>,
+) -> Vec<String> {
+    let Some(first) = curves.first() else {
+        return Vec::new();
+    };
+    let cells = |label: String, cells: Vec<String>| {
+        let cells: String = cells.iter().map(|cell| format!("{cell:>9}")).collect();
+        format!("  {label:<12}{cells}")
+    };
+    let shown = shown(first);
+    let heads = shown.iter().map(|&i| plain(first.x[i])).collect();
+    let mut lines = vec![cells(head.to_owned(), heads)];
+    for curve in curves {
+        let values = shown
+            .iter()
+            .map(|&i| percent(curve.percent[i][parameter]))
+            .collect();
+        lines.push(cells(format!("{} mm/s", plain(curve.speed.0)), values));
+    }
+    lines
+}
+
+/// Three digits; what is above 1000 % is no knowledge at all.
+fn percent(value: Option<f64>) -> String {
+    match value {
+        Some(value) if value < 1000.0 => digits(value, 3),
+        _ => "-".into(),
+    }
+}
+
+/// A number to so many significant digits, without an exponent where people write none.
+pub(super) fn digits(value: f64, count: i32) -> String {
+    let magnitude = value.abs().log10().floor();
+    if !magnitude.is_finite() {
+        return plain(value);
+    }
+    let decimals = (f64::from(count) - 1.0 - magnitude).max(0.0) as usize;
+    format!("{value:.decimals$}")
+}
+
+/// A number as short as it can be written, without the rounding of its arithmetic.
+pub(super) fn plain(value: f64) -> String {
+    let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
+    format!("{rounded}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn numbers_are_written_as_people_do() {
+        assert_eq!(plain(49.0 * 0.03), "1.47");
+        assert_eq!(plain(8.1), "8.1");
+        assert_eq!(digits(0.000_434_5, 4), "0.0004345");
+        assert_eq!(digits(1234.5, 3), "1234");
+        assert_eq!(digits(0.0, 3), "0");
+        assert_eq!(percent(Some(0.324_98)), "0.325");
+        assert_eq!(
+            (percent(None), percent(Some(2e4))),
+            ("-".into(), "-".into())
+        );
+    }
+}

@@ -1,0 +1,391 @@
+//! From derivatives along a path to intervals.
+//!
+//! Every press has its own initial force and offset, so they are eliminated press by press: with
+//! them as the first columns of an orthogonal triangularisation, the rows below theirs hold what the
+//! press says of the body alone, and the rows of all presses are triangularised together.
+
+use super::noise::{Noise, Unknowns};
+use super::protocol::Protocol;
+use super::response::{COLUMNS, NUISANCES, Press};
+use crate::units::{Newtons, Seconds};
+use crate::viscoelastic::{BodyError, ModifiedKelvin};
+use serde::Serialize;
+use thiserror::Error;
+
+/// Parameters of a body.
+const BODY: usize = COLUMNS - NUISANCES;
+
+/// Names of the parameters of a body, in the order of [`Expected::parameters`].
+pub const PARAMETER_NAMES: [&str; BODY] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
+
+/// Their units, in the same order.
+pub const PARAMETER_UNITS: [&str; BODY] = ["s", "N/mm", "N/mm^2", "N/mm^3", "N*s/mm^2"];
+
+/// The 97.5 % point of the normal distribution.
+const Z975: f64 = 1.959_963_984_540_054;
+
+/// A design with columns of unit length and a smallest singular value below the inverse of this
+/// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
+/// 1e4, a single ramp above 1e10.
+const CONDITION_MAX: f64 = 1e6;
+
+/// Parameters with at least this share of the largest entry belong to the blind combination.
+const NAMED_SHARE: f64 = 0.2;
+
+/// Nothing could be expected; the text says what to change.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum ExpectedError {
+    /// The body is none.
+    #[error(transparent)]
+    Body(#[from] BodyError),
+    /// A number that cannot be.
+    #[error("a {what} of {value} is not possible; give a finite number above zero")]
+    BadNumber {
+        /// Which number, with its unit.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// Different parameters give the same force on this path.
+    #[error("this protocol cannot separate {names}; add a hold of about 5 tau or a second speed")]
+    Inseparable {
+        /// The parameters that cannot be told apart, in words.
+        names: String,
+    },
+    /// A target for something that is not a parameter of the body.
+    #[error("a body has no parameter called '{name}'; it has {}", PARAMETER_NAMES.join(", "))]
+    UnknownParameter {
+        /// The name given.
+        name: String,
+    },
+    /// Relative to nothing.
+    #[error("{name} is zero in this body, so an interval in percent of it means nothing")]
+    ZeroParameter {
+        /// The parameter.
+        name: &'static str,
+    },
+    /// No speed of the rig is gentle enough.
+    #[error(
+        "pressing to {depth_mm} mm takes {force_n:.2} N even at {speed_mm_per_s} mm/s, and {allowed_n} N are allowed; press less deep or allow more force"
+    )]
+    TooForceful {
+        /// Depth asked for.
+        depth_mm: f64,
+        /// Peak force at the slowest speed tried.
+        force_n: f64,
+        /// That speed.
+        speed_mm_per_s: f64,
+        /// The ceiling.
+        allowed_n: f64,
+    },
+    /// No speed of the rig is fast enough.
+    #[error(
+        "pressing to {depth_mm} mm at {speed_mm_per_s} mm/s takes more than half of the {allowed_s} s allowed; allow more time or press less deep"
+    )]
+    TooLittleTime {
+        /// Depth asked for.
+        depth_mm: f64,
+        /// The rig's fastest speed.
+        speed_mm_per_s: f64,
+        /// Longest protocol allowed.
+        allowed_s: f64,
+    },
+    /// No protocol is good enough.
+    #[error(
+        "{name} cannot be known to {wanted} % with any protocol up to {longest_s} s; the best found reaches {reached} %; allow more time or noise that is smaller"
+    )]
+    Unreachable {
+        /// The parameter that is furthest from its target.
+        name: &'static str,
+        /// Half-width of the wanted 95 % interval in percent.
+        wanted: f64,
+        /// Half-width reached, in percent, to three digits.
+        reached: String,
+        /// Longest protocol tried.
+        longest_s: f64,
+    },
+}
+
+/// One parameter as a fit of the protocol's record is expected to find it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct ExpectedParameter {
+    /// One of [`PARAMETER_NAMES`].
+    pub name: &'static str,
+    /// Value in the assumed body.
+    pub value: f64,
+    /// Unit of value and error.
+    pub unit: &'static str,
+    /// Standard deviation of the fitted value.
+    pub std_error: f64,
+    /// Half-width of the 95 % interval in percent of the value; `None` where the value is zero.
+    pub percent: Option<f64>,
+}
+
+/// What a protocol is expected to tell about a body.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Expected {
+    /// In the order of [`PARAMETER_NAMES`].
+    pub parameters: [ExpectedParameter; BODY],
+    /// Lowest force on the path. Below zero the probe would have to pull: real tissue lets go of
+    /// it, and the model no longer holds.
+    pub force_min: Newtons,
+    /// Highest force on the path.
+    pub force_max: Newtons,
+    /// Time of the protocol, [`Protocol::duration`].
+    pub duration: Seconds,
+}
+
+/// The intervals that a least-squares fit of every sample, all of equal weight, is expected to have.
+pub fn intervals(
+    body: &ModifiedKelvin,
+    protocol: &Protocol,
+    noise: &Noise,
+    unknowns: Unknowns,
+) -> Result<Expected, ExpectedError> {
+    protocol.check()?;
+    noise.check()?;
+    body.checked()?;
+    let mut shared = Triangle::<BODY>::default();
+    let mut slow = [[0.0; BODY]; BODY];
+    let mut lengths = [0.0; BODY];
+    let mut forces = [f64::INFINITY, f64::NEG_INFINITY];
+    for pieces in &protocol.presses {
+        let press = Press {
+            body,
+            pieces,
+            sample_rate_hz: protocol.sample_rate_hz,
+            noise,
+            unknowns,
+        };
+        let sums = PressSums::of(&press, unknowns);
+        forces = [forces[0].min(sums.forces[0]), forces[1].max(sums.forces[1])];
+        for row in sums.triangle.r.iter().skip(NUISANCES) {
+            shared.push(std::array::from_fn(|k| row[NUISANCES + k]));
+        }
+        for (k, length) in lengths.iter_mut().enumerate() {
+            *length += sums.triangle.length_squared(NUISANCES + k);
+        }
+        sums.add_slow(&mut slow);
+    }
+    let inverse = shared.inverse(&lengths.map(f64::sqrt))?;
+    let variances = variances(&inverse, &slow, noise);
+    let values = [
+        body.tau_eps,
+        body.mu[0],
+        body.mu[1],
+        body.mu[2],
+        body.tau_sig,
+    ];
+    let parameters = std::array::from_fn(|k| {
+        // The first column is the derivative by log tau.
+        let scale = if k == 0 { body.tau_eps } else { 1.0 };
+        let std_error = scale * variances[k].sqrt();
+        let share = Z975 * std_error / values[k].abs();
+        ExpectedParameter {
+            name: PARAMETER_NAMES[k],
+            value: values[k],
+            unit: PARAMETER_UNITS[k],
+            std_error,
+            percent: share.is_finite().then_some(100.0 * share),
+        }
+    });
+    Ok(Expected {
+        parameters,
+        force_min: Newtons(forces[0]),
+        force_max: Newtons(forces[1]),
+        duration: protocol.duration(),
+    })
+}
+
+/// `sigma^2 V V' + sd^2 V V' M V V'` on the diagonal, with `V` the inverse of the triangle and `M`
+/// the columns' double sum over the correlation of slow noise.
+fn variances(
+    inverse: &[[f64; BODY]; BODY],
+    slow: &[[f64; BODY]; BODY],
+    noise: &Noise,
+) -> [f64; BODY] {
+    let sd = noise.memory.map_or(0.0, |memory| memory.sd.0);
+    let bread: [[f64; BODY]; BODY] = std::array::from_fn(|i| {
+        std::array::from_fn(|j| (0..BODY).map(|k| inverse[i][k] * inverse[j][k]).sum())
+    });
+    std::array::from_fn(|i| {
+        let mut filling = 0.0;
+        for j in 0..BODY {
+            for k in 0..BODY {
+                filling += bread[i][j] * slow[j][k] * bread[i][k];
+            }
+        }
+        noise.white.0.powi(2) * bread[i][i] + sd * sd * filling
+    })
+}
+
+/// What one press adds.
+struct PressSums {
+    triangle: Triangle<COLUMNS>,
+    /// Double sum of all columns over the correlation of slow noise.
+    slow: [[f64; COLUMNS]; COLUMNS],
+    /// Lowest and highest force in N.
+    forces: [f64; 2],
+}
+
+impl PressSums {
+    fn of(press: &Press<'_>, unknowns: Unknowns) -> Self {
+        let mut sums = Self {
+            triangle: Triangle::default(),
+            slow: [[0.0; COLUMNS]; COLUMNS],
+            forces: [0.0; 2],
+        };
+        let is_slow = press.noise.memory.is_some();
+        press.visit(|point| {
+            let [low, high] = sums.forces;
+            sums.forces = [low.min(point.force), high.max(point.force)];
+            let root = point.weight.sqrt();
+            if root > 0.0 {
+                sums.triangle.push(point.row.map(|value| root * value));
+            }
+            if is_slow {
+                for (i, sums) in sums.slow.iter_mut().enumerate() {
+                    for (j, sum) in sums.iter_mut().enumerate() {
+                        let pair = point.row[i] * point.lagged[j] + point.lagged[i] * point.row[j];
+                        *sum += point.weight * pair;
+                    }
+                }
+            }
+        });
+        // A known nuisance has a column of zeros; any pivot will do for it.
+        for (k, is_unknown) in [unknowns.f0, unknowns.f_offset].into_iter().enumerate() {
+            if !is_unknown {
+                sums.triangle.r[k][k] = 1.0;
+            }
+        }
+        sums
+    }
+
+    /// Adds the double sum of the body's columns with the nuisances projected out of them.
+    fn add_slow(&self, total: &mut [[f64; BODY]; BODY]) {
+        let r = &self.triangle.r;
+        // Body column k less its best combination of nuisances.
+        let projected: [[f64; COLUMNS]; BODY] = std::array::from_fn(|k| {
+            let column = NUISANCES + k;
+            let mut combination = [0.0; COLUMNS];
+            combination[column] = 1.0;
+            for i in (0..NUISANCES).rev() {
+                let known: f64 = (i + 1..NUISANCES).map(|j| r[i][j] * combination[j]).sum();
+                combination[i] = (-r[i][column] - known) / r[i][i];
+            }
+            combination
+        });
+        for (row, left) in total.iter_mut().zip(&projected) {
+            for (sum, right) in row.iter_mut().zip(&projected) {
+                for (i, a) in left.iter().enumerate() {
+                    for (j, b) in right.iter().enumerate() {
+                        *sum += a * self.slow[i][j] * b;
+                    }
+                }
+            }
+        }
+    }
+}
+
+/// Upper triangle of an orthogonal factorisation that takes one row at a time (Givens rotations;
+/// Golub & Van Loan, Matrix Computations, section 5.2.5).
+#[derive(Clone, Debug)]
+struct Triangle<const N: usize> {
+    r: [[f64; N]; N],
+}
+
+impl<const N: usize> Default for Triangle<N> {
+    fn default() -> Self {
+        Self { r: [[0.0; N]; N] }
+    }
+}
+
+impl<const N: usize> Triangle<N> {
+    fn push(&mut self, mut row: [f64; N]) {
+        for i in 0..N {
+            if row[i] == 0.0 {
+                continue;
+            }
+            let (a, b) = (self.r[i][i], row[i]);
+            let norm = a.hypot(b);
+            let (cos, sin) = (a / norm, b / norm);
+            self.r[i][i] = norm;
+            for (top, bottom) in self.r[i].iter_mut().zip(&mut row).skip(i + 1) {
+                (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
+            }
+        }
+    }
+
+    fn length_squared(&self, column: usize) -> f64 {
+        self.r.iter().map(|row| row[column].powi(2)).sum()
+    }
+}
+
+impl Triangle<BODY> {
+    /// The inverse, refused where columns of these lengths do not tell their parameters apart.
+    fn inverse(&self, lengths: &[f64; BODY]) -> Result<[[f64; BODY]; BODY], ExpectedError> {
+        let mut unit = self.r;
+        for row in &mut unit {
+            for (value, length) in row.iter_mut().zip(lengths) {
+                *value /= length;
+            }
+        }
+        let mut inverse = [[0.0; BODY]; BODY];
+        for column in 0..BODY {
+            for i in (0..=column).rev() {
+                let known: f64 = (i + 1..=column)
+                    .map(|j| unit[i][j] * inverse[j][column])
+                    .sum();
+                // A pivot smaller than its own rounding is that rounding.
+                let pivot = unit[i][i].max(f64::EPSILON);
+                inverse[i][column] = (f64::from(u8::from(i == column)) - known) / pivot;
+            }
+        }
+        let (condition, blind) = largest_singular(&inverse);
+        if condition.is_nan() || condition > CONDITION_MAX {
+            return Err(ExpectedError::Inseparable {
+                names: named(&blind),
+            });
+        }
+        for (row, length) in inverse.iter_mut().zip(lengths) {
+            row.iter_mut().for_each(|value| *value /= length);
+        }
+        Ok(inverse)
+    }
+}
+
+/// Largest singular value of a matrix and its left vector, by power iteration: what the inverse of a
+/// design enlarges most is what the design is blind to. Twenty steps leave nothing of the others
+/// where it matters, that is, where one value is far larger than the rest.
+fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
+    let mut vector = [1.0, 0.9, -0.8, 0.7, -0.6];
+    let mut value = 0.0;
+    for _ in 0..20 {
+        let across: [f64; BODY] =
+            std::array::from_fn(|k| (0..BODY).map(|i| matrix[i][k] * vector[i]).sum());
+        let back: [f64; BODY] =
+            std::array::from_fn(|i| (0..BODY).map(|k| matrix[i][k] * across[k]).sum());
+        let norm = back.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let before = vector.iter().map(|value| value * value).sum::<f64>().sqrt();
+        value = (norm / before).sqrt();
+        vector = back.map(|value| value / norm);
+    }
+    (value, vector)
+}
+
+fn named(blind: &[f64; BODY]) -> String {
+    let largest = blind.iter().fold(0.0f64, |max, value| max.max(value.abs()));
+    let names: Vec<&str> = PARAMETER_NAMES
+        .into_iter()
+        .zip(blind)
+        .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
+        .map(|(name, _)| name)
+        .collect();
+    match names.as_slice() {
+        [one, other] => format!("{one} from {other}"),
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        [only] => format!("{only} from initial force and offset"),
+        _ => "the parameters".into(),
+    }
+}

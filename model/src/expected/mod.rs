@@ -1,0 +1,40 @@
+//! What a protocol will be able to tell about a body, before it is run.
+//!
+//! For small noise a least-squares fit scatters around the truth with the covariance
+//! `(J'J)^-1 J'CJ (J'J)^-1`, where `J` holds the derivatives of the force by the unknowns along the
+//! path and `C` is the covariance of the noise; for white noise of standard deviation `sigma` that is
+//! `sigma^2 (J'J)^-1`, the bound of Cramér and Rao (Seber & Wild, Nonlinear Regression, 1989, sections
+//! 2.1 and 6.2). `J` needs a path and a body but no measurement, so intervals can be known, and the
+//! shortest protocol that reaches a wanted one found, before any tissue is touched.
+//!
+//! Start at [`intervals`] for one protocol and at [`shortest`] for the search.
+//!
+//! ```
+//! use palpate_model::expected::{Noise, Protocol, Unknowns, intervals};
+//! use palpate_model::viscoelastic::ModifiedKelvin;
+//! use palpate_model::{Depth, MmPerS, Newtons, Seconds};
+//!
+//! let protocol = Protocol::ramp_hold(MmPerS(0.75), Depth(30.0), Seconds(50.0), 1000.0);
+//! let noise = Noise::white(Newtons(0.02));
+//! let expected = intervals(&ModifiedKelvin::THESIS, &protocol, &noise, Unknowns::default())?;
+//! let tau = &expected.parameters[0];
+//! assert_eq!(tau.name, "tau_eps");
+//! // 1.96 standard deviations of 0.166 %.
+//! assert!((tau.percent.unwrap() - 0.325).abs() < 0.002);
+//! # Ok::<(), palpate_model::expected::ExpectedError>(())
+//! ```
+
+mod curves;
+mod information;
+mod noise;
+mod protocol;
+mod response;
+mod search;
+
+pub use curves::{Curve, Curves, curves};
+pub use information::{
+    Expected, ExpectedError, ExpectedParameter, PARAMETER_NAMES, PARAMETER_UNITS, intervals,
+};
+pub use noise::{Memory, Noise, Unknowns};
+pub use protocol::{Piece, Protocol};
+pub use search::{Family, Proposal, Rig, Target, shortest};

@@ -1,0 +1,546 @@
+//! The shortest protocol of each family that reaches wanted intervals.
+//!
+//! Speeds go down from the fastest that rig and force ceiling allow in steps of a fifth, each rounded
+//! to what the rig makes. For each speed the shortest hold (or the smallest number of cycles) that
+//! reaches every target is found by bisection. No randomness: the same question, the same answer.
+
+use super::information::{Expected, ExpectedError, PARAMETER_NAMES, intervals};
+use super::noise::{Noise, Unknowns};
+use super::protocol::Protocol;
+use crate::units::{Depth, MmPerS, Newtons, Seconds};
+use crate::viscoelastic::{KelvinState, ModifiedKelvin};
+use serde::Serialize;
+
+/// From one speed to the next.
+const SPEED_RATIO: f64 = 0.8;
+/// Down to a hundredth of the fastest.
+const SPEEDS_MAX: usize = 21;
+/// Steps in which the peak of a ramp is looked for.
+const PEAK_STEPS: u32 = 256;
+/// Rest between presses in relaxation times: what is left of the first press is `e^-10`.
+const REST_TAUS: f64 = 10.0;
+/// Longest series of cycles.
+const CYCLES_MAX: usize = 64;
+/// Where cycles turn back, as shares of the depth.
+const TURNS: [f64; 4] = [0.0, 0.25, 0.5, 0.75];
+/// Holds closer than this are the same.
+const HOLD_RATIO: f64 = 1.003;
+
+/// What the rig and the specimen allow, and how it is sampled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Rig {
+    /// Speeds are multiples of this.
+    pub speed_quantum: MmPerS,
+    /// Fastest speed.
+    pub speed_max: MmPerS,
+    /// Depth of every protocol, in mm.
+    pub depth: Depth,
+    /// Ceiling of the force along the path, in N.
+    pub force_max: Newtons,
+    /// Longest protocol, in s.
+    pub duration_max: Seconds,
+    /// Samples per second.
+    pub sample_rate_hz: f64,
+}
+
+/// A wanted interval.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Target {
+    /// One of [`PARAMETER_NAMES`].
+    pub parameter: &'static str,
+    /// Half-width of its 95 % interval, in percent of its value.
+    pub percent: f64,
+}
+
+impl Target {
+    /// A target for a parameter by name; `tau` is short for `tau_eps`.
+    pub fn new(name: &str, percent: f64) -> Result<Self, ExpectedError> {
+        let full = if name == "tau" { "tau_eps" } else { name };
+        let known = PARAMETER_NAMES.into_iter().find(|known| *known == full);
+        let parameter = known.ok_or_else(|| ExpectedError::UnknownParameter {
+            name: name.to_owned(),
+        })?;
+        if percent > 0.0 && percent.is_finite() {
+            Ok(Self { parameter, percent })
+        } else {
+            Err(ExpectedError::BadNumber {
+                what: "wanted interval in percent",
+                value: percent,
+            })
+        }
+    }
+}
+
+/// The kinds of protocol that are tried.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+#[serde(tag = "family", rename_all = "kebab-case")]
+pub enum Family {
+    /// One ramp and hold.
+    RampHold {
+        /// Speed of the ramp.
+        speed: MmPerS,
+        /// Time at depth.
+        hold: Seconds,
+    },
+    /// Two ramps and holds, fitted together.
+    TwoSpeeds {
+        /// Speed of each ramp.
+        speeds: [MmPerS; 2],
+        /// Time at depth, after each.
+        hold: Seconds,
+        /// Time out of the tissue between them.
+        rest: Seconds,
+    },
+    /// Up and down at one speed.
+    Cycles {
+        /// The speed.
+        speed: MmPerS,
+        /// Shallower and deeper turning point.
+        between: [Depth; 2],
+        /// How often.
+        count: usize,
+    },
+}
+
+impl Family {
+    /// The protocol on a rig.
+    #[must_use]
+    pub fn protocol(&self, rig: &Rig) -> Protocol {
+        let (depth, rate) = (rig.depth, rig.sample_rate_hz);
+        match *self {
+            Self::RampHold { speed, hold } => Protocol::ramp_hold(speed, depth, hold, rate),
+            Self::TwoSpeeds { speeds, hold, rest } => {
+                Protocol::two_speeds(speeds, depth, hold, rest, rate)
+            }
+            Self::Cycles {
+                speed,
+                between,
+                count,
+            } => Protocol::cycles(speed, between, count, rate),
+        }
+    }
+}
+
+/// The shortest protocol of one family that reaches every target.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Proposal {
+    /// Family and settings.
+    #[serde(flatten)]
+    pub family: Family,
+    /// What it is expected to tell.
+    #[serde(flatten)]
+    pub expected: Expected,
+    /// Why these settings, in words.
+    pub reason: String,
+}
+
+/// Searches ramps and holds, pairs of speeds and cycles, in this order, and returns the shortest of
+/// each family that reaches every target; a family that cannot is left out.
+pub fn shortest(
+    body: &ModifiedKelvin,
+    noise: &Noise,
+    unknowns: Unknowns,
+    targets: &[Target],
+    rig: &Rig,
+) -> Result<Vec<Proposal>, ExpectedError> {
+    noise.check()?;
+    let speeds = allowed_speeds(&body.checked()?, rig)?;
+    let mut search = Search {
+        body,
+        noise,
+        unknowns,
+        targets,
+        rig,
+        closest: None,
+    };
+    for target in targets {
+        let value = intervals_value(body, target.parameter);
+        if value.abs() <= 0.0 {
+            return Err(ExpectedError::ZeroParameter {
+                name: target.parameter,
+            });
+        }
+    }
+    let found = [
+        search.ramp_hold(&speeds),
+        search.two_speeds(&speeds),
+        search.cycles(&speeds),
+    ];
+    let proposals: Vec<Proposal> = found.into_iter().flatten().collect();
+    match (proposals.is_empty(), search.closest) {
+        (true, Some((_, target, reached))) => Err(ExpectedError::Unreachable {
+            name: target.parameter,
+            wanted: target.percent,
+            reached: format!("{reached:.3}"),
+            longest_s: rig.duration_max.0,
+        }),
+        (true, None) => Err(ExpectedError::Inseparable {
+            names: PARAMETER_NAMES.join(", "),
+        }),
+        (false, _) => Ok(proposals),
+    }
+}
+
+fn intervals_value(body: &ModifiedKelvin, name: &str) -> f64 {
+    let values = [
+        body.tau_eps,
+        body.mu[0],
+        body.mu[1],
+        body.mu[2],
+        body.tau_sig,
+    ];
+    PARAMETER_NAMES
+        .iter()
+        .zip(values)
+        .find(|(known, _)| **known == name)
+        .map_or(0.0, |(_, value)| value)
+}
+
+/// The speeds that are tried, fastest first.
+pub(super) fn allowed_speeds(
+    body: &ModifiedKelvin,
+    rig: &Rig,
+) -> Result<Vec<MmPerS>, ExpectedError> {
+    let checked = [
+        ("speed quantum in mm/s", rig.speed_quantum.0),
+        ("fastest speed in mm/s", rig.speed_max.0),
+        ("depth in mm", rig.depth.0),
+        ("force ceiling in N", rig.force_max.0),
+        ("longest duration in s", rig.duration_max.0),
+        ("sampling rate in Hz", rig.sample_rate_hz),
+    ];
+    if let Some((what, value)) = checked
+        .into_iter()
+        .find(|(_, value)| !(*value > 0.0 && value.is_finite()))
+    {
+        return Err(ExpectedError::BadNumber { what, value });
+    }
+    let speed = |multiple: f64| MmPerS(multiple * rig.speed_quantum.0);
+    // A ramp may take half the time at most; the other half is for what is learned from it.
+    let slowest = (2.0 * rig.depth.0 / rig.duration_max.0 / rig.speed_quantum.0)
+        .ceil()
+        .max(1.0);
+    let fastest = (rig.speed_max.0 / rig.speed_quantum.0 * (1.0 + 1e-9)).floor();
+    if slowest > fastest {
+        return Err(ExpectedError::TooLittleTime {
+            depth_mm: rig.depth.0,
+            speed_mm_per_s: rig.speed_max.0,
+            allowed_s: rig.duration_max.0,
+        });
+    }
+    let is_gentle = |multiple: f64| peak(body, rig.depth, speed(multiple)) <= rig.force_max.0;
+    if !is_gentle(slowest) {
+        return Err(ExpectedError::TooForceful {
+            depth_mm: rig.depth.0,
+            force_n: peak(body, rig.depth, speed(slowest)),
+            speed_mm_per_s: speed(slowest).0,
+            allowed_n: rig.force_max.0,
+        });
+    }
+    let (mut low, mut high) = (slowest, fastest + 1.0);
+    while high - low > 1.0 {
+        let middle = (0.5 * (low + high)).floor();
+        if is_gentle(middle) {
+            low = middle;
+        } else {
+            high = middle;
+        }
+    }
+    let mut multiples = vec![low];
+    let mut wanted = low;
+    while multiples.len() < SPEEDS_MAX && wanted > slowest {
+        wanted *= SPEED_RATIO;
+        let multiple = wanted.round().max(slowest);
+        if multiples.last() != Some(&multiple) {
+            multiples.push(multiple);
+        }
+    }
+    Ok(multiples.into_iter().map(speed).collect())
+}
+
+/// Highest force in N of a ramp and the hold behind it.
+fn peak(body: &ModifiedKelvin, depth: Depth, speed: MmPerS) -> f64 {
+    let mut state = KelvinState::at_rest();
+    let dt = Seconds(depth.0 / speed.0 / f64::from(PEAK_STEPS));
+    let ramp = (1..=PEAK_STEPS).map(|i| {
+        let to = Depth(depth.0 * f64::from(i) / f64::from(PEAK_STEPS));
+        state.step(body, to, dt).0
+    });
+    // During the hold the force goes straight to its elastic part.
+    ramp.fold(body.elastic(depth).0, f64::max)
+}
+
+/// Whether the force of one press falls below zero anywhere.
+fn pulls(body: &ModifiedKelvin, protocol: &Protocol) -> bool {
+    let mut state = KelvinState::at_rest();
+    let mut depth = 0.0;
+    protocol.presses[0].iter().any(|piece| {
+        let from = std::mem::replace(&mut depth, piece.to.0);
+        let dt = Seconds(piece.duration.0 / f64::from(PEAK_STEPS));
+        (1..=PEAK_STEPS).any(|i| {
+            let share = f64::from(i) / f64::from(PEAK_STEPS);
+            state.step(body, Depth(from + (depth - from) * share), dt).0 < 0.0
+        })
+    })
+}
+
+/// Where cycles at a speed can turn back with the probe still in contact.
+pub(super) fn shallowest_turn(body: &ModifiedKelvin, rig: &Rig, speed: MmPerS) -> Depth {
+    let turns = TURNS.map(|share| Depth(share * rig.depth.0));
+    let presses = |turn: &Depth| {
+        // The second cycle does what all later ones do.
+        let twice = Protocol::cycles(speed, [*turn, rig.depth], 2, rig.sample_rate_hz);
+        !pulls(body, &twice)
+    };
+    turns
+        .into_iter()
+        .find(presses)
+        .unwrap_or(turns[TURNS.len() - 1])
+}
+
+struct Search<'a> {
+    body: &'a ModifiedKelvin,
+    noise: &'a Noise,
+    unknowns: Unknowns,
+    targets: &'a [Target],
+    rig: &'a Rig,
+    /// The smallest worst excess met, as interval over target, with the target and its interval.
+    closest: Option<(f64, Target, f64)>,
+}
+
+type Found = Option<(Family, Expected)>;
+
+impl Search<'_> {
+    fn ramp_hold(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+        let mut best: Found = None;
+        for &speed in speeds {
+            let found = self.least_hold(&best, |hold| Family::RampHold { speed, hold });
+            best = found.or(best);
+        }
+        let (family, expected) = best?;
+        let Family::RampHold { speed, .. } = family else {
+            return None;
+        };
+        let reason = if speed == speeds[0] {
+            format!("{}; {}", self.decides(&expected), self.why_fastest(speed))
+        } else {
+            format!(
+                "{}; a faster ramp needs a longer hold",
+                self.decides(&expected)
+            )
+        };
+        Some(Proposal {
+            family,
+            expected,
+            reason,
+        })
+    }
+
+    fn two_speeds(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+        let rest = Seconds(REST_TAUS * self.body.tau_eps);
+        let mut best: Found = None;
+        let coarse: Vec<MmPerS> = speeds.iter().copied().step_by(2).collect();
+        for (index, &fast) in coarse.iter().enumerate() {
+            for &slow in &coarse[index + 1..] {
+                let found = self.least_hold(&best, |hold| Family::TwoSpeeds {
+                    speeds: [slow, fast],
+                    hold,
+                    rest,
+                });
+                best = found.or(best);
+            }
+        }
+        let (family, expected) = best?;
+        let reason = format!(
+            "{}; both records are fitted together, and the rest of {:.1} s between them counts",
+            self.decides(&expected),
+            rest.0
+        );
+        Some(Proposal {
+            family,
+            expected,
+            reason,
+        })
+    }
+
+    fn cycles(&mut self, speeds: &[MmPerS]) -> Option<Proposal> {
+        let mut best: Found = None;
+        for &speed in speeds {
+            for share in TURNS {
+                let between = [Depth(share * self.rig.depth.0), self.rig.depth];
+                let found = self.least_cycles(&best, speed, between);
+                best = found.or(best);
+            }
+        }
+        let (family, expected) = best?;
+        let reason = format!(
+            "{}; it turns back while the probe still presses, since tissue lets go of a probe that pulls",
+            self.decides(&expected)
+        );
+        Some(Proposal {
+            family,
+            expected,
+            reason,
+        })
+    }
+
+    /// The shortest hold that reaches every target and beats `best`.
+    fn least_hold(&mut self, best: &Found, family: impl Fn(Seconds) -> Family) -> Found {
+        let limit = self.limit(best);
+        let none = family(Seconds(0.0));
+        let protocol = none.protocol(self.rig);
+        let spare = (limit - protocol.duration().0) / protocol.presses.len() as f64;
+        if spare < 0.0 {
+            return None;
+        }
+        if let Some(expected) = self.reaches(none) {
+            return Some((none, expected));
+        }
+        let mut high = family(Seconds(spare));
+        let mut found = (high, self.reaches(high)?);
+        let (mut low_secs, mut high_secs) = (1e-3 * self.body.tau_eps, spare);
+        while high_secs > HOLD_RATIO * low_secs {
+            let middle = (low_secs * high_secs).sqrt();
+            high = family(Seconds(middle));
+            match self.reaches(high) {
+                Some(expected) => (found, high_secs) = ((high, expected), middle),
+                None => low_secs = middle,
+            }
+        }
+        // A hold that a person can type; rounded up, it reaches what the exact one does.
+        let rounded = family(Seconds(rounded_up(high_secs)));
+        if rounded.protocol(self.rig).duration().0 <= limit
+            && let Some(expected) = self.reaches(rounded)
+        {
+            found = (rounded, expected);
+        }
+        Some(found)
+    }
+
+    fn least_cycles(&mut self, best: &Found, speed: MmPerS, between: [Depth; 2]) -> Found {
+        let limit = self.limit(best);
+        let family = |count| Family::Cycles {
+            speed,
+            between,
+            count,
+        };
+        let secs = |count| family(count).protocol(self.rig).duration().0;
+        if pulls(self.body, &family(2).protocol(self.rig)) || secs(1) > limit {
+            return None;
+        }
+        let per_cycle = secs(2) - secs(1);
+        let most = (1.0 + (limit - secs(1)) / per_cycle).floor() as usize;
+        let (mut low, mut high) = (0, most.min(CYCLES_MAX));
+        let mut found = (family(high), self.reaches(family(high))?);
+        while high - low > 1 {
+            let middle = usize::midpoint(low, high);
+            match self.reaches(family(middle)) {
+                Some(expected) => (found, high) = ((family(middle), expected), middle),
+                None => low = middle,
+            }
+        }
+        Some(found)
+    }
+
+    fn limit(&self, best: &Found) -> f64 {
+        let beaten = best.as_ref().map(|(_, expected)| expected.duration.0);
+        beaten.unwrap_or(self.rig.duration_max.0)
+    }
+
+    fn expected(&self, family: Family) -> Option<Expected> {
+        let protocol = family.protocol(self.rig);
+        let expected = intervals(self.body, &protocol, self.noise, self.unknowns).ok()?;
+        // The rig's own limit is in force; what rounding adds is not.
+        (expected.force_max.0 <= self.rig.force_max.0 * (1.0 + 1e-9)).then_some(expected)
+    }
+
+    /// What it is expected to tell, if that reaches every target.
+    fn reaches(&mut self, family: Family) -> Option<Expected> {
+        let expected = self.expected(family)?;
+        let (target, percent) = self.worst(&expected)?;
+        let excess = percent / target.percent;
+        if self.closest.is_none_or(|(closest, ..)| excess < closest) {
+            self.closest = Some((excess, target, percent));
+        }
+        (excess <= 1.0).then_some(expected)
+    }
+
+    /// The target that is furthest from being reached, with the interval there is.
+    fn worst(&self, expected: &Expected) -> Option<(Target, f64)> {
+        let excess = |(target, percent): &(Target, f64)| percent / target.percent;
+        self.targets
+            .iter()
+            .filter_map(|target| {
+                let mut all = expected.parameters.iter();
+                let found = all.find(|one| one.name == target.parameter)?;
+                Some((*target, found.percent?))
+            })
+            .max_by(|one, other| excess(one).total_cmp(&excess(other)))
+    }
+
+    fn decides(&self, expected: &Expected) -> String {
+        let name = self
+            .worst(expected)
+            .map_or("nothing", |(target, _)| target.parameter);
+        format!("{name} decides the length")
+    }
+
+    fn why_fastest(&self, speed: MmPerS) -> String {
+        if speed.0 + self.rig.speed_quantum.0 > self.rig.speed_max.0 * (1.0 + 1e-9) {
+            format!("{} mm/s is the rig's fastest speed", shown(speed))
+        } else {
+            format!(
+                "{} mm/s is the fastest speed that stays under {:.2} N",
+                shown(speed),
+                self.rig.force_max.0
+            )
+        }
+    }
+}
+
+/// A speed without the rounding of its multiplication.
+fn shown(speed: MmPerS) -> f64 {
+    (speed.0 * 1e6).round() * 1e-6
+}
+
+/// The next number of three digits.
+fn rounded_up(value: f64) -> f64 {
+    let digits = 2 - value.log10().floor() as i32;
+    // Dividing by a power of ten gives the nearest number to the decimal fraction; multiplying by a
+    // negative power does not.
+    if digits >= 0 {
+        let scale = 10f64.powi(digits);
+        (value * scale).ceil() / scale
+    } else {
+        let scale = 10f64.powi(-digits);
+        (value / scale).ceil() * scale
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn holds_are_rounded_up_to_what_a_person_types() {
+        for (value, rounded) in [
+            (12.301, 12.4),
+            (0.012_31, 0.0124),
+            (1234.0, 1240.0),
+            (5.0, 5.0),
+        ] {
+            assert!((rounded_up(value) / rounded - 1.0).abs() < 1e-12, "{value}");
+        }
+    }
+
+    #[test]
+    fn names_and_percentages_are_checked() {
+        assert_eq!(Target::new("tau", 1.0).unwrap().parameter, "tau_eps");
+        let text = Target::new("nu", 1.0).unwrap_err().to_string();
+        assert!(
+            text.contains("'nu'") && text.contains("mu3, tau_sig"),
+            "{text}"
+        );
+        assert!(Target::new("mu1", 0.0).is_err());
+    }
+}
