@@ -120,7 +120,7 @@ impl Fitted<'_> {
             },
         );
         let block = uncertainty.block_length(record);
-        let memory = uncertainty.memories[record];
+        let memory = uncertainty.memory(record);
         let remembered = memory
             .filter(|memory| memory.neighbour > 0.0)
             .map_or(0.0, |memory| block / -memory.forgetting.ln());

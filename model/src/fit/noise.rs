@@ -9,7 +9,7 @@
 //! of the noise is white. Its parameters maximise the restricted likelihood (Harville, J. Am. Stat.
 //! Assoc. 72 (1977) 320-338), which allows for what the fit itself has taken out of the residuals.
 
-use super::triangle::Triangle;
+use super::triangle::{Factor, Triangle};
 
 /// Fewer blocks than this beyond the unknowns say nothing of memory.
 const SPARE_MIN: usize = 12;
@@ -376,4 +376,35 @@ pub(super) fn triangle<'b>(blocks: impl Iterator<Item = &'b Blocks>, unknowns: u
         }
     }
     triangle
+}
+
+/// Variance of a combination of unknowns under the memories found over that under independent
+/// noise of variance `white`, and the variance of its logarithm; `factor` is the [`triangle`].
+pub(super) fn inflation(
+    records: &[(Blocks, Option<Memory>)],
+    factor: &Factor,
+    combination: &[f64],
+    white: f64,
+) -> (f64, f64) {
+    let influence = factor.influence(combination);
+    let (mut with, mut without, mut uncertain) = (0.0, 0.0, 0.0);
+    for (blocks, memory) in records {
+        let weights: Vec<f64> = (0..blocks.residuals.len())
+            .map(|b| {
+                let shares = influence.iter().zip(&blocks.columns);
+                shares.map(|(share, column)| share * column[b]).sum()
+            })
+            .collect();
+        let memory = memory.unwrap_or_else(|| Memory::none(white));
+        let part = memory.quadratic(&weights);
+        with += part;
+        without += white * weights.iter().map(|z| z * z).sum::<f64>();
+        uncertain += memory.uncertainty * part * part;
+    }
+    let inflation = with / without;
+    if inflation.is_finite() {
+        (inflation.max(1.0), uncertain / (with * with))
+    } else {
+        (1.0, 0.0)
+    }
 }

@@ -180,7 +180,7 @@ impl Fitted<'_> {
         let parameters = parameters(&self.system.physical(point), &errors, |k| {
             self.system.fixed(k).is_some()
         });
-        let noise = uncertainty.memories[record].map(|memory| {
+        let noise = uncertainty.memory(record).map(|memory| {
             let scatter = uncertainty.scatter.unwrap_or(0.0);
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
             let interval = length / (samples.len() - 1) as f64;

@@ -18,9 +18,7 @@ const ROUNDING: f64 = 1e-24;
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
-    /// Per record.
-    pub memories: Vec<Option<Memory>>,
-    blocks: Vec<Blocks>,
+    records: Vec<(Blocks, Option<Memory>)>,
     block_factor: Factor,
 }
 
@@ -54,32 +52,41 @@ impl Uncertainty {
         let forces = refined.pass.joint.residual_sum(0) / system.measured() as f64;
         // What is left of a record without noise is rounding, whose memory means nothing.
         let is_rounding = white <= ROUNDING * forces;
-        let memories = blocks
-            .iter()
-            .map(|blocks| match is_rounding {
-                true => Some(Memory::none(white)),
-                false => noise::memory(blocks, white),
+        let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
+        let records = blocks
+            .into_iter()
+            .map(|blocks| {
+                let memory = match is_rounding {
+                    true => Some(Memory::none(white)),
+                    false => noise::memory(&blocks, white),
+                };
+                (blocks, memory)
             })
             .collect();
-        let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
         Self {
             scatter,
-            memories,
-            blocks,
+            records,
             block_factor,
         }
     }
 
     /// Samples in a block of a record.
     pub fn block_length(&self, record: usize) -> f64 {
-        self.blocks[record].length
+        self.records[record].0.length
+    }
+
+    /// What the residuals of a record remember; `None` where it is too short to tell.
+    pub fn memory(&self, record: usize) -> Option<Memory> {
+        self.records[record].1
     }
 
     /// The uncertainty of a combination of unknowns; `None` where there is nothing to judge it by.
     pub fn error(&self, refined: &Refined, combination: &[f64], spare: f64) -> Option<Error> {
         let scatter = self.scatter?;
         let independent = scatter * refined.pass.joint.deviation(combination);
-        let (inflation, uncertainty) = self.inflation(combination, scatter * scatter);
+        let white = scatter * scatter;
+        let (inflation, uncertainty) =
+            noise::inflation(&self.records, &self.block_factor, combination, white);
         let std_error = independent * inflation.sqrt();
         let freedom = if uncertainty > 0.0 {
             spare.min(2.0 / uncertainty)
@@ -91,32 +98,6 @@ impl Uncertainty {
             inflation,
             freedom,
         })
-    }
-
-    /// Variance of a combination under the noise found over that under independent noise, and the
-    /// variance of its logarithm.
-    fn inflation(&self, combination: &[f64], white: f64) -> (f64, f64) {
-        let influence = self.block_factor.influence(combination);
-        let (mut with, mut without, mut uncertain) = (0.0, 0.0, 0.0);
-        for (blocks, memory) in self.blocks.iter().zip(&self.memories) {
-            let weights: Vec<f64> = (0..blocks.residuals.len())
-                .map(|b| {
-                    let shares = influence.iter().zip(&blocks.columns);
-                    shares.map(|(share, column)| share * column[b]).sum()
-                })
-                .collect();
-            let memory = memory.unwrap_or_else(|| Memory::none(white));
-            let part = memory.quadratic(&weights);
-            with += part;
-            without += white * weights.iter().map(|z| z * z).sum::<f64>();
-            uncertain += memory.uncertainty * part * part;
-        }
-        let inflation = with / without;
-        if inflation.is_finite() {
-            (inflation.max(1.0), uncertain / (with * with))
-        } else {
-            (1.0, 0.0)
-        }
     }
 }
 

@@ -13,9 +13,10 @@ mod residual_blocks;
 mod stencil;
 mod verdict;
 
+use super::noise;
 use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
-use super::problem::linear_units;
-use super::report::Parameter;
+use super::report::{Parameter, student_t975};
+use super::system::linear_units;
 use crate::units::{Depth, Newtons, Seconds};
 use bank::{Bank, COLUMNS, NODES, spacing, tau_at};
 use blocks::Blocks;
@@ -30,6 +31,12 @@ pub use verdict::Verdict;
 
 /// A parameter counts as identified when its standard error is below this share of its value.
 const IDENTIFIED_SHARE: f64 = 0.5;
+
+/// Blocks in which the memory of the residuals is judged: coarser than in the fit of record, since
+/// it is judged again with every answer.
+const NOISE_BLOCKS: usize = 128;
+/// Residuals this small beside the forces are rounding of sums of products.
+const ROUNDING: f64 = 1e-6;
 
 /// The fit in progress: memory and cost of a sample do not grow with the run.
 #[derive(Clone, Debug, PartialEq)]
@@ -190,11 +197,19 @@ impl LiveFit {
         }
         let mut parameters = Vec::new();
         let mut verdicts = Vec::new();
+        let is_seen: Vec<bool> = (0..values.len())
+            .map(|k| blind.reason(k).is_none())
+            .collect();
+        let inflations = self.inflations(&values, &is_seen, variance);
         for (index, (value, error)) in values.into_iter().enumerate() {
+            let (inflation, uncertainty) = inflations[index];
+            let error = error * inflation.sqrt();
             let reason = blind
                 .reason(index)
                 .or_else(|| uncertain(index, value, error));
-            parameters.push(parameter(index, value, reason.is_none().then_some(error)));
+            let quantile = student_t975(freedom.min(2.0 / uncertainty));
+            let known = reason.is_none().then_some((error, quantile));
+            parameters.push(parameter(index, value, known));
             verdicts.push(Verdict {
                 parameter: PARAMETER_NAMES[index].into(),
                 is_identified: reason.is_none(),
@@ -207,6 +222,54 @@ impl LiveFit {
             samples: self.samples,
             verdicts,
         })
+    }
+
+    /// By how much the memory of the residuals multiplies the variance of each parameter, and the
+    /// variance of the logarithm of that, as in the fit of record but from coarser blocks.
+    fn inflations(&self, values: &[(f64, f64)], is_seen: &[bool], white: f64) -> Vec<(f64, f64)> {
+        let mut inflations = vec![(1.0, 0.0); values.len()];
+        let linear: [f64; LINEAR_COUNT] = std::array::from_fn(|k| values[LINEAR + k].0);
+        let Some(means) = self.residual_blocks(Seconds(values[TAU].0), &linear) else {
+            return inflations;
+        };
+        let seen: Vec<usize> = (0..values.len()).filter(|&k| is_seen[k]).collect();
+        let joined = means.residuals.len().div_ceil(NOISE_BLOCKS).max(1);
+        let ranges = (0..means.residuals.len() / joined).map(|b| b * joined..(b + 1) * joined);
+        let mut blocks = noise::Blocks {
+            residuals: Vec::new(),
+            columns: vec![Vec::new(); seen.len()],
+            length: (means.samples_per_block * joined as u64) as f64,
+        };
+        for range in ranges {
+            // Sums of weighted residuals over the root of the sum of weights.
+            let weight: f64 = means.weights[range.clone()].iter().sum();
+            let over_root = if weight > 0.0 {
+                1.0 / weight.sqrt()
+            } else {
+                0.0
+            };
+            let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
+                range.clone().map(|i| means.weights[i] * of(i)).sum()
+            };
+            blocks
+                .residuals
+                .push(over_root * sum(&|i| means.residuals[i]));
+            for (column, &k) in blocks.columns.iter_mut().zip(&seen) {
+                column.push(over_root * sum(&|i| means.jacobian[i][k]));
+            }
+        }
+        if white * self.samples as f64 <= ROUNDING * ROUNDING * self.bank.shared()[2] {
+            return inflations;
+        }
+        let memory = noise::memory(&blocks, white);
+        let factor = noise::triangle(std::iter::once(&blocks), seen.len()).finish();
+        let records = [(blocks, memory)];
+        for (place, &k) in seen.iter().enumerate() {
+            let mut unit = vec![0.0; seen.len()];
+            unit[place] = 1.0;
+            inflations[k] = noise::inflation(&records, &factor, &unit, white);
+        }
+        inflations
     }
 
     /// Rows that turn coefficients of the columns into parameters: the exact map from
@@ -281,14 +344,13 @@ fn uncertain(index: usize, value: f64, error: f64) -> Option<String> {
     })
 }
 
-fn parameter(index: usize, value: f64, std_error: Option<f64>) -> Parameter {
+fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> Parameter {
     Parameter {
         name: PARAMETER_NAMES[index].into(),
         value,
         unit: PARAMETER_UNITS[index].into(),
-        std_error,
-        // 1.96 standard errors: two-sided 95 % of a normal distribution.
-        ci95: std_error.map(|error| [value - 1.96 * error, value + 1.96 * error]),
+        std_error: known.map(|(error, _)| error),
+        ci95: known.map(|(error, quantile)| [value - quantile * error, value + quantile * error]),
         is_fixed: false,
     }
 }

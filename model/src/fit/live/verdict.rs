@@ -1,6 +1,6 @@
 //! Whether the path so far can tell the parameters apart, in words.
 
-use super::super::design::Columns;
+use super::super::design::{Columns, legendre_from_powers};
 use super::super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
 use super::super::triangle::Triangle;
 use serde::{Deserialize, Serialize};
@@ -122,8 +122,7 @@ fn rows(
     let mut keep = |columns: &Columns<true>, weight: f64| {
         let mut row = [0.0; JUDGED];
         row[..LINEAR_COUNT].copy_from_slice(&columns.row());
-        let slopes = columns.tau_row();
-        row[LINEAR_COUNT] = slopes.iter().zip(coefficients).map(|(s, c)| s * c).sum();
+        row[LINEAR_COUNT] = columns.tau_slope(&legendre_from_powers(coefficients));
         rows.push((row, weight));
     };
     for pair in corners.windows(2) {
