@@ -3,10 +3,10 @@
 use super::options::{CONTACT, TAU};
 use super::system::{Outer, Pass, Point, System};
 
-/// A step of the outer parameters below this is rounding.
-const STEP_ZERO: f64 = 1e-13;
-/// Below this a step that no longer shrinks is rounding too.
+/// A step of the outer parameters below this leaves its square: rounding, once it is taken.
 const STEP_MIN: f64 = 1e-9;
+/// Halving steps ends here.
+const STEP_ZERO: f64 = 1e-13;
 /// A step below this share of its standard error leaves its square and a share of noise of that.
 const STEP_SHARE: f64 = 1e-3;
 /// Iterations and step halvings together.
@@ -39,18 +39,17 @@ pub(super) struct Refined {
 pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) -> Refined {
     let (linear, all) = (system.linear, system.unknowns.len());
     let mut points = start.to_vec();
+    let force_square = system.force_square();
     let mut best: Option<Refined> = None;
     // The step that led from the best point to the present one.
     let mut step = vec![0.0; all - linear];
-    // Length of the step before.
-    let mut before = f64::INFINITY;
     for _ in 0..PASSES_MAX {
         let pass = system.pass(&points);
         let sum = pass.joint.residual_sum(linear);
         let solution = pass.joint.solve(all);
         let is_usable = sum.is_finite() && solution.iter().all(|value| value.is_finite());
         if let Some(best) = &mut best {
-            let allowed = best.sum * (1.0 + 1e-10) + ROUNDING * pass.joint.residual_sum(0);
+            let allowed = best.sum * (1.0 + 1e-10) + ROUNDING * force_square;
             if !is_usable || sum > allowed {
                 step.iter_mut().for_each(|step| *step *= 0.5);
                 if length(&step) < STEP_ZERO {
@@ -80,13 +79,14 @@ pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) ->
         let is_whole = taken == solution[linear..];
         step = taken;
         // Coefficients that go with the step to first order; where it was cut short, those of here.
-        let coefficients = if is_whole {
-            solution
+        let change_here = pass.joint.solve(linear);
+        let change = if is_whole {
+            &solution[..linear]
         } else {
-            pass.joint.solve(linear)
+            &change_here
         };
         for (record, point) in target.iter_mut().enumerate() {
-            point.at = system.coefficients(record, &coefficients[..linear]);
+            point.at = system.changed(record, &points[record].at, change);
         }
         let scatter = (sum / (system.measured() - all).max(1) as f64).sqrt();
         let is_lost_in_noise = step.iter().enumerate().all(|(i, step)| {
@@ -95,14 +95,11 @@ pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) ->
             let error = pass.joint.deviation(&outer) * scatter;
             step.abs() < (STEP_SHARE * error).min(STEP_SHARE)
         });
-        let is_rounding =
-            length(&step) < STEP_ZERO || (length(&step) < STEP_MIN && 2.0 * length(&step) > before);
-        let is_converged = is_rounding || (is_whole && is_lost_in_noise);
-        before = length(&step);
+        let is_last = is_lost_in_noise || length(&step) < STEP_MIN;
+        let is_converged = length(&step) < STEP_ZERO || (is_whole && is_last);
         let mut here = std::mem::replace(&mut points, target);
-        let at_here = pass.joint.solve(linear);
         for (record, point) in here.iter_mut().enumerate() {
-            point.at = system.coefficients(record, &at_here);
+            point.at = system.changed(record, &point.at, &change_here);
         }
         best = Some(Refined {
             points: if is_converged { points.clone() } else { here },

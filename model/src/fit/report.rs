@@ -203,7 +203,8 @@ impl Fitted<'_> {
         report
     }
 
-    /// Unweighted residuals of the final model in one pass.
+    /// Unweighted residuals of the final model: in one pass, unless all weights are one and the sum
+    /// is known already.
     fn residuals(&self, record: usize) -> Residuals {
         let Record { samples, .. } = &self.system.records[record];
         let point = &self.refined.points[record];
@@ -211,18 +212,35 @@ impl Fitted<'_> {
         let measured = || samples.iter().filter(|sample| sample.is_measured());
         let count = self.system.records[record].measured as f64;
         let mean = measured().map(|sample| sample.force.0).sum::<f64>() / count;
-        let (mut sum, mut total) = (0.0, 0.0);
+        let total: f64 = measured()
+            .map(|sample| (sample.force.0 - mean).powi(2))
+            .sum();
+        let is_even = measured().all(|sample| self.system.weight(sample) == 1.0);
+        if is_even && self.system.records.len() == 1 && self.refined.is_converged {
+            return Residuals::of(self.refined.sum, total, count);
+        }
+        let mut sum = 0.0;
         let scale = self.system.scale(point.outer);
         walk::<false>(samples, scale, point.outer.tau, |block, rows| {
             let model = rows.force(&scaled);
             for (sample, model) in block.iter().zip(model) {
                 if sample.is_measured() {
                     sum += (sample.force.0 - model).powi(2);
-                    total += (sample.force.0 - mean).powi(2);
                 }
             }
         });
-        Residuals {
+        Residuals::of(sum, total, count)
+    }
+}
+
+struct Residuals {
+    r2: f64,
+    rmse_n: f64,
+}
+
+impl Residuals {
+    fn of(sum: f64, total: f64, count: f64) -> Self {
+        Self {
             r2: if total > 0.0 {
                 1.0 - sum / total
             } else {
@@ -231,11 +249,6 @@ impl Fitted<'_> {
             rmse_n: (sum / count).sqrt(),
         }
     }
-}
-
-struct Residuals {
-    r2: f64,
-    rmse_n: f64,
 }
 
 /// Coefficients of the bare powers of scaled depth.

@@ -247,8 +247,13 @@ impl<'a> System<'a> {
 
     /// A record's coefficients, from the linear unknowns.
     pub fn coefficients(&self, record: usize, solution: &[f64]) -> Coefficients {
-        let mut all = self.fixed_coefficients();
-        for (value, unknown) in solution.iter().zip(&self.unknowns[..self.linear]) {
+        self.changed(record, &self.fixed_coefficients(), solution)
+    }
+
+    /// A record's coefficients after a change of the linear unknowns.
+    pub fn changed(&self, record: usize, at: &Coefficients, change: &[f64]) -> Coefficients {
+        let mut all = *at;
+        for (value, unknown) in change.iter().zip(&self.unknowns[..self.linear]) {
             for (slot, share) in all.iter_mut().zip(self.column(record, *unknown)) {
                 *slot += value * share;
             }
@@ -295,7 +300,10 @@ impl<'a> System<'a> {
         combination
     }
 
-    /// All records triangularised at their points, with derivative columns.
+    /// All records triangularised at their points, with derivative columns. The last column is what
+    /// the point leaves of the force, so that solutions are changes of the point: solving for a
+    /// small change wins back the digits that the rounding of the triangle costs (iterative
+    /// refinement; Bjorck, "Numerical Methods for Least Squares Problems", section 2.9).
     pub fn pass(&self, points: &[Point]) -> Pass {
         let records: Vec<RecordFactor> = self
             .records
@@ -303,7 +311,10 @@ impl<'a> System<'a> {
             .zip(points)
             .map(|(record, point)| self.record_factor(record.samples, point))
             .collect();
-        let joint = self.stack(records.iter().map(|record| &record.factor), true);
+        let joint = self.stack(
+            records.iter().map(|record| &record.factor),
+            Column::Residual,
+        );
         Pass { joint, records }
     }
 
@@ -315,7 +326,7 @@ impl<'a> System<'a> {
             .zip(outers)
             .map(|(record, outer)| self.values_factor(record.samples, *outer))
             .collect();
-        self.stack(factors.iter(), false)
+        self.stack(factors.iter(), Column::Force)
     }
 
     /// The thinned records at given outer parameters.
@@ -326,11 +337,12 @@ impl<'a> System<'a> {
             .zip(outers)
             .map(|(record, outer)| record.thin.factor(self.depth_mm, outer.tau, outer.contact))
             .collect();
-        self.stack(factors.iter(), false)
+        self.stack(factors.iter(), Column::Force)
     }
 
     /// Stacks the triangles of the records with their columns mapped to the unknowns.
-    fn stack<'f>(&self, factors: impl Iterator<Item = &'f Factor>, with_slopes: bool) -> Factor {
+    fn stack<'f>(&self, factors: impl Iterator<Item = &'f Factor>, last_is: Column) -> Factor {
+        let with_slopes = last_is == Column::Residual;
         let unknowns = if with_slopes {
             self.unknowns.len()
         } else {
@@ -340,7 +352,10 @@ impl<'a> System<'a> {
         let mut mapped = vec![0.0; unknowns + 1];
         for (record, factor) in factors.enumerate() {
             let columns = self.map(record, with_slopes);
-            let fixed = self.fixed_coefficients();
+            let fixed = match last_is {
+                Column::Residual => [0.0; LINEAR_COUNT],
+                Column::Force => self.fixed_coefficients(),
+            };
             let last = factor.width() - 1;
             for i in 0..factor.width() {
                 let row = factor.row(i);
@@ -372,9 +387,13 @@ impl<'a> System<'a> {
             .collect()
     }
 
-    /// The force column of a row of a record's triangle less what fixed parameters explain.
-    pub fn force_of(&self, row: &[f64], last: usize) -> f64 {
-        row[last] - product(&self.fixed_coefficients(), row)
+    /// Weighted sum of squared forces.
+    pub fn force_square(&self) -> f64 {
+        let samples = self.records.iter().flat_map(|record| record.samples);
+        samples
+            .filter(|sample| sample.is_measured())
+            .map(|sample| (sample.force.0 * self.weight(sample)).powi(2))
+            .sum()
     }
 
     /// How many outer parameters a record has.
@@ -401,6 +420,8 @@ impl<'a> System<'a> {
                     if self.fixed[CONTACT].is_none() {
                         columns[next] = rows.contact_slope(&point.at);
                     }
+                    self.forces(block, columns);
+                    subtract(columns, &point.at);
                     self.weigh(block, columns);
                     sums.add(columns, block.len());
                     triangle.push_lanes(columns, block.len());
@@ -434,16 +455,28 @@ impl<'a> System<'a> {
         triangle.finish()
     }
 
-    /// Adds the force as the last column and weighs all; censored samples weigh nothing.
+    /// Writes the force as the last column.
+    #[inline(always)]
+    fn forces(&self, block: &[FitSample], columns: &mut [Lane]) {
+        let Some(last) = columns.last_mut() else {
+            return;
+        };
+        for (force, sample) in last.iter_mut().zip(block) {
+            *force = if sample.is_measured() {
+                sample.force.0
+            } else {
+                0.0
+            };
+        }
+    }
+
+    /// Weighs all columns; censored samples weigh nothing.
     #[inline(always)]
     fn weigh(&self, block: &[FitSample], columns: &mut [Lane]) {
         let mut weights = [0.0; LANES];
-        let last = columns.len() - 1;
-        columns[last] = [0.0; LANES];
-        for ((weight, force), sample) in weights.iter_mut().zip(&mut columns[last]).zip(block) {
+        for (weight, sample) in weights.iter_mut().zip(block) {
             if sample.is_measured() {
                 *weight = self.weight(sample);
-                *force = sample.force.0;
             }
         }
         for column in columns {
@@ -452,6 +485,27 @@ impl<'a> System<'a> {
             }
         }
     }
+}
+
+/// Subtracts what the coefficients explain from the last column.
+#[inline(always)]
+fn subtract(columns: &mut [Lane], at: &Coefficients) {
+    let Some((force, [c1, c2, c3, c4, c5, c6, ..])) = columns.split_last_mut() else {
+        return;
+    };
+    for i in 0..LANES {
+        let elastic = at[0] * c1[i] + at[1] * c2[i] + at[2] * c3[i];
+        force[i] -= elastic + at[3] * c4[i] + (at[4] * c5[i] + at[5] * c6[i]);
+    }
+}
+
+/// What the last column of a record's triangle holds.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Column {
+    /// The measured force; there are no derivative columns.
+    Force,
+    /// What a point leaves of it.
+    Residual,
 }
 
 /// Where an unknown finds its column in a record's triangle.

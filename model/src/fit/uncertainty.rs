@@ -37,7 +37,7 @@ impl Uncertainty {
         let unknowns = system.unknowns.len();
         let spare = system.measured() - unknowns;
         let scatter = (spare > 0).then(|| (refined.sum / spare as f64).sqrt());
-        let solution = refined.pass.joint.solve(unknowns);
+        let change = refined.pass.joint.solve(unknowns);
         let blocks: Vec<Blocks> = refined
             .pass
             .records
@@ -45,11 +45,11 @@ impl Uncertainty {
             .enumerate()
             .map(|(record, factor)| {
                 let map = system.map(record, true);
-                blocks(system, &factor.blocks, &map, &solution)
+                blocks(system, &factor.blocks, &map, &change)
             })
             .collect();
         let white = scatter.unwrap_or(0.0).powi(2);
-        let forces = refined.pass.joint.residual_sum(0) / system.measured() as f64;
+        let forces = system.force_square() / system.measured() as f64;
         // What is left of a record without noise is rounding, whose memory means nothing.
         let is_rounding = white <= ROUNDING * forces;
         let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
@@ -110,7 +110,7 @@ fn blocks(system: &System<'_>, sums: &[NoiseBlock], map: &[Mapped], solution: &[
     };
     for block in sums {
         let over_root = 1.0 / (block.count as f64).sqrt();
-        let mut residual = system.force_of(&block.sums, last);
+        let mut residual = block.sums[last];
         for ((column, mapped), value) in blocks.columns.iter_mut().zip(map).zip(solution) {
             let entry = mapped.of(&block.sums);
             column.push(entry * over_root);
