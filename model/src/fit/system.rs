@@ -446,6 +446,7 @@ impl<'a> System<'a> {
                     #[inline(always)]
                     || {
                         rows.values(&mut lanes);
+                        self.forces(block, &mut lanes);
                         self.weigh(block, &mut lanes);
                         triangle.push_lanes(&mut lanes, block.len());
                     },
