@@ -3,6 +3,7 @@
 
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_model::fit::{FitOptions, LiveFit, fit};
 use palpate_model::rig::{Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Record};
@@ -136,5 +137,37 @@ fn a_changed_verdict_or_standard_error_is_noticed() {
         }
         let difference = replay(&changed, &[]).unwrap().first_difference.unwrap();
         assert_eq!(difference.what, "live fit", "{pointer}");
+    }
+}
+
+#[test]
+fn the_last_live_answer_is_the_fit_of_a_run_on_the_lab_rig() {
+    let params = RampHold {
+        speed: MmPerS(3.0),
+        depth: Depth(12.0),
+        hold: Seconds(2.0),
+        until: None,
+    };
+    let settings = SimSettings {
+        seed: 11,
+        ..SimSettings::default()
+    };
+    let run = palpate_tests::simulated::run(settings, params);
+    let mut live = LiveFit::new(params.depth);
+    for sample in &run.samples {
+        live.push(sample.t, sample.depth, sample.force, sample.sigma);
+    }
+    let live = live.estimate().unwrap();
+    let exact = fit(&run.samples, &FitOptions::default()).unwrap();
+    for parameter in &live.parameters {
+        let same = exact.parameter(&parameter.name).unwrap();
+        let error = same.std_error.unwrap();
+        let miss = (parameter.value - same.value).abs() / error;
+        println!(
+            "{} {miss:.1e} {:.3}",
+            same.name,
+            parameter.std_error.unwrap() / error
+        );
+        assert!(miss < 0.01, "{}: {miss} standard errors", same.name);
     }
 }

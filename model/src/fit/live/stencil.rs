@@ -47,7 +47,9 @@ impl Stencil {
     pub fn jet(&self, place: f64) -> Jet {
         let x = place - self.first as f64;
         let mut weights = [[0.0; STENCIL_MAX]; 3];
-        for i in 0..self.count {
+        let [values, slopes, curvatures] = &mut weights;
+        let orders = values.iter_mut().zip(slopes).zip(curvatures);
+        for (i, ((first, second), third)) in orders.enumerate().take(self.count) {
             let (mut value, mut slope, mut curvature) = (1.0, 0.0, 0.0);
             for j in (0..self.count).filter(|&j| j != i) {
                 let share = 1.0 / (i as f64 - j as f64);
@@ -56,9 +58,7 @@ impl Stencil {
                 slope = slope * factor + value * share;
                 value *= factor;
             }
-            weights[0][i] = value;
-            weights[1][i] = slope;
-            weights[2][i] = curvature;
+            (*first, *second, *third) = (value, slope, curvature);
         }
         Jet { weights }
     }
