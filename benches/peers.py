@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """scipy and lmfit on the record of fit-peers, with the exact model, vectorised. Prints JSON.
 
-Usage: peers.py RECORD START_FACTOR [--skip-intervals]
+Usage: peers.py RECORD TAU_START [--skip-intervals]
 RECORD holds t, depth, force, noisy force, one array after the other, as little-endian doubles.
 """
 import json
@@ -17,9 +17,6 @@ from scipy.optimize import least_squares
 from scipy.signal import lfilter
 
 NAMES = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "f0", "f_offset"]
-TRUTH = np.array([1.023, 0.05333, -0.0086, 0.0004345, 0.06])
-# x_scale of the scipy fits; lmfit's leastsq scales by itself.
-SCALE = "jac"
 
 
 def psi(r):
@@ -58,6 +55,9 @@ class Model:
 
     def force(self, p):
         tau, mu1, mu2, mu3, tau_sig, f0, f_offset = p
+        if tau <= 0:
+            # LM knows no bounds; a residual this large makes it take a shorter step.
+            return np.full(len(self.t), 1e6)
         r = self.h / tau
         weights = psi(r)
         first, second, third = (sum(w * part for w, part in zip(weights, parts)) for parts in self.parts)
@@ -90,22 +90,26 @@ def entry(name, record, seconds, values, errors):
 
 def main():
     t, x, clean, noisy = np.fromfile(sys.argv[1], dtype="<f8").reshape(4, -1)
-    factor = float(sys.argv[2])
+    tau_start = float(sys.argv[2])
     model = Model(t, x)
-    start = np.append(TRUTH * factor, [0.0, 0.0])
     fits = []
     for record, force in (("noiseless", clean), ("noisy", noisy)):
+        # What a careful user starts from: a guess at tau, elastic coefficients from a polynomial
+        # through force against depth, no viscosity, no initial force, no offset.
+        elastic = np.linalg.lstsq(np.stack([x, x**2, x**3], axis=1), force, rcond=None)[0]
+        start = np.array([tau_start, *elastic, 0.0, 0.0, 0.0])
+
         def residual(p):
             return model.force(p) - force
 
         def lm():
-            solution = least_squares(residual, start, method="lm", x_scale=SCALE)
+            solution = least_squares(residual, start, method="lm")
             return solution, covariance(solution, len(t))
 
         low = [1e-3] + [-np.inf] * 6
 
         def trf():
-            solution = least_squares(residual, start, method="trf", x_scale=SCALE, bounds=(low, np.inf))
+            solution = least_squares(residual, start, method="trf", bounds=(low, np.inf))
             return solution, covariance(solution, len(t))
 
         for name, work in (("scipy LM", lm), ("scipy TRF, bounds", trf)):

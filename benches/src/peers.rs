@@ -48,7 +48,7 @@ pub struct Intervals {
 pub fn run(
     python: &Path,
     records: &Records,
-    start_factor: f64,
+    tau_start: f64,
     with_intervals: bool,
 ) -> Result<Peers, String> {
     let path = std::env::temp_dir().join(format!("palpate-record-{}.f64", std::process::id()));
@@ -57,7 +57,7 @@ pub fn run(
         .map_err(|err| format!("cannot write the record to {}: {err}", path.display()))?;
     let script = PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("peers.py");
     let mut command = Command::new(python);
-    command.arg(script).arg(&path).arg(start_factor.to_string());
+    command.arg(script).arg(&path).arg(tau_start.to_string());
     if !with_intervals {
         command.arg("--skip-intervals");
     }

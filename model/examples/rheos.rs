@@ -1,0 +1,278 @@
+//! Draws `docs/pictures/rheos.svg`: a published Maxwell fit and its discretisation bias.
+//!
+//! `cargo run -p palpate-model --example rheos -- example1_data.csv docs/pictures/rheos.svg`
+
+use palpate_model::Seconds;
+use palpate_model::fit::{MaxwellFit, StrainSample, fit_maxwell};
+use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellState};
+use std::error::Error;
+use std::fmt::Write;
+
+/// Plot area of a panel in px: left, top, width, height.
+const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
+const RIGHT_PANEL: [f64; 4] = [530.0, 60.0, 360.0, 260.0];
+/// Okabe-Ito blue and vermilion.
+const BLUE: &str = "#0072B2";
+const RED: &str = "#D55E00";
+const DASHED: &str = "stroke-dasharray=\"4 5\"";
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let (Some(csv), Some(svg)) = (arguments.next(), arguments.next()) else {
+        return Err(
+            "give the recording and the picture to write: rheos RECORDING.csv OUT.svg".into(),
+        );
+    };
+    let samples = read(&csv).map_err(|err| format!("cannot read {csv}: {err}"))?;
+    std::fs::write(&svg, picture(&samples)?).map_err(|err| format!("cannot write {svg}: {err}"))?;
+    Ok(())
+}
+
+/// Columns t, strain, stress; no header.
+fn read(path: &str) -> Result<Vec<StrainSample>, Box<dyn Error>> {
+    let text = std::fs::read_to_string(path)?;
+    let sample = |(row, line): (usize, &str)| {
+        let fields: Result<Vec<f64>, _> =
+            line.split(',').map(|field| field.trim().parse()).collect();
+        match fields.as_deref() {
+            Ok(&[t, strain, stress]) => Ok(StrainSample {
+                t: Seconds(t),
+                strain,
+                stress,
+            }),
+            _ => Err(format!("row {} is not three numbers", row + 1).into()),
+        }
+    };
+    text.lines().enumerate().map(sample).collect()
+}
+
+fn picture(samples: &[StrainSample]) -> Result<String, Box<dyn Error>> {
+    let exact = fit_maxwell(samples, Integrator::Exact)?;
+    let backward = fit_maxwell(samples, Integrator::BackwardDifference)?;
+    let mut svg = String::from(
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"930\" height=\"380\" \
+         font-family=\"sans-serif\" font-size=\"13\">\n\
+         <rect width=\"930\" height=\"380\" fill=\"white\"/>\n",
+    );
+    recording(&mut svg, samples, [&exact, &backward])?;
+    bias(&mut svg, exact.body)?;
+    svg.push_str("</svg>\n");
+    Ok(svg)
+}
+
+/// Left: the recording and both fits, which are one curve.
+fn recording(
+    svg: &mut String,
+    samples: &[StrainSample],
+    [exact, backward]: [&MaxwellFit; 2],
+) -> Result<(), Box<dyn Error>> {
+    let axes = Axes {
+        panel: LEFT_PANEL,
+        x: (0.0, 10.0),
+        y: (0.0, 3.0),
+    };
+    axes.draw(
+        svg,
+        ["Recording (dots) and both fits", "time in s", "stress"],
+        [&[0.0, 2.0, 4.0, 6.0, 8.0, 10.0], &[0.0, 1.0, 2.0, 3.0]],
+    )?;
+    for sample in samples {
+        axes.dot(svg, (sample.t.0, sample.stress), "#999999", 2.5)?;
+    }
+    let stress = curve(samples, exact.body, Integrator::Exact);
+    axes.line(svg, &stress, BLUE, "")?;
+    let stress = curve(samples, backward.body, Integrator::BackwardDifference);
+    axes.line(svg, &stress, RED, DASHED)?;
+    let rows = [
+        (BLUE, "exact", exact.body),
+        (RED, "backward difference", backward.body),
+    ];
+    for (row, (colour, name, Maxwell { eta, k })) in rows.into_iter().enumerate() {
+        let y = 2.75 - 0.5 * row as f64;
+        axes.text(svg, (4.6, y), colour, name)?;
+        let numbers = format!("eta {eta:.4}, k {k:.4}");
+        axes.text(svg, (4.6, y - 0.2), colour, &numbers)?;
+    }
+    Ok(())
+}
+
+/// Right: fitted over true stiffness of simulated records, against the sampling interval.
+fn bias(svg: &mut String, body: Maxwell) -> Result<(), Box<dyn Error>> {
+    let axes = Axes {
+        panel: RIGHT_PANEL,
+        x: (0.0, 0.52),
+        y: (0.75, 1.05),
+    };
+    axes.draw(
+        svg,
+        [
+            "Noiseless simulated records: fitted over true eta and k",
+            "r = sampling interval / relaxation time",
+            "",
+        ],
+        [
+            &[0.0, 0.1, 0.2, 0.3, 0.4, 0.5],
+            &[0.75, 0.8, 0.85, 0.9, 0.95, 1.0, 1.05],
+        ],
+    )?;
+    let law: Vec<(f64, f64)> = (1..=52)
+        .map(|i| f64::from(i) * 0.01)
+        .map(|r: f64| (r, -(-r).exp_m1() / r))
+        .collect();
+    axes.line(svg, &law, RED, DASHED)?;
+    axes.line(svg, &[(0.0, 1.0), (0.52, 1.0)], BLUE, "")?;
+    for intervals in [2, 3, 4, 5, 7, 10, 20, 50] {
+        let (r, ratios) = simulated(body, intervals)?;
+        for (ratio, colour) in ratios.into_iter().zip([BLUE, RED]) {
+            axes.dot(svg, (r, ratio), colour, 4.0)?;
+        }
+    }
+    axes.text(svg, (0.34, 1.012), BLUE, "exact")?;
+    let text = "backward difference: (1 - e^-r) / r";
+    axes.text(svg, (0.17, 0.955), RED, text)?;
+    Ok(())
+}
+
+/// `dt / tau`, and the fitted over the true `k` of both integrators, on the recording's protocol of
+/// 2 s of ramp and 8 s of hold with `5 * ramp_intervals` intervals.
+fn simulated(body: Maxwell, ramp_intervals: u32) -> Result<(f64, [f64; 2]), Box<dyn Error>> {
+    let dt = 2.0 / f64::from(ramp_intervals);
+    let t = |i: u32| f64::from(i) * dt;
+    let path: Vec<StrainSample> = (0..=5 * ramp_intervals)
+        .map(|i| StrainSample {
+            t: Seconds(t(i)),
+            strain: t(i.min(ramp_intervals)),
+            stress: 0.0,
+        })
+        .collect();
+    let stress = curve(&path, body, Integrator::Exact);
+    let record: Vec<StrainSample> = path
+        .iter()
+        .zip(stress)
+        .map(|(sample, (_, stress))| StrainSample { stress, ..*sample })
+        .collect();
+    let ratio =
+        |integrator| Ok::<_, Box<dyn Error>>(fit_maxwell(&record, integrator)?.body.k / body.k);
+    Ok((
+        dt / body.tau().0,
+        [
+            ratio(Integrator::Exact)?,
+            ratio(Integrator::BackwardDifference)?,
+        ],
+    ))
+}
+
+/// Time and the stress a body gives along the strain of some samples.
+fn curve(samples: &[StrainSample], body: Maxwell, integrator: Integrator) -> Vec<(f64, f64)> {
+    let mut before = samples[0];
+    let mut state = MaxwellState::at_rest_from(before.strain);
+    samples
+        .iter()
+        .map(|sample| {
+            let dt = Seconds(sample.t.0 - before.t.0);
+            before = *sample;
+            let stress = state.step(&body, integrator, sample.strain, dt);
+            (sample.t.0, stress)
+        })
+        .collect()
+}
+
+struct Axes {
+    panel: [f64; 4],
+    x: (f64, f64),
+    y: (f64, f64),
+}
+
+impl Axes {
+    fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
+        let [left, top, width, height] = self.panel;
+        let share = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
+        (
+            left + width * share(x, self.x),
+            top + height * (1.0 - share(y, self.y)),
+        )
+    }
+
+    fn draw(
+        &self,
+        svg: &mut String,
+        [title, x_title, y_title]: [&str; 3],
+        [x_ticks, y_ticks]: [&[f64]; 2],
+    ) -> std::fmt::Result {
+        let [left, top, width, height] = self.panel;
+        let (right, bottom, middle) = (left + width, top + height, left + 0.5 * width);
+        let (above, below) = (top - 28.0, bottom + 42.0);
+        writeln!(
+            svg,
+            "<text x=\"{left}\" y=\"{above}\" font-weight=\"bold\">{title}</text>"
+        )?;
+        writeln!(
+            svg,
+            "<text x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">{x_title}</text>"
+        )?;
+        writeln!(
+            svg,
+            "<text x=\"{}\" y=\"{}\">{y_title}</text>",
+            left - 40.0,
+            top - 8.0
+        )?;
+        for &tick in y_ticks {
+            let (x, y) = (left - 8.0, self.at((0.0, tick)).1);
+            writeln!(
+                svg,
+                "<path d=\"M{left} {y:.1}H{right}\" stroke=\"#dddddd\"/>"
+            )?;
+            let y = y + 4.0;
+            writeln!(
+                svg,
+                "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{tick}</text>"
+            )?;
+        }
+        for &tick in x_ticks {
+            let (x, y) = (self.at((tick, 0.0)).0, bottom + 20.0);
+            writeln!(svg, "<path d=\"M{x:.1} {bottom}v5\" stroke=\"black\"/>")?;
+            writeln!(
+                svg,
+                "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{tick}</text>"
+            )?;
+        }
+        writeln!(
+            svg,
+            "<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"black\"/>"
+        )
+    }
+
+    fn line(
+        &self,
+        svg: &mut String,
+        points: &[(f64, f64)],
+        colour: &str,
+        style: &str,
+    ) -> std::fmt::Result {
+        svg.push_str("<polyline points=\"");
+        for &point in points {
+            let (x, y) = self.at(point);
+            write!(svg, "{x:.1},{y:.1} ")?;
+        }
+        writeln!(
+            svg,
+            "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" {style}/>"
+        )
+    }
+
+    fn dot(&self, svg: &mut String, at: (f64, f64), colour: &str, radius: f64) -> std::fmt::Result {
+        let (x, y) = self.at(at);
+        writeln!(
+            svg,
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"/>"
+        )
+    }
+
+    fn text(&self, svg: &mut String, at: (f64, f64), colour: &str, text: &str) -> std::fmt::Result {
+        let (x, y) = self.at(at);
+        writeln!(
+            svg,
+            "<text x=\"{x:.0}\" y=\"{y:.0}\" fill=\"{colour}\">{text}</text>"
+        )
+    }
+}
