@@ -10,6 +10,7 @@ use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
 use crate::theme;
 use crate::window::WindowOptions;
+use crate::workers::fit::{Refit, Refitter};
 use crate::workers::folder_dialog::FolderDialog;
 use crate::workers::ports::Ports;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
@@ -45,6 +46,7 @@ pub struct WorkbenchApp {
     pub(crate) ports: Ports,
     pub(crate) dialog: FolderDialog,
     pub(crate) plots: PlotCache,
+    pub(crate) refitter: Refitter,
     pub(crate) time_view: TimeView,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
@@ -89,6 +91,7 @@ impl WorkbenchApp {
             ports,
             dialog: FolderDialog::default(),
             plots: PlotCache::default(),
+            refitter: Refitter::default(),
             time_view: TimeView::default(),
             events: EventLog::default(),
             refusal: None,
@@ -104,6 +107,12 @@ impl WorkbenchApp {
     #[must_use]
     pub fn snapshot(&self) -> &Arc<Snapshot> {
         &self.snapshot
+    }
+
+    /// Where the exact fit of the run on the screen stands.
+    #[must_use]
+    pub fn refit(&self) -> Refit<'_> {
+        self.refitter.of(self.snapshot.run.as_ref())
     }
 
     /// What the window is in the middle of.
@@ -240,6 +249,7 @@ impl eframe::App for WorkbenchApp {
         self.form
             .refresh(&rig.description, &self.bench, rig.is_homed);
         self.plots.update(self.snapshot.run.as_ref());
+        self.refitter.update(ctx, self.snapshot.run.as_ref());
         self.act(ctx, &mut commands);
         self.handle_close(ctx);
         let is_quiet = run_in_progress(&self.snapshot).is_none()

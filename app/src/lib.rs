@@ -8,6 +8,7 @@ pub mod app;
 pub mod cli;
 pub mod command;
 pub mod plots;
+pub mod report;
 pub mod screens;
 pub mod shell;
 pub mod theme;

@@ -4,12 +4,14 @@ use crate::app::WorkbenchApp;
 use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{TimeView, force_time_ui};
+use crate::plots::residual::residual_ui;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
 use crate::shell::activity::{Activity, Intent, run_in_progress};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
+use crate::workers::fit::Refit;
 use eframe::egui::{
     CentralPanel, Context, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder,
     ViewportCommand, vec2,
@@ -27,6 +29,9 @@ const RIGHT_WIDTH: f32 = 318.0;
 
 /// Height of the event log in points.
 const LOG_HEIGHT: f32 = 134.0;
+
+/// Height of the residuals under the force in points.
+const RESIDUAL_HEIGHT: f32 = 96.0;
 
 /// What a window needs.
 pub struct WindowOptions {
@@ -128,7 +133,9 @@ impl WorkbenchApp {
                 ScrollArea::vertical()
                     .id_salt("results")
                     .auto_shrink(false)
-                    .show(ui, |ui| results_ui(ui, &self.snapshot, commands));
+                    .show(ui, |ui| {
+                        results_ui(ui, &self.snapshot, self.refit(), commands)
+                    });
             });
         CentralPanel::default()
             .frame(frame(ui, true))
@@ -177,11 +184,26 @@ impl WorkbenchApp {
         });
         let run = self.snapshot.run.as_ref();
         let limit = self.bench.limits.force_max;
+        let exact = match self.refit() {
+            Refit::Done(exact) => Some(exact),
+            _ => None,
+        };
         // The chart over time carries the limits and phases, so it gets the larger half.
         let height = (ui.available_height() - 30.0) * 0.56;
-        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-            force_time_ui(ui, run, &self.plots, self.time_view, limit);
+        let below = if exact.is_some() {
+            RESIDUAL_HEIGHT
+        } else {
+            0.0
+        };
+        let mut shown = 0.0..=1.0;
+        ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
+            shown = force_time_ui(ui, run, &self.plots, exact, self.time_view, limit);
         });
+        if let Some(exact) = exact {
+            ui.allocate_ui(vec2(ui.available_width(), below), |ui| {
+                residual_ui(ui, exact, shown);
+            });
+        }
         ui.label(RichText::new("Force over depth").heading().strong());
         let depth = self
             .form

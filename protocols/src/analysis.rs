@@ -4,9 +4,9 @@ use palpate_model::calibration::Calibration;
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
-use palpate_sessions::import::{TableError, read_table};
+use palpate_sessions::import::{ColumnNames, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
-use palpate_sessions::record::EntryKind;
+use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
@@ -17,6 +17,8 @@ use crate::engine::{Effect, Record};
 pub struct FitSource {
     /// Time from the first sample, depth, force and its own uncertainty.
     pub samples: Vec<FitSample>,
+    /// Session time of the first sample; 0 for a table, whose times are kept as they are.
+    pub start: Seconds,
     /// Remarks, such as an interrupted recording.
     pub notes: Vec<String>,
 }
@@ -45,14 +47,20 @@ pub enum SourceError {
 
 /// Reads a session folder, a session file or a table.
 pub fn read(path: &Path) -> Result<FitSource, SourceError> {
+    read_named(path, None)
+}
+
+/// As [`read`]; `columns` names the columns of a table that has no header.
+pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSource, SourceError> {
     let is_session = path.is_dir()
         || path
             .extension()
             .is_some_and(|extension| extension == "mcap");
     if !is_session && path.exists() {
-        let table = read_table(path)?;
+        let table = read_table(path, columns)?;
         return Ok(FitSource {
             samples: samples_of_table(&table),
+            start: Seconds(0.0),
             notes: table.notes,
         });
     }
@@ -60,6 +68,7 @@ pub fn read(path: &Path) -> Result<FitSource, SourceError> {
     let samples = samples_of(&session)?;
     Ok(FitSource {
         samples,
+        start: start_of(&session),
         notes: session.notes,
     })
 }
@@ -73,10 +82,7 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let curve = calibration.curve().map_err(|err| bad(err.to_string()))?;
     let noise = noise_of(session).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;
-    let rows = session
-        .rows
-        .iter()
-        .filter(|row| matches!(row.phase, Phase::Ramp | Phase::Hold));
+    let rows = session.rows.iter().filter(|row| is_fitted(row));
     let mut first_tick = None;
     let samples: Vec<FitSample> = rows
         .filter_map(|row| {
@@ -95,6 +101,16 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     } else {
         Ok(samples)
     }
+}
+
+fn is_fitted(row: &Row) -> bool {
+    matches!(row.phase, Phase::Ramp | Phase::Hold) && row.force.is_some() && row.depth.is_some()
+}
+
+/// Session time of the first sample that a fit takes.
+fn start_of(session: &Session) -> Seconds {
+    let first = session.rows.iter().find(|row| is_fitted(row));
+    first.map_or(Seconds(0.0), |row| row.host.seconds())
 }
 
 /// The signal's noise as the tare found it.

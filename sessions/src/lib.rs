@@ -25,7 +25,7 @@ pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,
     library_folder, new_session_folder, segment_file,
 };
-pub use import::{Table, TableError, parse_table, read_table};
+pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use log::{
     BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
     SegmentSource, Session, SessionWriter, Sink,

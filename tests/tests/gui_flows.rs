@@ -7,10 +7,14 @@ use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_app::app::WorkbenchApp;
+use palpate_app::report::text::{self, ParameterText};
+use palpate_app::screens::exact_fit::exact_ui;
 use palpate_app::shell::activity::{is_motion_possible, run_in_progress};
 use palpate_app::shell::frame_meter::thread_cpu_s;
 use palpate_app::window::WindowOptions;
+use palpate_app::workers::fit::{Refit, fit_source};
 use palpate_drivers::sim::SimSettings;
+use palpate_model::fit::{FitOptions, FitReport, Parameter};
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::runner::{LogLine, RunView, TimeScale};
@@ -127,6 +131,45 @@ impl Flow {
             .collect()
     }
 
+    /// Waits for the exact fit of the last session; the window must then say of it what
+    /// `palpate fit` prints, be it a report or a refusal. Returns the report.
+    fn same_words_as_the_command_line(&mut self) -> Option<FitReport> {
+        self.wait("the exact fit", |window| {
+            matches!(window.state().refit(), Refit::Done(_) | Refit::Refused(_))
+        });
+        self.window.run_steps(2);
+        let session = self.sessions().pop().unwrap();
+        let fitted = fit_source(&session, None, &FitOptions::default());
+        let result = match fitted {
+            Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
+            Err(err) => Err(err.to_string()),
+        };
+        match result {
+            Ok(report) => {
+                self.says_all_of(&report);
+                Some(report)
+            }
+            Err(reason) => {
+                assert!(self.says(&format!("No exact fit: {reason}")), "{reason}");
+                None
+            }
+        }
+    }
+
+    fn says_all_of(&self, report: &FitReport) {
+        let printed = text::whole(report);
+        let mut words: Vec<String> = report.sentences().map(String::from).collect();
+        words.push(text::quality(report));
+        for parameter in &report.parameters {
+            let text = ParameterText::of(parameter);
+            words.extend([text.name, text.value, text.unit, text.interval]);
+        }
+        for word in words {
+            assert!(self.says(&word), "the window does not say '{word}'");
+            assert!(printed.contains(&word), "'{word}' is not in:\n{printed}");
+        }
+    }
+
     fn wait_for_end(&mut self) -> RunView {
         self.wait("the end of the run", |window| {
             let run = window.state().snapshot().run.as_ref();
@@ -176,6 +219,74 @@ fn a_run_started_by_its_button_ends_with_a_session_on_disk() {
         flow.is_enabled("Start  F5"),
         "a second run must be possible"
     );
+}
+
+#[test]
+fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
+    let mut flow = Flow::open(TimeScale::Max);
+    flow.type_into("hold", "10");
+    flow.click("Start  F5");
+    flow.wait_for_end();
+    let report = flow.same_words_as_the_command_line().unwrap();
+    assert!(flow.says("Exact fit") && !flow.says("Live parameters"));
+    let Refit::Done(exact) = flow.window.state().refit() else {
+        panic!("the fit is gone");
+    };
+    // The curve stands where the force stands: as late as the ramp, as high as the peak.
+    let run = flow.run().unwrap();
+    let ramp = run.phases.iter().find(|(_, phase)| *phase == Phase::Ramp);
+    let (first, peak) = (exact.curve[0], run.force_peak.unwrap().0);
+    // A sample and a tick of the runner lie between them.
+    assert!((first.x - ramp.unwrap().0).abs() < 0.05, "{first:?}");
+    let highest = exact.curve.iter().map(|point| point.y).fold(0.0, f64::max);
+    // Noise makes the highest of ten thousand forces higher than the model: five times the rmse.
+    assert!(
+        (highest - peak).abs() < 6.0 * report.rmse_n,
+        "{highest} {peak}"
+    );
+    assert!(exact.residual.len() > 1000 && exact.residual.len() <= 4000);
+    // A second run begins with live numbers again.
+    flow.click("Start  F5");
+    flow.wait("live numbers", |window| {
+        window.query_by_label("Live parameters").is_some()
+    });
+    assert!(!flow.says("Exact fit"));
+}
+
+#[test]
+fn every_sentence_of_a_report_is_on_the_screen() {
+    let parameter = |name: &str, std_error: Option<f64>| Parameter {
+        name: name.into(),
+        value: 1.5,
+        unit: "N*s/mm^2".into(),
+        std_error,
+        ci95: std_error.map(|error| [1.5 - 2.0 * error, 1.5 + 2.0 * error]),
+        is_fixed: false,
+    };
+    let report = FitReport {
+        model: "a model".into(),
+        parameters: vec![parameter("mu1", Some(0.1)), parameter("mu2", None)],
+        r2: 0.99,
+        rmse_n: 0.01,
+        samples: 10,
+        warnings: vec!["the errors are too small".into()],
+        findings: vec!["unstable from 5 to 8 mm".into()],
+    };
+    let shown = report.clone();
+    let mut window = Harness::new_ui(move |ui| exact_ui(ui, &shown));
+    window.run();
+    for words in [
+        "the errors are too small",
+        "unstable from 5 to 8 mm",
+        "1.50 ± 0.10",
+        "[1.30, 1.70]",
+        "1.500 not identified",
+        "N·s/mm²",
+        &text::quality(&report),
+    ] {
+        let mut found = window.query_all_by_label_contains(words);
+        assert!(found.next().is_some(), "{words}");
+    }
 }
 
 #[test]
@@ -249,6 +360,7 @@ fn the_probe_is_retracted_after_a_stop_in_the_tissue() {
     let left_at = run.derived.position;
     assert!(left_at < stopped_at);
     assert!(left_at < contact, "the probe must be out of the tissue");
+    flow.same_words_as_the_command_line();
 }
 
 #[test]

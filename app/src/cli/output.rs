@@ -20,13 +20,24 @@ impl Output {
 
     /// Prints a result: `text` for people, `object` for machines.
     pub fn result(&self, object: &impl Serialize, text: impl FnOnce() -> String) {
-        let line = if self.is_json {
-            serde_json::to_string(object).unwrap_or_else(|err| format!("{{\"error\":\"{err}\"}}"))
-        } else {
-            text()
-        };
-        // A closed pipe (`palpate info x | head`) is the reader's choice, not an error.
-        let _ = writeln!(std::io::stdout(), "{line}");
+        self.object(object);
+        self.text_only(text);
+    }
+
+    /// Prints what only machines read.
+    pub fn object(&self, object: &impl Serialize) {
+        if self.is_json {
+            let line = serde_json::to_string(object)
+                .unwrap_or_else(|err| format!("{{\"error\":\"{err}\"}}"));
+            print(&line);
+        }
+    }
+
+    /// Prints what only people read.
+    pub fn text_only(&self, text: impl FnOnce() -> String) {
+        if !self.is_json {
+            print(&text());
+        }
     }
 
     /// Prints a remark that is not the result.
@@ -45,13 +56,27 @@ impl Output {
 
     /// A progress bar on the terminal; silent in JSON and where nobody watches.
     pub fn bar(&self, length: u64) -> ProgressBar {
+        self.bar_like(length, "{bar:30} {percent:>3} %  {msg}")
+    }
+
+    /// A progress bar that counts pieces of like size and tells the time left.
+    pub fn count_bar(&self, length: u64) -> ProgressBar {
+        self.bar_like(length, "{bar:30} {pos} of {len}  {eta} left  {msg}")
+    }
+
+    fn bar_like(&self, length: u64, template: &str) -> ProgressBar {
         let bar = ProgressBar::new(length);
         if self.is_json {
             bar.set_draw_target(ProgressDrawTarget::hidden());
         }
-        if let Ok(style) = ProgressStyle::with_template("{bar:30} {percent:>3} %  {msg}") {
+        if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
         bar
     }
+}
+
+fn print(line: &str) {
+    // A closed pipe (`palpate info x | head`) is the reader's choice, not an error.
+    let _ = writeln!(std::io::stdout(), "{line}");
 }

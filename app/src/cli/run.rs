@@ -259,7 +259,7 @@ fn run_text(report: &RunReport) -> String {
     }
     if let Some(live) = &report.live {
         lines.push("live fit:".into());
-        lines.extend(live.parameters.iter().map(super::fit::parameter_line));
+        lines.extend(crate::report::text::parameter_lines(&live.parameters));
     }
     lines.join("\n")
 }

@@ -3,11 +3,13 @@
 use super::points::{PlotCache, phase_spans};
 use super::style::quiet;
 use crate::theme::Tokens;
+use crate::workers::fit::ExactFit;
 use eframe::egui::{Align2, Color32, Ui, Vec2b};
-use egui_plot::{HLine, LineStyle, Plot, PlotPoint, Span, Text};
+use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text};
 use palpate_model::rig::Phase;
 use palpate_model::units::Newtons;
 use palpate_protocols::runner::RunView;
+use std::ops::RangeInclusive;
 
 /// How much of the run is shown.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -22,14 +24,16 @@ pub enum TimeView {
 /// Seconds shown before the ramp.
 const LEAD_S: f64 = 2.0;
 
-/// Draws the plot in the space there is.
+/// Draws the plot in the space there is, the exact fit over the measured force once there is one.
+/// Returns the session times shown.
 pub fn force_time_ui(
     ui: &mut Ui,
     run: Option<&RunView>,
     cache: &PlotCache,
+    exact: Option<&ExactFit>,
     view: TimeView,
     force_max: Newtons,
-) {
+) -> RangeInclusive<f64> {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let from = run
         .filter(|_| view == TimeView::FromRamp)
@@ -43,7 +47,7 @@ pub fn force_time_ui(
         .include_y(1.12 * force_max.0)
         .include_x(now)
         .auto_bounds(Vec2b::new(from.is_none(), true));
-    plot.show(ui, |plot_ui| {
+    let response = plot.show(ui, |plot_ui| {
         if let Some(start) = from {
             plot_ui.set_plot_bounds_x(start - LEAD_S..=now.max(start + 1.0));
         }
@@ -83,7 +87,18 @@ pub fn force_time_ui(
         for line in cache.force_time.lines("force") {
             plot_ui.line(line.color(tokens.series));
         }
+        if let Some(exact) = exact {
+            // Dashed, so that the measured force shows through where both agree.
+            plot_ui.line(
+                Line::new("fitted", PlotPoints::Borrowed(&exact.curve))
+                    .color(tokens.limit)
+                    .width(2.0)
+                    .style(LineStyle::dashed_loose()),
+            );
+        }
     });
+    let bounds = response.transform.bounds();
+    bounds.min()[0]..=bounds.max()[0]
 }
 
 /// Session time at which the ramp began.

@@ -3,6 +3,7 @@
 pub mod force_depth;
 pub mod force_time;
 mod points;
-mod style;
+pub mod residual;
+pub(crate) mod style;
 
 pub use points::PlotCache;

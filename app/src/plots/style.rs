@@ -61,7 +61,7 @@ fn mark_text(mark: GridMark) -> String {
 }
 
 /// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
-fn round_up(least: f64) -> f64 {
+pub(crate) fn round_up(least: f64) -> f64 {
     let power = 10f64.powf(least.log10().floor());
     // 1e-9 forgives the rounding of the logarithm.
     let round = [1.0, 2.0, 5.0]

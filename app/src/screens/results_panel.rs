@@ -1,23 +1,31 @@
 //! What is known from the run: parameters, measured facts, the steps and how it ended.
 
 use super::after_stop::after_stop_ui;
+use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
 use crate::command::Commands;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::step_mark::{StepState, step_ui};
-use eframe::egui::{RichText, Ui};
+use crate::workers::fit::Refit;
+use eframe::egui::{Label, RichText, Ui};
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::runner::{RunView, Snapshot};
 
 /// Draws the panel.
-pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, commands: &mut Commands) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {
         after_stop_ui(ui, run, commands);
     }
-    section_ui(ui, "Live parameters");
-    parameters_ui(ui, run);
+    match refit {
+        Refit::Done(exact) => exact_ui(ui, &exact.report),
+        _ => {
+            section_ui(ui, "Live parameters");
+            refit_ui(ui, refit);
+            parameters_ui(ui, run);
+        }
+    }
     section_ui(ui, "Measured");
     match run {
         Some(run) => facts_ui(ui, run),
@@ -29,6 +37,27 @@ pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
     if let Some(run) = run {
         section_ui(ui, "Steps");
         steps_ui(ui, run);
+    }
+}
+
+/// Seconds after which a fit that is under way says so.
+const BUSY_SECS: f64 = 1.0;
+
+/// Why the parameters are still the live ones.
+fn refit_ui(ui: &mut Ui, refit: Refit<'_>) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    match refit {
+        Refit::Refused(reason) => {
+            let text = format!("No exact fit: {reason}");
+            ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
+        }
+        Refit::Busy(seconds) if seconds > BUSY_SECS => {
+            ui.horizontal(|ui| {
+                ui.spinner();
+                ui.label(format!("fitting every sample, {seconds:.0} s so far"));
+            });
+        }
+        Refit::Busy(_) | Refit::Done(_) | Refit::NotYet => {}
     }
 }
 

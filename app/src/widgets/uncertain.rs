@@ -7,19 +7,67 @@ const SHORTEST_PLAIN_ERROR: f64 = 1e-4;
 /// one common power of ten where plain digits would be long (GUM 7.2.6: one or two digits).
 #[must_use]
 pub fn with_error(value: f64, error: f64) -> String {
-    if !(value.is_finite() && error.is_finite() && error > 0.0) {
-        return plain(value);
+    match Digits::of(value, error) {
+        Some(digits) => digits.print(&[value, error], ["", " ± ", ""]),
+        None => plain(value),
     }
-    let magnitude = value.abs().max(error).log10().floor() as i32;
-    let are_digits_short = magnitude < 5 && error >= SHORTEST_PLAIN_ERROR;
-    let exponent = if are_digits_short { 0 } else { magnitude };
-    let scale = 10f64.powi(exponent);
-    let (value, error) = (value / scale, error / scale);
-    let decimals = (1 - error.log10().floor() as i32).clamp(0, 6) as usize;
-    if exponent == 0 {
-        format!("{value:.decimals$} ± {error:.decimals$}")
-    } else {
-        format!("({value:.decimals$} ± {error:.decimals$})e{exponent}")
+}
+
+/// `value [low, high]`, all in the digits that [`with_error`] finds for `value` and `error`.
+#[must_use]
+pub fn with_interval(value: f64, error: f64, ends: [f64; 2]) -> String {
+    let ends = interval(ends, value, error);
+    let alone = with_error(value, error);
+    match alone.split_once(" ± ") {
+        // `(4.120 ± 0.031)e-5` gives `4.120e-5`.
+        Some((value, rest)) => {
+            let power = rest.split_once(')').map_or("", |(_, power)| power);
+            format!("{}{power} {ends}", value.trim_start_matches('('))
+        }
+        None => format!("{alone} {ends}"),
+    }
+}
+
+/// `[low, high]` in the digits in which [`with_error`] prints `value` and `error`.
+#[must_use]
+pub fn interval([low, high]: [f64; 2], value: f64, error: f64) -> String {
+    match Digits::of(value, error) {
+        Some(digits) => digits.print(&[low, high], ["[", ", ", "]"]),
+        None => format!("[{}, {}]", plain(low), plain(high)),
+    }
+}
+
+/// How many digits an error supports, and in which power of ten.
+struct Digits {
+    exponent: i32,
+    decimals: usize,
+}
+
+impl Digits {
+    /// `None` if there is no error to go by.
+    fn of(value: f64, error: f64) -> Option<Self> {
+        if !(value.is_finite() && error.is_finite() && error > 0.0) {
+            return None;
+        }
+        let magnitude = value.abs().max(error).log10().floor() as i32;
+        let are_digits_short = magnitude < 5 && error >= SHORTEST_PLAIN_ERROR;
+        let exponent = if are_digits_short { 0 } else { magnitude };
+        let scaled = error / 10f64.powi(exponent);
+        Some(Self {
+            exponent,
+            decimals: (1 - scaled.log10().floor() as i32).clamp(0, 6) as usize,
+        })
+    }
+
+    /// Two numbers between three marks, in brackets where a power of ten is common to both.
+    fn print(&self, numbers: &[f64; 2], [open, between, close]: [&str; 3]) -> String {
+        let scale = 10f64.powi(self.exponent);
+        let [a, b] = numbers.map(|number| format!("{:.*}", self.decimals, number / scale));
+        match (self.exponent, open) {
+            (0, _) => format!("{open}{a}{between}{b}{close}"),
+            (exponent, "") => format!("({a}{between}{b})e{exponent}"),
+            (exponent, _) => format!("{open}{a}{between}{b}{close}e{exponent}"),
+        }
     }
 }
 
@@ -77,6 +125,45 @@ mod tests {
             (5.0, f64::NAN, "5.000"),
         ] {
             assert_eq!(with_error(value, error), text);
+        }
+    }
+
+    #[test]
+    fn an_interval_has_the_digits_of_its_value() {
+        for (ends, value, error, text) in [
+            ([1.019_4, 1.027_6], 1.023_47, 0.002_1, "[1.0194, 1.0276]"),
+            (
+                [-8.737_8e-3, -8.726_3e-3],
+                -0.008_732,
+                2.9e-6,
+                "[-8.7378, -8.7263]e-3",
+            ),
+            ([1185.2, 1283.8], 1234.5, 25.0, "[1185, 1284]"),
+            ([0.5, 2.0], 1.0, 0.0, "[0.5000, 2.000]"),
+        ] {
+            assert_eq!(interval(ends, value, error), text);
+            assert!(with_interval(value, error, ends).ends_with(text));
+        }
+    }
+
+    #[test]
+    fn a_value_before_its_interval_has_its_own_power() {
+        for (value, error, ends, text) in [
+            (1.023_47, 0.002_1, [1.0, 2.0], "1.0235 [1.0000, 2.0000]"),
+            (
+                4.12e-5,
+                3.1e-7,
+                [4.0e-5, 5.0e-5],
+                "4.120e-5 [4.000, 5.000]e-5",
+            ),
+            (
+                -0.008_732,
+                2.9e-6,
+                [-0.009, 0.0],
+                "-8.7320e-3 [-9.0000, 0.0000]e-3",
+            ),
+        ] {
+            assert_eq!(with_interval(value, error, ends), text);
         }
     }
 

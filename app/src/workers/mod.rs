@@ -1,6 +1,8 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
+pub mod fit;
 pub mod folder_dialog;
+pub mod pool;
 pub mod ports;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};

@@ -59,7 +59,9 @@ impl Quantity {
 pub(super) enum Meaning {
     /// A quantity with the factor to its unit here.
     Known(Quantity, f64),
-    /// A quantity whose unit is missing or unknown.
+    /// A quantity by its name alone.
+    Bare(Quantity),
+    /// A quantity whose unit is unknown.
     Unitless(Quantity),
     /// Something else.
     Other,
@@ -82,6 +84,7 @@ pub(super) fn meaning(cell: &str) -> Meaning {
         return Meaning::Other;
     };
     match rest {
+        [] => Meaning::Bare(quantity),
         [unit] => quantity
             .factor(unit)
             .map_or(Meaning::Unitless(quantity), |factor| {
@@ -112,7 +115,8 @@ mod tests {
 
     #[test]
     fn names_without_units_and_foreign_names_are_told_apart() {
-        assert_eq!(meaning("force"), Meaning::Unitless(Quantity::Force));
+        assert_eq!(meaning("force"), Meaning::Bare(Quantity::Force));
+        assert_eq!(meaning("Time"), Meaning::Bare(Quantity::Time));
         assert_eq!(meaning("depth_furlong"), Meaning::Unitless(Quantity::Depth));
         assert_eq!(meaning("signal_V"), Meaning::Other);
         assert_eq!(meaning(""), Meaning::Other);

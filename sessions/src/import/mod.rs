@@ -1,6 +1,7 @@
 //! Foreign tables: one format per file.
 
+mod cells;
 mod header;
 mod table;
 
-pub use table::{Table, TableError, parse_table, read_table};
+pub use table::{ColumnNames, Table, TableError, parse_table, read_table};

@@ -1,6 +1,7 @@
 //! A delimited text with a header that names time, depth and force. What it cannot tell it
 //! refuses with a reason; nothing is guessed and nothing repaired.
 
+use super::cells::{delimiter_of, split};
 use super::header::{Meaning, Quantity, meaning};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -52,8 +53,24 @@ pub enum TableError {
     },
 }
 
-/// Reads a table from a file.
-pub fn read_table(path: &Path) -> Result<Table, TableError> {
+/// Names for the columns of a table that has no header, in its order: `t_s`, `x_mm`, `F_N` and the
+/// like; a column of another name is not read.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnNames(Vec<String>);
+
+impl std::str::FromStr for ColumnNames {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let names: Vec<String> = text.split(',').map(|name| name.trim().to_owned()).collect();
+        // A mistake is told before any file is read.
+        Layout::of(&names, ',')?;
+        Ok(Self(names))
+    }
+}
+
+/// Reads a table from a file; `columns` names the columns of one without a header.
+pub fn read_table(path: &Path, columns: Option<&ColumnNames>) -> Result<Table, TableError> {
     let io_error = |source: io::Error| TableError::Io {
         path: path.to_owned(),
         source,
@@ -71,28 +88,53 @@ pub fn read_table(path: &Path) -> Result<Table, TableError> {
     if text.contains('\0') {
         return Err(not_text("it holds binary data"));
     }
-    parse_table(&text).map_err(|reason| TableError::Content {
+    parse_table(&text, columns).map_err(|reason| TableError::Content {
         path: path.to_owned(),
         reason,
     })
 }
 
-/// Parses a table; the error is one sentence.
-pub fn parse_table(text: &str) -> Result<Table, String> {
+/// Parses a table; `columns` names the columns of one without a header. The error is one sentence.
+pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, String> {
     let text = text.strip_prefix('\u{feff}').unwrap_or(text);
     let mut lines = text
         .lines()
         .enumerate()
         .map(|(i, line)| (i + 1, line))
-        .filter(|(_, line)| !line.trim().is_empty());
-    let (_, header) = lines.next().ok_or("the table is empty")?;
-    let delimiter = delimiter_of(header)?;
-    let cells: Vec<String> = split(header, delimiter);
-    let layout = Layout::of(&cells, delimiter)?;
+        .filter(|(_, line)| !line.trim().is_empty())
+        .peekable();
+    let &(number, first) = lines.peek().ok_or("the table is empty")?;
+    let delimiter = delimiter_of(first)?;
+    let cells = split(first, delimiter, number)?;
+    let has_decimal_comma = delimiter != ',';
+    let has_header = !cells.iter().all(|cell| is_number(cell, has_decimal_comma));
+    let layout = match (has_header, columns) {
+        (true, None) => {
+            lines.next();
+            Layout::of(&cells, delimiter)?
+        }
+        (false, Some(ColumnNames(names))) if names.len() == cells.len() => {
+            Layout::of(names, delimiter)?
+        }
+        (false, Some(ColumnNames(names))) => {
+            return Err(format!(
+                "the table has {} columns but {} are named; name every one",
+                cells.len(),
+                names.len()
+            ));
+        }
+        (true, Some(_)) => {
+            return Err("the table names its columns in its first line already; leave out the names given beside it".into());
+        }
+        (false, None) => {
+            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or with --columns".into());
+        }
+    };
     let mut table = Table::default();
+    table.notes.extend(layout.note.clone());
     let mut left_out = 0usize;
     for (number, line) in lines {
-        let cells = split(line, delimiter);
+        let cells = split(line, delimiter, number)?;
         if cells.len() != layout.width {
             return Err(format!(
                 "line {number} has {} cells where the header has {}; mend the line",
@@ -127,19 +169,17 @@ pub fn parse_table(text: &str) -> Result<Table, String> {
     Ok(table)
 }
 
-fn delimiter_of(header: &str) -> Result<char, String> {
-    ['\t', ';', ',']
-        .into_iter()
-        .find(|delimiter| header.contains(*delimiter))
-        .ok_or_else(|| {
-            "the first line names no columns; separate them by comma, semicolon or tab".into()
-        })
+/// The number in a cell, written with the decimal sign of its table.
+fn number_in(cell: &str, has_decimal_comma: bool) -> Option<f64> {
+    if has_decimal_comma {
+        cell.replace(',', ".").parse().ok()
+    } else {
+        cell.parse().ok()
+    }
 }
 
-fn split(line: &str, delimiter: char) -> Vec<String> {
-    line.split(delimiter)
-        .map(|cell| cell.trim().trim_matches('"').to_owned())
-        .collect()
+fn is_number(cell: &str, has_decimal_comma: bool) -> bool {
+    number_in(cell, has_decimal_comma).is_some()
 }
 
 /// Where the three quantities are.
@@ -149,20 +189,24 @@ struct Layout {
     places: [(usize, f64); 3],
     phase: Option<usize>,
     has_decimal_comma: bool,
+    /// What was assumed.
+    note: Option<String>,
 }
 
 impl Layout {
     fn of(cells: &[String], delimiter: char) -> Result<Self, String> {
-        if cells.iter().all(|cell| cell.parse::<f64>().is_ok()) {
-            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N".into());
-        }
         let place = |quantity: Quantity| -> Result<(usize, f64), String> {
             let found: Vec<(usize, Option<f64>)> = cells
                 .iter()
                 .enumerate()
                 .filter_map(|(i, cell)| match meaning(cell) {
                     Meaning::Known(q, factor) if q == quantity => Some((i, Some(factor))),
-                    Meaning::Unitless(q) if q == quantity => Some((i, None)),
+                    // A time by its name alone is in seconds in every instrument's table we know;
+                    // depths and forces come in too many units to assume one.
+                    Meaning::Bare(Quantity::Time) if quantity == Quantity::Time => {
+                        Some((i, Some(1.0)))
+                    }
+                    Meaning::Bare(q) | Meaning::Unitless(q) if q == quantity => Some((i, None)),
                     _ => None,
                 })
                 .collect();
@@ -180,13 +224,14 @@ impl Layout {
                 )),
             }
         };
+        let time = place(Quantity::Time)?;
+        let name = &cells[time.0];
+        let is_bare = meaning(name) == Meaning::Bare(Quantity::Time);
         Ok(Self {
             width: cells.len(),
-            places: [
-                place(Quantity::Time)?,
-                place(Quantity::Depth)?,
-                place(Quantity::Force)?,
-            ],
+            places: [time, place(Quantity::Depth)?, place(Quantity::Force)?],
+            note: is_bare
+                .then(|| format!("column '{name}' has no unit; it is taken to be in seconds")),
             phase: cells.iter().position(|cell| cell == "phase"),
             has_decimal_comma: delimiter != ',',
         })
@@ -198,12 +243,7 @@ impl Layout {
             values.iter_mut().zip(self.places.iter().zip(Quantity::ALL))
         {
             let cell = &cells[*column];
-            let plain = if self.has_decimal_comma {
-                cell.replace(',', ".")
-            } else {
-                cell.clone()
-            };
-            let read = plain.parse::<f64>().ok().map(|read| read * factor);
+            let read = number_in(cell, self.has_decimal_comma).map(|read| read * factor);
             *value = read.filter(|read| read.is_finite()).ok_or_else(|| {
                 format!(
                     "line {number}: the {} '{cell}' is not a number; mend or remove the line",
@@ -221,9 +261,11 @@ mod tests {
 
     #[test]
     fn reads_units_order_and_foreign_columns() {
-        let table =
-            parse_table("\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n")
-                .unwrap();
+        let table = parse_table(
+            "\u{feff}Force [mN];Time (ms);note;x mm\n1,5;0;a;0\n-2;100;b;0,25\n",
+            None,
+        )
+        .unwrap();
         assert_eq!(table.t, [0.0, 0.1]);
         assert_eq!(table.depth, [0.0, 0.25]);
         assert_eq!(table.force, [0.0015, -0.002]);
@@ -233,15 +275,54 @@ mod tests {
     fn our_own_export_keeps_ramp_and_hold_only() {
         let text =
             "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,retract\n";
-        let table = parse_table(text).unwrap();
+        let table = parse_table(text, None).unwrap();
         assert_eq!(table.t, [1.0, 2.0]);
         assert!(table.notes[0].contains("2 rows"));
     }
 
     #[test]
+    fn a_time_without_a_unit_is_seconds_and_says_so() {
+        let table = parse_table("Time,x_mm,F_N\n0,0,0\n0.5,1,2\n", None).unwrap();
+        assert_eq!(table.t, [0.0, 0.5]);
+        assert_eq!(
+            table.notes,
+            ["column 'Time' has no unit; it is taken to be in seconds"]
+        );
+        let reason = parse_table("time_furlong,x_mm,F_N\n0,0,0\n", None).unwrap_err();
+        assert!(reason.contains("no unit that is known"), "{reason}");
+    }
+
+    #[test]
+    fn a_table_without_a_header_takes_names_from_beside_it() {
+        let names: ColumnNames = "t_s, x_mm, F_N".parse().unwrap();
+        let table = parse_table("0;0,5;1\n1;1,5;2\n", Some(&names)).unwrap();
+        assert_eq!(
+            (table.t, table.depth, table.force),
+            (vec![0.0, 1.0], vec![0.5, 1.5], vec![1.0, 2.0])
+        );
+        let check = |text: &str, expected: &str| {
+            let reason = parse_table(text, Some(&names)).unwrap_err();
+            assert!(reason.contains(expected), "{reason}");
+        };
+        check("0,0,0,0\n", "4 columns but 3 are named");
+        check("t_s,x_mm,F_N\n0,0,0\n", "already");
+        let reason = "t_s,x_mm".parse::<ColumnNames>().unwrap_err();
+        assert!(reason.contains("no column is a force"), "{reason}");
+    }
+
+    #[test]
+    fn quoted_cells_may_hold_the_delimiter() {
+        let text = "\"note, free\",t_s,x_mm,F_N\n\"a, b\",0,0,0\n\"say \"\"c\"\"\",1,1,\"2.5\"\n";
+        let table = parse_table(text, None).unwrap();
+        assert_eq!(table.force, [0.0, 2.5]);
+        let reason = parse_table("t_s,x_mm,F_N\n0,0,\"0\n", None).unwrap_err();
+        assert!(reason.contains("line 2: a quote is not closed"), "{reason}");
+    }
+
+    #[test]
     fn what_it_cannot_tell_it_refuses() {
         let check = |text: &str, expected: &str| {
-            let reason = parse_table(text).unwrap_err();
+            let reason = parse_table(text, None).unwrap_err();
             assert!(reason.contains(expected), "{text:?}: {reason}");
         };
         check("", "empty");

@@ -44,7 +44,7 @@ fn csv_holds_every_digit_and_reads_back() {
     }
     assert_eq!(text.lines().count(), 3001);
 
-    let table = read_table(&path).unwrap();
+    let table = read_table(&path, None).unwrap();
     let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold);
     let kept: Vec<usize> = (0..session.rows.len())
         .filter(|&i| is_measured(session.rows[i].phase))

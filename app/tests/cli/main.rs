@@ -1,5 +1,7 @@
 //! The command line as a user meets it: whole commands, their exit codes and their sentences.
 
+mod fit;
+
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};

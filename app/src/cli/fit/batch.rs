@@ -1,0 +1,199 @@
+//! Many sources, each read and fitted on one of several threads; the answers in the sources' order.
+
+use super::super::{Failure, output::Output};
+use super::Recipe;
+use crate::report::text;
+use crate::workers::pool::{News, NoAnswer, in_order};
+use palpate_model::fit::{FitReport, PARAMETER_NAMES, PARAMETER_UNITS};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What came of one source.
+struct Answer {
+    notes: Vec<String>,
+    result: Result<FitReport, Failure>,
+}
+
+#[derive(Serialize)]
+struct Line<'a> {
+    source: &'a Path,
+    #[serde(flatten)]
+    report: &'a FitReport,
+    notes: &'a [String],
+}
+
+#[derive(Serialize)]
+struct FailedLine<'a> {
+    source: &'a Path,
+    error: &'a str,
+    exit: u8,
+}
+
+pub(super) fn run(
+    sources: &[PathBuf],
+    jobs: usize,
+    recipe: &Recipe,
+    output: &Output,
+) -> Result<(), Failure> {
+    let is_ending = Arc::new(AtomicBool::new(false));
+    end_on_signals(&is_ending)?;
+    let bar = output.count_bar(sources.len() as u64);
+    let mut rows = Vec::with_capacity(sources.len());
+    let mut failed = 0;
+    let work = |source: &PathBuf| answer(source, recipe);
+    in_order(jobs, sources, &is_ending, work, |news| match news {
+        News::Done(count) => {
+            bar.set_position(count as u64);
+            if is_ending.load(Ordering::Relaxed) {
+                bar.set_message("ending after those under way");
+            }
+        }
+        News::Next(answer) => {
+            let source = sources[rows.len()].as_path();
+            let Answer { notes, result } = answer.unwrap_or_else(missing);
+            failed += usize::from(result.is_err());
+            bar.suspend(|| {
+                for note in &notes {
+                    output.note(&format!("{}: {note}", source.display()));
+                }
+                match &result {
+                    Ok(report) => output.object(&Line {
+                        source,
+                        report,
+                        notes: &notes,
+                    }),
+                    Err(failure) => output.object(&FailedLine {
+                        source,
+                        error: failure.sentence(),
+                        exit: failure.code(),
+                    }),
+                }
+            });
+            rows.push(result);
+        }
+    })
+    .map_err(|err| Failure::failed(format!("no thread can be started ({err}); try again")))?;
+    bar.finish_and_clear();
+    output.text_only(|| table(sources, &rows));
+    if failed == 0 {
+        return Ok(());
+    }
+    let those = format!("{failed} of {} sources", sources.len());
+    Err(Failure::failed(if is_ending.load(Ordering::Relaxed) {
+        format!("{those} not fitted; the batch was asked to end")
+    } else {
+        format!("{those} could not be fitted; each says why")
+    }))
+}
+
+/// The first signal ends after what is under way, the second at once.
+fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
+    let is_ending = Arc::clone(is_ending);
+    ctrlc::set_handler(move || {
+        if is_ending.swap(true, Ordering::Relaxed) {
+            std::process::exit(1);
+        }
+    })
+    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
+}
+
+fn answer(source: &Path, recipe: &Recipe) -> Answer {
+    match recipe.fit(source) {
+        Ok(fitted) => Answer {
+            notes: fitted.notes,
+            result: fitted.result.map_err(Failure::failed),
+        },
+        Err(failure) => Answer {
+            notes: Vec::new(),
+            result: Err(failure),
+        },
+    }
+}
+
+fn missing(none: NoAnswer) -> Answer {
+    let sentence = match none {
+        NoAnswer::NotBegun => "not begun; the batch was asked to end",
+        NoAnswer::Died => "the fit ended unexpectedly; report this with the source",
+    };
+    Answer {
+        notes: Vec::new(),
+        result: Err(Failure::failed(sentence)),
+    }
+}
+
+/// One row per source: parameters with their intervals, how good, how many sentences; or why not.
+/// Parameters that were held everywhere have no column.
+fn table(sources: &[PathBuf], rows: &[Result<FitReport, Failure>]) -> String {
+    let reports = || rows.iter().flatten();
+    let is_shown = |index: &usize| {
+        let one = |report: &FitReport| !report.parameters[*index].is_fixed;
+        reports().any(one)
+    };
+    let shown: Vec<usize> = (0..PARAMETER_NAMES.len()).filter(is_shown).collect();
+    let mut head = vec!["source".to_owned()];
+    head.extend(shown.iter().map(|&index| {
+        let unit = text::typeset(PARAMETER_UNITS[index]);
+        format!("{} ({unit})", PARAMETER_NAMES[index])
+    }));
+    head.extend(["R²", "rmse (mN)", "sentences"].map(String::from));
+    let mut lines = vec![head];
+    for (source, row) in sources.iter().zip(rows) {
+        let mut line = vec![source.display().to_string()];
+        match row {
+            Ok(report) => {
+                let cells = shown.iter().map(|&index| &report.parameters[index]);
+                line.extend(cells.map(text::cell));
+                line.push(format!("{:.6}", report.r2));
+                line.push(format!("{:.3}", report.rmse_n * 1e3));
+                line.push(report.sentences().count().to_string());
+            }
+            Err(failure) => line.push(format!("failed: {}", failure.sentence())),
+        }
+        lines.push(line);
+    }
+    in_columns(&lines)
+}
+
+/// Cells in columns as wide as their widest; a sentence at the end of a short line widens none.
+fn in_columns(lines: &[Vec<String>]) -> String {
+    let columns = lines.first().map_or(0, Vec::len);
+    let letters = |text: &String| text.chars().count();
+    let width = |column: usize| {
+        let whole = lines
+            .iter()
+            .filter(|line| column == 0 || line.len() == columns);
+        whole.filter_map(|line| line.get(column)).map(letters).max()
+    };
+    let widths: Vec<usize> = (0..columns).filter_map(width).collect();
+    let line = |cells: &Vec<String>| {
+        let padded = cells.iter().zip(&widths).map(|(cell, &width)| {
+            // Counted by letters: `±` is two bytes and one letter.
+            format!("{cell:<width$}")
+        });
+        let joined = padded.collect::<Vec<_>>().join("  ");
+        joined.trim_end().to_owned()
+    };
+    lines.iter().map(line).collect::<Vec<_>>().join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sentence_does_not_widen_the_columns() {
+        let lines = [
+            vec!["source".into(), "mu1".into(), "R²".into()],
+            vec!["a-long-name".into(), "1 [0, 2]".into(), "1".into()],
+            vec!["b".into(), "failed: a long sentence".into()],
+        ];
+        let expected = [
+            "source       mu1       R²",
+            "a-long-name  1 [0, 2]  1",
+            "b            failed: a long sentence",
+        ];
+        assert_eq!(in_columns(&lines), expected.join("\n"));
+    }
+}

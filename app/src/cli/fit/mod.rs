@@ -1,0 +1,158 @@
+//! `palpate fit`: the force model fitted to a session or a table, or to folders full of them.
+
+mod batch;
+mod sources;
+
+use super::Failure;
+use super::output::Output;
+use crate::report::{picture, text};
+use crate::workers::fit::{Fitted, fit_source};
+use clap::Args;
+use palpate_model::fit::{FitOptions, FitReport};
+use palpate_sessions::import::ColumnNames;
+use serde::Serialize;
+use std::num::NonZeroUsize;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate fit`.
+#[derive(Debug, Args)]
+pub struct FitArgs {
+    /// Session folders, delimited tables with columns for time, depth and force, or folders in
+    /// which every session and table (.csv, .tsv, .mcap) is fitted
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<PathBuf>,
+    /// Hold a parameter, as NAME=VALUE; may be repeated
+    #[arg(long = "fixed", value_name = "NAME=VALUE")]
+    fixed: Vec<String>,
+    /// Free a parameter that is held by default, such as x_contact; may be repeated
+    #[arg(long = "free", value_name = "NAME")]
+    free: Vec<String>,
+    /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<String>,
+    /// Draw the fit, or why there is none, as a new SVG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Sources fitted at a time; as many as the computer has processors without it
+    #[arg(long, value_name = "N")]
+    jobs: Option<NonZeroUsize>,
+    /// Print one JSON object, or one per line for several sources
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// How every source is fitted.
+struct Recipe {
+    options: FitOptions,
+    columns: Option<ColumnNames>,
+}
+
+impl Recipe {
+    fn fit(&self, path: &Path) -> Result<Fitted, Failure> {
+        fit_source(path, self.columns.as_ref(), &self.options).map_err(super::source_failure)
+    }
+}
+
+#[derive(Serialize)]
+struct FitOutput<'a> {
+    #[serde(flatten)]
+    report: &'a FitReport,
+    /// The fit alone, without reading.
+    seconds: f64,
+}
+
+pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
+    let columns = args.columns.as_deref().map(str::parse).transpose();
+    let recipe = Recipe {
+        options: options(args)?,
+        columns: columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?,
+    };
+    if let [source] = args.sources.as_slice()
+        && !sources::is_collection(source)
+    {
+        return one(source, &recipe, args.picture.as_deref(), output);
+    }
+    if args.picture.is_some() {
+        return Err(Failure::usage(
+            "--picture draws one fit; name a single session or table",
+        ));
+    }
+    let found = sources::find(&args.sources)?;
+    let jobs = args.jobs.or(std::thread::available_parallelism().ok());
+    batch::run(&found, jobs.map_or(1, NonZeroUsize::get), &recipe, output)
+}
+
+fn one(source: &Path, recipe: &Recipe, to: Option<&Path>, output: &Output) -> Result<(), Failure> {
+    if let Some(to) = to.filter(|to| to.exists()) {
+        return Err(Failure::usage(format!(
+            "{} exists already; give the picture another name",
+            to.display()
+        )));
+    }
+    let fitted = recipe.fit(source)?;
+    fitted.notes.iter().for_each(|note| output.note(note));
+    let name = source.display().to_string();
+    if let Some(to) = to {
+        // Its own name only: a picture travels, and folders are nobody else's business.
+        let short = source
+            .file_name()
+            .map_or(name.clone(), |name| name.to_string_lossy().into());
+        let picture = match &fitted.result {
+            Ok(report) => picture::of_report(&short, &fitted.samples, report),
+            Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
+        };
+        std::fs::write(to, picture).map_err(|err| {
+            Failure::failed(format!(
+                "cannot write the picture {} ({err}); choose a folder that may be written",
+                to.display()
+            ))
+        })?;
+    }
+    let report = fitted
+        .result
+        .map_err(|err| Failure::failed(format!("{err}, in {name}")))?;
+    super::last_fit::remember(&report, source, output);
+    let object = FitOutput {
+        report: &report,
+        seconds: fitted.seconds,
+    };
+    output.result(&object, || text::whole(&report));
+    Ok(())
+}
+
+fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
+    let mut options = FitOptions::default();
+    let names = args.free.iter().map(|name| name.trim());
+    let held = args
+        .fixed
+        .iter()
+        .filter_map(|pair| pair.split('=').next().map(str::trim));
+    let mut names: Vec<&str> = names.chain(held).collect();
+    names.sort_unstable();
+    if let Some(pair) = names.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Failure::usage(format!(
+            "{} is given twice; say once what it shall be",
+            pair[0]
+        )));
+    }
+    for name in &args.free {
+        options.free(name).map_err(Failure::usage)?;
+    }
+    for pair in &args.fixed {
+        let parsed = pair.split_once('=').and_then(|(name, value)| {
+            value
+                .trim()
+                .parse::<f64>()
+                .ok()
+                .filter(|value| value.is_finite())
+                .map(|value| (name.trim(), value))
+        });
+        let Some((name, value)) = parsed else {
+            return Err(Failure::usage(format!(
+                "--fixed {pair} is not NAME=VALUE, as in --fixed f_offset=0"
+            )));
+        };
+        options.fix(name, value).map_err(Failure::usage)?;
+    }
+    Ok(options)
+}

@@ -1,0 +1,144 @@
+//! What a batch fits: every session and table in folders, in order.
+
+use super::Failure;
+use palpate_sessions::log::ReadError;
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+
+/// Endings of file names that are taken for tables.
+const TABLES: [&str; 2] = ["csv", "tsv"];
+/// Ending of a session's log.
+const LOG: &str = "mcap";
+
+/// Whether a path is a folder of sources rather than one source.
+pub(super) fn is_collection(path: &Path) -> bool {
+    path.is_dir() && !is_session(path)
+}
+
+/// A session's folder has a log whose name is a number: `000.mcap` or, where the first segment was
+/// lost, a later one.
+fn is_session(folder: &Path) -> bool {
+    fs::read_dir(folder).is_ok_and(|mut entries| {
+        entries.any(|entry| {
+            entry.is_ok_and(|entry| {
+                let path = entry.path();
+                let stem = path.file_stem().map(|stem| stem.to_string_lossy());
+                has_ending(&path, &[LOG])
+                    && stem.is_some_and(|stem| {
+                        stem.len() >= 3 && stem.bytes().all(|byte| byte.is_ascii_digit())
+                    })
+            })
+        })
+    })
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    path.extension().is_some_and(|ending| {
+        endings
+            .iter()
+            .any(|known| ending.eq_ignore_ascii_case(known))
+    })
+}
+
+/// Every source named, and every one in the folders named: folder by folder, by name.
+pub(super) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let mut found = Vec::new();
+    for path in paths {
+        if !path.exists() {
+            return Err(Failure::usage(ReadError::Missing { path: path.clone() }));
+        }
+        if !is_collection(path) {
+            found.push(path.clone());
+            continue;
+        }
+        let before = found.len();
+        below(path, &mut found).map_err(|(folder, err)| {
+            Failure::failed(format!(
+                "cannot look into {} ({err}); check its permissions",
+                folder.display()
+            ))
+        })?;
+        if found.len() == before {
+            return Err(Failure::usage(format!(
+                "{} holds no session and no table (.csv or .tsv); name the folder that does",
+                path.display()
+            )));
+        }
+    }
+    Ok(found)
+}
+
+/// Sources below a folder. Links to folders are not followed, so no walk is endless and nothing
+/// counts twice; hidden names are left alone.
+fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), (PathBuf, io::Error)> {
+    let failed = |err| (folder.to_owned(), err);
+    let mut entries = fs::read_dir(folder)
+        .and_then(Iterator::collect::<io::Result<Vec<_>>>)
+        .map_err(failed)?;
+    entries.sort_by_key(fs::DirEntry::file_name);
+    for entry in entries {
+        let path = entry.path();
+        let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
+        if is_hidden {
+            continue;
+        }
+        if entry.file_type().map_err(failed)?.is_dir() {
+            if is_session(&path) {
+                found.push(path);
+            } else {
+                below(&path, found)?;
+            }
+        } else if path.is_file() && (has_ending(&path, &TABLES) || has_ending(&path, &[LOG])) {
+            found.push(path);
+        }
+    }
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sessions_and_tables_are_found_in_order_and_links_are_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        for name in ["b/s10", "b/s9", "a/deep", "empty", ".hidden"] {
+            fs::create_dir_all(at.join(name)).unwrap();
+        }
+        for name in [
+            "b/s10/000.mcap",
+            "b/s9/001.mcap",
+            "b/s9/lock",
+            "b/table.CSV",
+            "a/deep/t.tsv",
+            "a/alone.mcap",
+            ".hidden/t.csv",
+            "notes.txt",
+        ] {
+            fs::write(at.join(name), "").unwrap();
+        }
+        // A loop, and a second way to the same sessions.
+        std::os::unix::fs::symlink(at, at.join("a/loop")).unwrap();
+        std::os::unix::fs::symlink(at.join("b"), at.join("again")).unwrap();
+        let found = find(&[at.to_path_buf()]).unwrap();
+        let names: Vec<_> = found
+            .iter()
+            .map(|path| path.strip_prefix(at).unwrap())
+            .collect();
+        let expected = [
+            "a/alone.mcap",
+            "a/deep/t.tsv",
+            "b/s10",
+            "b/s9",
+            "b/table.CSV",
+        ];
+        assert_eq!(names, expected.map(Path::new));
+        // Named itself, a link is what it leads to; a session is a source and not a folder of some.
+        assert_eq!(find(&[at.join("again")]).unwrap().len(), 3);
+        assert_eq!(find(&[at.join("b/s9")]).unwrap(), [at.join("b/s9")]);
+        let refusal = find(&[at.join("empty")]).unwrap_err();
+        assert!(refusal.sentence().contains("holds no session"));
+    }
+}

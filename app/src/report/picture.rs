@@ -1,0 +1,226 @@
+//! A fit as one picture: measured and fitted force over time, what is left over beneath, the
+//! parameters and every sentence. A refused fit shows the path of the probe and the reason.
+
+use super::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
+use super::text::{ParameterText, quality};
+use super::thin::thin;
+use crate::theme::tokens::LIGHT;
+use palpate_model::fit::{FitReport, FitSample};
+
+/// Width of a picture in px.
+const WIDTH: f64 = 960.0;
+/// Left and right edge of what is drawn.
+const LEFT: f64 = 76.0;
+const RIGHT: f64 = 936.0;
+/// Height of a line of text.
+const LINE: f64 = 20.0;
+/// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
+const LETTERS: usize = 120;
+
+/// The picture of a fit that was made. `source` is what was fitted, for the title.
+#[must_use]
+pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> String {
+    let modelled = report.predict(samples);
+    let start = samples.first().map_or(0.0, |sample| sample.t.0);
+    let columns = (RIGHT - LEFT) as usize;
+    let pairs = || samples.iter().zip(&modelled);
+    let measured = thin(
+        samples.iter().map(|one| [one.t.0 - start, one.force.0]),
+        columns,
+    );
+    let fitted = thin(pairs().map(|(one, fit)| [one.t.0 - start, fit.0]), columns);
+    let residual = thin(
+        pairs().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]),
+        columns,
+    );
+    let mut svg = Svg::new(WIDTH);
+    title(
+        &mut svg,
+        source,
+        &format!("{}; {}", report.model, quality(report)),
+    );
+    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], &[&measured, &fitted]);
+    upper.axes(&mut svg, ["", "force (N)"], look());
+    // Wide under narrow, so that both are seen where they agree.
+    upper.line(&mut svg, &measured, LIGHT.series, 3.0);
+    upper.line(&mut svg, &fitted, LIGHT.limit, 1.2);
+    legend(&mut svg);
+    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], &[&residual]);
+    lower.axes(&mut svg, ["time (s)", "residual (mN)"], look());
+    lower.line(&mut svg, &residual, LIGHT.series, 1.0);
+    let mut y = table(&mut svg, report, 580.0);
+    for sentence in report.sentences() {
+        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
+    }
+    svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
+}
+
+/// The picture of a fit that was refused, with the sentence that says why.
+#[must_use]
+pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String {
+    let start = samples.first().map_or(0.0, |sample| sample.t.0);
+    let depth = thin(
+        samples.iter().map(|one| [one.t.0 - start, one.depth.0]),
+        (RIGHT - LEFT) as usize,
+    );
+    let mut svg = Svg::new(WIDTH);
+    title(&mut svg, source, "not fitted");
+    let panel = Panel::around([LEFT, 66.0, RIGHT, 360.0], &[&depth]);
+    panel.axes(&mut svg, ["time (s)", "depth (mm)"], look());
+    panel.line(&mut svg, &depth, LIGHT.series, 1.6);
+    let y = sentence_lines(&mut svg, 434.0, Ink::plain(LIGHT.alarm_text), sentence);
+    svg.finish(y, LIGHT.canvas, &format!("Refused fit of {source}"))
+}
+
+fn look() -> Look {
+    Look {
+        text: LIGHT.text_quiet,
+        grid: LIGHT.line,
+    }
+}
+
+fn title(svg: &mut Svg, source: &str, line: &str) {
+    let ink = Ink {
+        size: 18.0,
+        ..Ink::plain(LIGHT.text)
+    };
+    svg.text([LEFT, 28.0], ink, source);
+    svg.text([LEFT, 50.0], Ink::plain(LIGHT.text_quiet), line);
+}
+
+fn legend(svg: &mut Svg) {
+    for (i, (name, color)) in [("measured", LIGHT.series), ("fitted", LIGHT.limit)]
+        .into_iter()
+        .enumerate()
+    {
+        let x = RIGHT - 190.0 + 100.0 * i as f64;
+        svg.line(&[[x, 46.0], [x + 24.0, 46.0]], color, 2.5);
+        svg.text([x + 30.0, 50.0], Ink::plain(LIGHT.text), name);
+    }
+}
+
+/// The parameters from `y` on; returns where what follows may begin.
+fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
+    let places = [LEFT, 180.0, 420.0, 540.0];
+    let quiet = Ink::plain(LIGHT.text_quiet);
+    let heads = [
+        "parameter",
+        "value ± standard error",
+        "unit",
+        "95 % interval",
+    ];
+    for (x, head) in places.into_iter().zip(heads) {
+        svg.text([x, y], quiet, head);
+    }
+    svg.line(&[[LEFT, y + 6.0], [RIGHT, y + 6.0]], LIGHT.line, 1.0);
+    for parameter in &report.parameters {
+        y += LINE;
+        let text = ParameterText::of(parameter);
+        let cells = [text.name, text.value, text.unit, text.interval];
+        for (x, cell) in places.into_iter().zip(&cells) {
+            svg.text([x, y + 4.0], Ink::plain(LIGHT.text), cell);
+        }
+    }
+    y + 2.0 * LINE
+}
+
+/// A sentence from `y` on, wrapped; returns where the next one may begin.
+fn sentence_lines(svg: &mut Svg, mut y: f64, ink: Ink, sentence: &str) -> f64 {
+    for line in wrap(sentence, LETTERS) {
+        svg.text([LEFT, y], ink.anchored(Anchor::Start), &line);
+        y += FONT + 5.0;
+    }
+    y + 8.0
+}
+
+/// Words in lines of at most `letters`; a longer word stands alone.
+fn wrap(text: &str, letters: usize) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for word in text.split_whitespace() {
+        match lines.last_mut() {
+            Some(line) if line.chars().count() + 1 + word.chars().count() <= letters => {
+                line.push(' ');
+                line.push_str(word);
+            }
+            _ => lines.push(word.to_owned()),
+        }
+    }
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::fit::{FitOptions, fit};
+    use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+    use palpate_model::{Depth, Newtons, Seconds};
+
+    fn record(force_of: impl Fn(usize, f64) -> f64) -> Vec<FitSample> {
+        let mut state = KelvinState::at_rest();
+        (0..3000usize)
+            .map(|i| {
+                let t = i as f64 * 0.03;
+                let depth = Depth((0.75 * t).min(30.0));
+                let dt = Seconds(if i == 0 { 0.0 } else { 0.03 });
+                let force = state.step(&ModifiedKelvin::THESIS, depth, dt).0;
+                FitSample {
+                    t: Seconds(t),
+                    depth,
+                    force: Newtons(force_of(i, force)),
+                    sigma: Newtons(0.02),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_picture_shows_curves_parameters_and_sentences() {
+        // A slow wave on the force, so that there is something left over and a sentence on it.
+        let samples = record(|i, force| force + 0.05 * (i as f64 * 0.01).sin());
+        let report = fit(&samples, &FitOptions::default()).unwrap();
+        assert!(report.sentences().count() > 0);
+        let picture = of_report("S & T <1>", &samples, &report);
+        assert!(picture.contains("S &amp; T &lt;1&gt;"));
+        for parameter in &report.parameters {
+            let text = ParameterText::of(parameter);
+            for part in [text.name, text.value, text.unit, text.interval] {
+                assert!(picture.contains(&part), "{part}");
+            }
+        }
+        for sentence in report.sentences() {
+            assert!(picture.contains(&wrap(sentence, LETTERS)[0]), "{sentence}");
+        }
+        // Three curves of at most two points a pixel, and nothing that is not a number.
+        assert!(!picture.contains("NaN") && !picture.contains("inf"));
+        assert!(
+            picture.len() < 3 * 2 * 860 * 14 + 20_000,
+            "{}",
+            picture.len()
+        );
+        let sizes = picture.split("font-size=\"").skip(1);
+        for size in sizes.filter_map(|rest| rest.split('"').next()) {
+            assert!(size.parse::<f64>().unwrap() >= 12.0, "{size}");
+        }
+    }
+
+    #[test]
+    fn a_refusal_shows_the_path_and_the_sentence() {
+        let mut samples = record(|_, force| force);
+        samples.truncate(1300);
+        samples[7].force = Newtons(f64::NAN);
+        let refusal = fit(&samples, &FitOptions::default())
+            .unwrap_err()
+            .to_string();
+        let picture = of_refusal("ramp", &samples, &refusal);
+        assert!(picture.contains(&wrap(&refusal, LETTERS)[0]), "{refusal}");
+        assert!(picture.contains("depth (mm)") && !picture.contains("NaN\""));
+        assert!(of_refusal("nothing", &[], "no samples").contains("no samples"));
+    }
+
+    #[test]
+    fn lines_break_between_words() {
+        assert_eq!(wrap("one two three", 7), ["one two", "three"]);
+        assert_eq!(wrap("unbreakable", 4), ["unbreakable"]);
+        assert!(wrap("", 4).is_empty());
+    }
+}

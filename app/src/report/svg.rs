@@ -1,0 +1,277 @@
+//! The little SVG that pictures need: text, lines, and a panel with axes (SVG 1.1, W3C).
+
+use crate::plots::style::round_up;
+use eframe::egui::Color32;
+use std::fmt::Write;
+
+/// Font size of everything but titles, in px.
+pub const FONT: f64 = 13.0;
+
+/// A picture under construction.
+pub struct Svg {
+    width: f64,
+    body: String,
+}
+
+/// Where a text stands relative to its point.
+#[derive(Clone, Copy)]
+pub enum Anchor {
+    Start,
+    Middle,
+    End,
+}
+
+/// How a text looks.
+#[derive(Clone, Copy)]
+pub struct Ink {
+    pub color: Color32,
+    pub size: f64,
+    pub anchor: Anchor,
+}
+
+impl Ink {
+    pub fn plain(color: Color32) -> Self {
+        Self {
+            color,
+            size: FONT,
+            anchor: Anchor::Start,
+        }
+    }
+
+    pub fn anchored(self, anchor: Anchor) -> Self {
+        Self { anchor, ..self }
+    }
+}
+
+impl Svg {
+    pub fn new(width: f64) -> Self {
+        Self {
+            width,
+            body: String::new(),
+        }
+    }
+
+    /// The document, `height` px high, on a ground; `title` is what a screen reader says.
+    pub fn finish(self, height: f64, ground: Color32, title: &str) -> String {
+        let width = self.width;
+        format!(
+            "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{width}\" height=\"{height:.0}\" \
+             viewBox=\"0 0 {width} {height:.0}\" font-family=\"sans-serif\">\n\
+             <title>{}</title>\n<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n{}</svg>\n",
+            escape(title),
+            hex(ground),
+            self.body
+        )
+    }
+
+    pub fn text(&mut self, [x, y]: [f64; 2], ink: Ink, text: &str) {
+        self.put(&format!("x=\"{x:.1}\" y=\"{y:.1}\""), ink, text);
+    }
+
+    /// A text turned a quarter to the left, for the names of vertical axes.
+    pub fn upright_text(&mut self, [x, y]: [f64; 2], ink: Ink, text: &str) {
+        let place = format!("transform=\"translate({x:.1} {y:.1}) rotate(-90)\"");
+        self.put(&place, ink, text);
+    }
+
+    fn put(&mut self, place: &str, ink: Ink, text: &str) {
+        let anchor = match ink.anchor {
+            Anchor::Start => "start",
+            Anchor::Middle => "middle",
+            Anchor::End => "end",
+        };
+        self.push(&format!(
+            "<text {place} font-size=\"{}\" text-anchor=\"{anchor}\" fill=\"{}\">{}</text>",
+            ink.size,
+            hex(ink.color),
+            escape(text)
+        ));
+    }
+
+    pub fn line(&mut self, points: &[[f64; 2]], color: Color32, width: f64) {
+        if points.is_empty() {
+            return;
+        }
+        let mut list = String::with_capacity(12 * points.len());
+        for [x, y] in points {
+            // Writing to a string does not fail.
+            let _ = write!(list, "{x:.1},{y:.1} ");
+        }
+        self.push(&format!(
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{}\" stroke-width=\"{width}\" \
+             stroke-linejoin=\"round\"/>",
+            list.trim_end(),
+            hex(color)
+        ));
+    }
+
+    fn push(&mut self, element: &str) {
+        self.body.push_str(element);
+        self.body.push('\n');
+    }
+}
+
+/// A rectangle of the picture with a range of numbers each way.
+pub struct Panel {
+    /// Left, top, right and bottom in px.
+    pub place: [f64; 4],
+    /// Lowest and highest x and y drawn.
+    pub x: [f64; 2],
+    pub y: [f64; 2],
+}
+
+impl Panel {
+    /// A panel in which all of these points are seen.
+    pub fn around(place: [f64; 4], series: &[&[[f64; 2]]]) -> Self {
+        let range = |k: usize, margin: f64| {
+            let values = series.iter().flat_map(|points| points.iter());
+            let (low, high) = values
+                .map(|point| point[k])
+                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
+                    (low.min(value), high.max(value))
+                });
+            if low > high {
+                return [0.0, 1.0];
+            }
+            // A flat line still needs some height to be drawn in.
+            let span = (high - low).max(1e-6 * high.abs()).max(1e-12);
+            [low - margin * span, high + margin * span]
+        };
+        Self {
+            place,
+            x: range(0, 0.0),
+            y: range(1, 0.05),
+        }
+    }
+
+    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        let [left, top, right, bottom] = self.place;
+        let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
+        [
+            left + share(x, self.x) * (right - left),
+            bottom - share(y, self.y) * (bottom - top),
+        ]
+    }
+
+    pub fn line(&self, svg: &mut Svg, points: &[[f64; 2]], color: Color32, width: f64) {
+        let placed: Vec<[f64; 2]> = points.iter().map(|point| self.at(*point)).collect();
+        svg.line(&placed, color, width);
+    }
+
+    /// Grid, numbers and names of the axes.
+    pub fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2], look: Look) {
+        let [left, top, right, bottom] = self.place;
+        let ink = Ink::plain(look.text);
+        for (mark, text) in marks(self.x, 10.0) {
+            let [x, _] = self.at([mark, 0.0]);
+            svg.line(&[[x, top], [x, bottom]], look.grid, 0.6);
+            let below = [x, bottom + FONT + 4.0];
+            svg.text(below, ink.anchored(Anchor::Middle), &text);
+        }
+        for (mark, text) in marks(self.y, (bottom - top) / 45.0) {
+            let [_, y] = self.at([0.0, mark]);
+            svg.line(&[[left, y], [right, y]], look.grid, 0.6);
+            let beside = [left - 6.0, y + 0.35 * FONT];
+            svg.text(beside, ink.anchored(Anchor::End), &text);
+        }
+        svg.line(
+            &[[left, top], [left, bottom], [right, bottom]],
+            look.text,
+            1.0,
+        );
+        let middle = ink.anchored(Anchor::Middle);
+        let x_place = [0.5 * (left + right), bottom + 2.0 * FONT + 10.0];
+        svg.text(x_place, middle, x_name);
+        svg.upright_text([left - 52.0, 0.5 * (top + bottom)], middle, y_name);
+    }
+}
+
+/// The two inks of axes.
+#[derive(Clone, Copy)]
+pub struct Look {
+    pub text: Color32,
+    pub grid: Color32,
+}
+
+/// Round numbers within a range, with the decimals their step needs.
+fn marks([low, high]: [f64; 2], steps_max: f64) -> Vec<(f64, String)> {
+    let span = high - low;
+    if !(span.is_finite() && span > 0.0) {
+        return Vec::new();
+    }
+    let step = round_up(span / steps_max.max(2.0));
+    let decimals = (-step.log10().floor()).clamp(0.0, 9.0) as usize;
+    // The step is at least a part of the span, so these are few.
+    let (first, last) = ((low / step).ceil() as i64, (high / step).floor() as i64);
+    (first..=last)
+        .map(|i| {
+            let value = i as f64 * step;
+            (value, format!("{value:.decimals$}"))
+        })
+        .collect()
+}
+
+fn hex(color: Color32) -> String {
+    format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b())
+}
+
+/// Text as XML takes it: five characters spelt out, and none that XML 1.0 cannot hold.
+fn escape(text: &str) -> String {
+    let mut escaped = String::with_capacity(text.len());
+    for character in text.chars() {
+        match character {
+            '&' => escaped.push_str("&amp;"),
+            '<' => escaped.push_str("&lt;"),
+            '>' => escaped.push_str("&gt;"),
+            '"' => escaped.push_str("&quot;"),
+            '\'' => escaped.push_str("&apos;"),
+            control if control.is_control() => escaped.push(' '),
+            other => escaped.push(other),
+        }
+    }
+    escaped
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_text_becomes_valid_xml() {
+        assert_eq!(
+            escape("a<b> & \"c\"\u{0}'d'"),
+            "a&lt;b&gt; &amp; &quot;c&quot; &apos;d&apos;"
+        );
+    }
+
+    #[test]
+    fn marks_are_round_and_inside() {
+        let texts = |range| -> Vec<String> {
+            marks(range, 5.0)
+                .into_iter()
+                .map(|(_, text)| text)
+                .collect()
+        };
+        assert_eq!(texts([-0.2, 9.7]), ["0", "2", "4", "6", "8"]);
+        assert_eq!(
+            texts([-0.012, 0.011]),
+            ["-0.010", "-0.005", "0.000", "0.005", "0.010"]
+        );
+        assert!(texts([1.0, 1.0]).is_empty());
+    }
+
+    #[test]
+    fn points_lie_where_the_axes_say() {
+        let panel = Panel {
+            place: [100.0, 10.0, 300.0, 110.0],
+            x: [0.0, 10.0],
+            y: [-1.0, 1.0],
+        };
+        assert_eq!(panel.at([5.0, 0.0]), [200.0, 60.0]);
+        assert_eq!(panel.at([10.0, 1.0]), [300.0, 10.0]);
+        let nothing = Panel::around(panel.place, &[&[]]);
+        assert_eq!((nothing.x, nothing.y), ([0.0, 1.0], [0.0, 1.0]));
+        let flat = Panel::around(panel.place, &[&[[0.0, 3.0], [1.0, 3.0]]]);
+        assert!(flat.at([0.5, 3.0]).iter().all(|number| number.is_finite()));
+    }
+}

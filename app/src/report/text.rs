@@ -1,0 +1,157 @@
+//! The strings of a fit. Window, command line and picture print these and no others, so that a
+//! number never reads differently in two places.
+
+use crate::widgets::uncertain::{interval, plain, with_error, with_interval};
+use palpate_model::fit::{FitReport, Parameter};
+
+/// One parameter in words.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ParameterText {
+    /// Its name.
+    pub name: String,
+    /// `value ± standard error`, or the value and why it has no error.
+    pub value: String,
+    /// Unit of value and interval, typeset.
+    pub unit: String,
+    /// 95 % interval, empty where there is none.
+    pub interval: String,
+}
+
+impl ParameterText {
+    /// The words for a parameter.
+    #[must_use]
+    pub fn of(parameter: &Parameter) -> Self {
+        let value = match parameter.std_error {
+            Some(error) => with_error(parameter.value, error),
+            None if parameter.is_fixed => format!("{} fixed", plain(parameter.value)),
+            None => format!("{} not identified", plain(parameter.value)),
+        };
+        Self {
+            name: parameter.name.clone(),
+            value,
+            unit: typeset(&parameter.unit),
+            interval: match (parameter.ci95, parameter.std_error) {
+                (Some(ends), Some(error)) => interval(ends, parameter.value, error),
+                _ => String::new(),
+            },
+        }
+    }
+}
+
+/// A parameter in one cell of a table: `value [low, high]`, or the value and why it has no
+/// interval.
+#[must_use]
+pub fn cell(parameter: &Parameter) -> String {
+    match (parameter.std_error, parameter.ci95) {
+        (Some(error), Some(ends)) => with_interval(parameter.value, error, ends),
+        _ => ParameterText::of(parameter).value,
+    }
+}
+
+/// A unit as it is printed rather than typed.
+#[must_use]
+pub fn typeset(unit: &str) -> String {
+    unit.replace("^2", "²").replace("^3", "³").replace('*', "·")
+}
+
+/// How well the model explains the record.
+#[must_use]
+pub fn quality(report: &FitReport) -> String {
+    format!(
+        "R² {:.6}, rmse {:.3} mN, {} samples",
+        report.r2,
+        report.rmse_n * 1e3,
+        report.samples
+    )
+}
+
+/// A whole report: model, parameters, quality, then every sentence.
+#[must_use]
+pub fn whole(report: &FitReport) -> String {
+    let mut lines = vec![report.model.clone()];
+    lines.extend(parameter_lines(&report.parameters));
+    lines.push(quality(report));
+    lines.extend(report.sentences().map(|sentence| format!("- {sentence}")));
+    lines.join("\n")
+}
+
+/// One line per parameter, in columns.
+#[must_use]
+pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
+    let texts: Vec<ParameterText> = parameters.iter().map(ParameterText::of).collect();
+    let widest = texts.iter().map(|text| text.value.chars().count()).max();
+    let width = widest.unwrap_or(0);
+    let line = |text: &ParameterText| {
+        let interval = match text.interval.as_str() {
+            "" => String::new(),
+            ends => format!("95 % {ends}"),
+        };
+        let line = format!(
+            "  {:<10} {:<width$}  {:<8} {interval}",
+            text.name, text.value, text.unit
+        );
+        line.trim_end().to_owned()
+    };
+    texts.iter().map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn parameter(std_error: Option<f64>, is_fixed: bool) -> Parameter {
+        Parameter {
+            name: "tau_sig".into(),
+            value: 1.5,
+            unit: "N*s/mm^2".into(),
+            std_error,
+            ci95: std_error.map(|error| [1.5 - 2.0 * error, 1.5 + 2.0 * error]),
+            is_fixed,
+        }
+    }
+
+    #[test]
+    fn a_value_without_an_error_says_why() {
+        for (parameter, value, interval) in [
+            (parameter(Some(0.1), false), "1.50 ± 0.10", "[1.30, 1.70]"),
+            (parameter(None, true), "1.500 fixed", ""),
+            (parameter(None, false), "1.500 not identified", ""),
+        ] {
+            let text = ParameterText::of(&parameter);
+            assert_eq!(
+                (text.value.as_str(), text.interval.as_str()),
+                (value, interval)
+            );
+            assert_eq!(text.unit, "N·s/mm²");
+        }
+    }
+
+    #[test]
+    fn every_unit_is_typeset() {
+        for unit in palpate_model::fit::PARAMETER_UNITS {
+            assert!(!typeset(unit).contains(['^', '*']), "{unit}");
+        }
+    }
+
+    #[test]
+    fn a_whole_report_says_every_sentence() {
+        let report = FitReport {
+            model: "a model".into(),
+            parameters: vec![parameter(Some(0.1), false), parameter(None, true)],
+            r2: 0.999_123_4,
+            rmse_n: 0.003_45,
+            samples: 900,
+            warnings: vec!["beware".into()],
+            findings: vec!["found".into()],
+        };
+        let lines = [
+            "a model",
+            "  tau_sig    1.50 ± 0.10  N·s/mm²  95 % [1.30, 1.70]",
+            "  tau_sig    1.500 fixed  N·s/mm²",
+            "R² 0.999123, rmse 3.450 mN, 900 samples",
+            "- beware",
+            "- found",
+        ];
+        assert_eq!(whole(&report), lines.join("\n"));
+    }
+}

@@ -1,0 +1,158 @@
+//! From a source on disk to a fit, as the command line and the window both make it; and the
+//! window's refit of a run that has ended, on a thread of its own.
+
+use super::Job;
+use crate::report::thin::thin;
+use eframe::egui::Context;
+use egui_plot::PlotPoint;
+use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, fit};
+use palpate_model::units::Seconds;
+use palpate_protocols::analysis::{self, SourceError};
+use palpate_protocols::runner::{RunView, Stopwatch};
+use palpate_sessions::import::ColumnNames;
+use std::path::{Path, PathBuf};
+
+/// What came of a source that could be read.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The samples fitted.
+    pub samples: Vec<FitSample>,
+    /// Session time of the first sample.
+    pub start: Seconds,
+    /// What the reader of the source remarked.
+    pub notes: Vec<String>,
+    /// The fit, or why there is none.
+    pub result: Result<FitReport, FitError>,
+    /// Wall seconds of the fit alone.
+    pub seconds: f64,
+}
+
+/// Reads a session or a table and fits it. `columns` names the columns of a table without header.
+pub fn fit_source(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+    options: &FitOptions,
+) -> Result<Fitted, SourceError> {
+    let source = analysis::read_named(path, columns)?;
+    let watch = Stopwatch::start();
+    let result = fit(&source.samples, options);
+    Ok(Fitted {
+        seconds: watch.seconds(),
+        samples: source.samples,
+        start: source.start,
+        notes: source.notes,
+        result,
+    })
+}
+
+/// Columns for which the curves of a plot are thinned: more than a screen is wide.
+const COLUMNS: usize = 2000;
+
+/// An exact fit as the window shows it.
+#[derive(Clone, Debug)]
+pub struct ExactFit {
+    /// What the fit found.
+    pub report: FitReport,
+    /// Modelled force in N over session time in s, thinned.
+    pub curve: Vec<PlotPoint>,
+    /// Measured minus modelled force in mN over session time in s, thinned.
+    pub residual: Vec<PlotPoint>,
+}
+
+/// Where the exact fit of the run on the screen stands.
+#[derive(Clone, Copy, Debug)]
+pub enum Refit<'a> {
+    /// The run goes on, or there is none.
+    NotYet,
+    /// Under way for so many seconds.
+    Busy(f64),
+    /// Made.
+    Done(&'a ExactFit),
+    /// Not made, for this reason.
+    Refused(&'a str),
+}
+
+/// Refits every run exactly when it has ended.
+#[derive(Default)]
+pub struct Refitter {
+    job: Job<Result<ExactFit, String>>,
+    /// The session asked for and since when.
+    asked: Option<(PathBuf, Stopwatch)>,
+    answer: Option<Result<ExactFit, String>>,
+}
+
+impl Refitter {
+    /// Fetches an answer, and starts when a run has ended.
+    pub fn update(&mut self, ctx: &Context, run: Option<&RunView>) {
+        let ended = run.filter(|run| run.outcome.is_some());
+        let folder = ended.map(|run| &run.folder);
+        let is_asked = self.asked.as_ref().map(|(asked, _)| asked) == folder;
+        if self.job.is_busy() {
+            let answer = self.job.poll();
+            if self.job.is_busy() {
+                return;
+            }
+            let gone = "the exact fit ended unexpectedly; 'palpate fit' on the session tells more";
+            // An answer about a run that is no longer shown is of no use.
+            self.answer = is_asked.then(|| answer.unwrap_or_else(|| Err(gone.into())));
+        }
+        if is_asked {
+            return;
+        }
+        self.answer = None;
+        self.asked = folder.map(|folder| (folder.clone(), Stopwatch::start()));
+        if let Some(folder) = folder.cloned() {
+            let wake = ctx.clone();
+            let started = self.job.start(
+                "fit",
+                move || exact(&folder),
+                move || wake.request_repaint(),
+            );
+            if let Err(err) = started {
+                self.answer = Some(Err(format!("the exact fit cannot be started: {err}")));
+            }
+        }
+    }
+
+    /// Whether a fit is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.job.is_busy()
+    }
+
+    /// Where the fit of this run stands.
+    #[must_use]
+    pub fn of(&self, run: Option<&RunView>) -> Refit<'_> {
+        let Some((folder, since)) = &self.asked else {
+            return Refit::NotYet;
+        };
+        if !run.is_some_and(|run| run.outcome.is_some() && run.folder == *folder) {
+            return Refit::NotYet;
+        }
+        match &self.answer {
+            None => Refit::Busy(since.seconds()),
+            Some(Ok(exact)) => Refit::Done(exact),
+            Some(Err(reason)) => Refit::Refused(reason),
+        }
+    }
+}
+
+fn exact(folder: &Path) -> Result<ExactFit, String> {
+    let fitted = fit_source(folder, None, &FitOptions::default()).map_err(|err| err.to_string())?;
+    let report = fitted.result.map_err(|err| err.to_string())?;
+    let modelled = report.predict(&fitted.samples);
+    let start = fitted.start.0;
+    let pairs = || fitted.samples.iter().zip(&modelled);
+    let curve = pairs().map(|(sample, fit)| [start + sample.t.0, fit.0]);
+    let residual =
+        pairs().map(|(sample, fit)| [start + sample.t.0, (sample.force.0 - fit.0) * 1e3]);
+    Ok(ExactFit {
+        curve: points(&thin(curve, COLUMNS)),
+        residual: points(&thin(residual, COLUMNS)),
+        report,
+    })
+}
+
+fn points(thinned: &[[f64; 2]]) -> Vec<PlotPoint> {
+    thinned.iter().map(|&point| point.into()).collect()
+}

@@ -1,0 +1,228 @@
+//! `palpate fit`: one source, many, pictures, tables of all kinds.
+
+use super::{json, palpate, short_run, stderr, succeeded};
+use palpate_app::report::text;
+use palpate_app::workers::fit::fit_source;
+use palpate_model::fit::FitOptions;
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::{Depth, Seconds};
+use serde_json::Value;
+use std::fmt::Write as _;
+use std::io::{BufRead, BufReader, Read};
+use std::path::Path;
+use std::process::{Command, Output, Stdio};
+
+/// Rows of a ramp and hold of the thesis body, 0.75 mm/s to 30 mm, for as long as `count` says.
+fn rows(count: usize, step_secs: f64, stiffness: f64) -> String {
+    let mut body = ModifiedKelvin::THESIS;
+    body.mu[2] *= stiffness;
+    let mut state = KelvinState::at_rest();
+    let mut text = String::new();
+    for i in 0..count {
+        let t = i as f64 * step_secs;
+        let depth = Depth((0.75 * t).min(30.0));
+        let dt = Seconds(if i == 0 { 0.0 } else { step_secs });
+        // A little ripple, so that there is something to be uncertain about.
+        let force = state.step(&body, depth, dt).0 + 1e-3 * (i as f64 * 2.4).sin();
+        writeln!(text, "{t},{},{force}", depth.0).expect("a string takes any text");
+    }
+    text
+}
+
+fn table(path: &Path, rows: &str) {
+    std::fs::write(path, format!("t_s,x_mm,F_N\n{rows}")).expect("a table is written");
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8(output.stdout.clone()).expect("output is text")
+}
+
+#[test]
+fn a_batch_prints_the_same_bytes_with_any_number_of_jobs() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir_all(at.join("lib/deep")).unwrap();
+    succeeded(&short_run(at, "lib/session", &[]));
+    for i in 0..6usize {
+        // The first is the longest, so that with several jobs it ends after others.
+        let rows = rows(900 * (6 - i).max(2), 0.1, 1.0 + 0.1 * i as f64);
+        table(&at.join(format!("lib/deep/t{i}.csv")), &rows);
+    }
+    table(&at.join("lib/ramp.csv"), &rows(300, 0.1, 1.0));
+    std::fs::write(at.join("lib/words.csv"), "t_s,x_mm,F_N\n0,0,zero\n").unwrap();
+    for kind in [&[][..], &["--json"]] {
+        let outputs = ["1", "2", "9"].map(|jobs| {
+            let args = [&["fit", "lib", "--jobs", jobs], kind].concat();
+            let output = palpate(at, &args);
+            assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
+            assert!(stderr(&output).contains("2 of 9 sources could not be fitted"));
+            stdout(&output)
+        });
+        assert_eq!(outputs[0], outputs[1]);
+        assert_eq!(outputs[0], outputs[2]);
+        let lines: Vec<&str> = outputs[0].lines().collect();
+        if kind.is_empty() {
+            assert_eq!(lines.len(), 10, "{}", outputs[0]);
+            assert!(lines[0].starts_with("source") && lines[0].contains("tau_sig (N·s/mm²)"));
+            assert!(lines[1].starts_with("lib/deep/t0.csv") && lines[1].contains("1.023"));
+            assert!(lines[9].contains("failed: ") && lines[9].contains("line 2"));
+            continue;
+        }
+        let objects: Vec<Value> = lines
+            .iter()
+            .map(|line| serde_json::from_str(line).unwrap())
+            .collect();
+        let sources: Vec<&str> = objects
+            .iter()
+            .filter_map(|object| object["source"].as_str())
+            .collect();
+        let expected: Vec<String> = (0..6)
+            .map(|i| format!("lib/deep/t{i}.csv"))
+            .chain(["lib/ramp.csv", "lib/session", "lib/words.csv"].map(String::from))
+            .collect();
+        assert_eq!(sources, expected);
+        // Each line is its own table: the stiffest one has the highest mu3.
+        let mu3 = |i: usize| objects[i]["parameters"][3]["value"].as_f64().unwrap();
+        for i in 0..6 {
+            let truth = ModifiedKelvin::THESIS.mu[2] * (1.0 + 0.1 * i as f64);
+            // The ripple of 1 mN under 15 N.
+            assert!((mu3(i) / truth - 1.0).abs() < 1e-3, "{i}: {}", mu3(i));
+        }
+        assert!(objects[6]["error"].as_str().unwrap().contains("tau_sig"));
+        assert_eq!(
+            (&objects[6]["exit"], &objects[8]["exit"]),
+            (&1.into(), &2.into())
+        );
+        assert_eq!(objects[9]["exit"], 1);
+    }
+}
+
+#[test]
+fn one_source_prints_what_the_window_shows() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
+    let output = palpate(at, &["fit", "t.csv"]);
+    succeeded(&output);
+    let fitted = fit_source(&at.join("t.csv"), None, &FitOptions::default()).unwrap();
+    let report = fitted.result.unwrap();
+    assert_eq!(stdout(&output).trim_end(), text::whole(&report));
+    assert!(stdout(&output).contains("tau_eps    1.0"));
+}
+
+#[test]
+fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
+    table(&at.join("ramp.csv"), &rows(300, 0.1, 1.0));
+    let output = palpate(at, &["fit", "t.csv", "--picture", "t.svg"]);
+    succeeded(&output);
+    let picture = std::fs::read_to_string(at.join("t.svg")).unwrap();
+    let first = stdout(&output).lines().nth(1).unwrap().to_owned();
+    let interval = first.split("95 % ").nth(1).unwrap();
+    assert!(
+        picture.starts_with("<svg") && picture.contains(interval),
+        "{interval}"
+    );
+
+    let again = palpate(at, &["fit", "t.csv", "--picture", "t.csv"]);
+    assert_eq!(again.status.code(), Some(2));
+    assert!(
+        stderr(&again).contains("exists already"),
+        "{}",
+        stderr(&again)
+    );
+
+    let refused = palpate(at, &["fit", "ramp.csv", "--picture", "ramp.svg"]);
+    assert_eq!(refused.status.code(), Some(1));
+    let picture = std::fs::read_to_string(at.join("ramp.svg")).unwrap();
+    let said = stderr(&refused);
+    let words: Vec<&str> = said.split_whitespace().skip(1).take(6).collect();
+    assert!(picture.contains(&words.join(" ")), "{said}");
+
+    let many = palpate(at, &["fit", "t.csv", "ramp.csv", "--picture", "x.svg"]);
+    assert_eq!(many.status.code(), Some(2));
+    let nowhere = palpate(at, &["fit", "t.csv", "--picture", "no/x.svg"]);
+    assert_eq!(nowhere.status.code(), Some(1), "{}", stderr(&nowhere));
+}
+
+#[test]
+fn tables_without_header_or_unit_are_read_when_told_how() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let rows = rows(900, 0.1, 1.0);
+    std::fs::write(at.join("bare.csv"), &rows).unwrap();
+    std::fs::write(at.join("time.csv"), format!("Time,x_mm,F_N\n{rows}")).unwrap();
+    let unnamed = palpate(at, &["fit", "bare.csv"]);
+    assert_eq!(unnamed.status.code(), Some(2));
+    assert!(
+        stderr(&unnamed).contains("--columns"),
+        "{}",
+        stderr(&unnamed)
+    );
+    let named = palpate(
+        at,
+        &["fit", "bare.csv", "--columns", "t_s,x_mm,F_N", "--json"],
+    );
+    succeeded(&named);
+    let time = palpate(at, &["fit", "time.csv", "--json"]);
+    succeeded(&time);
+    assert!(stderr(&time).contains("taken to be in seconds"));
+    assert_eq!(json(&named)["parameters"], json(&time)["parameters"]);
+    let wrong = palpate(at, &["fit", "bare.csv", "--columns", "t_s,x_mm"]);
+    assert_eq!(wrong.status.code(), Some(2));
+    assert!(
+        stderr(&wrong).contains("no column is a force"),
+        "{}",
+        stderr(&wrong)
+    );
+}
+
+#[test]
+fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::create_dir(at.join("many")).unwrap();
+    let rows = rows(9000, 0.01, 1.0);
+    for i in 0..40 {
+        table(&at.join(format!("many/t{i:02}.csv")), &rows);
+    }
+    let mut batch = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["fit", "many", "--jobs", "1", "--json"])
+        .current_dir(at)
+        .stdout(Stdio::piped())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let mut reader = BufReader::new(batch.stdout.take().unwrap());
+    let mut text = String::new();
+    reader.read_line(&mut text).unwrap();
+    let kill = format!("kill -INT {}", batch.id());
+    assert!(
+        Command::new("sh")
+            .args(["-c", &kill])
+            .status()
+            .unwrap()
+            .success()
+    );
+    reader.read_to_string(&mut text).unwrap();
+    assert_eq!(batch.wait().unwrap().code(), Some(1));
+    let objects: Vec<Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    // One line for every source, then why the command failed.
+    assert_eq!(objects.len(), 41);
+    let fitted = objects
+        .iter()
+        .filter(|object| object["r2"].is_f64())
+        .count();
+    let not_begun = |object: &&Value| {
+        let error = object["error"].as_str();
+        error.is_some_and(|error| error.starts_with("not begun"))
+    };
+    let left = objects.iter().filter(not_begun).count();
+    assert!(fitted >= 1 && left >= 1, "{fitted} {left}");
+    assert_eq!(fitted + left, 40);
+}
