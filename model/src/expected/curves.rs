@@ -3,7 +3,7 @@
 use super::information::{ExpectedError, intervals};
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
-use super::search::{Rig, allowed_speeds, shallowest_turn};
+use super::rig::{Rig, allowed_speeds, shallowest_turn};
 use crate::units::{Depth, MmPerS, Seconds};
 use crate::viscoelastic::ModifiedKelvin;
 use serde::Serialize;

@@ -7,13 +7,14 @@
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
 use super::response::{COLUMNS, NUISANCES, Press};
+use super::triangle::Triangle;
 use crate::units::{Newtons, Seconds};
 use crate::viscoelastic::{BodyError, ModifiedKelvin};
 use serde::Serialize;
 use thiserror::Error;
 
 /// Parameters of a body.
-const BODY: usize = COLUMNS - NUISANCES;
+pub(super) const BODY: usize = COLUMNS - NUISANCES;
 
 /// Names of the parameters of a body, in the order of [`Expected::parameters`].
 pub const PARAMETER_NAMES: [&str; BODY] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
@@ -23,14 +24,6 @@ pub const PARAMETER_UNITS: [&str; BODY] = ["s", "N/mm", "N/mm^2", "N/mm^3", "N*s
 
 /// The 97.5 % point of the normal distribution.
 const Z975: f64 = 1.959_963_984_540_054;
-
-/// A design with columns of unit length and a smallest singular value below the inverse of this
-/// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
-/// 1e4, a single ramp above 1e10.
-const CONDITION_MAX: f64 = 1e6;
-
-/// Parameters with at least this share of the largest entry belong to the blind combination.
-const NAMED_SHARE: f64 = 0.2;
 
 /// Nothing could be expected; the text says what to change.
 #[derive(Clone, Debug, PartialEq, Error)]
@@ -168,7 +161,9 @@ pub fn intervals(
         }
         sums.add_slow(&mut slow);
     }
-    let inverse = shared.inverse(&lengths.map(f64::sqrt))?;
+    let inverse = shared
+        .inverse(&lengths.map(f64::sqrt))
+        .map_err(|names| ExpectedError::Inseparable { names })?;
     let variances = variances(&inverse, &slow, noise);
     let values = [
         body.tau_eps,
@@ -285,107 +280,5 @@ impl PressSums {
                 }
             }
         }
-    }
-}
-
-/// Upper triangle of an orthogonal factorisation that takes one row at a time (Givens rotations;
-/// Golub & Van Loan, Matrix Computations, section 5.2.5).
-#[derive(Clone, Debug)]
-struct Triangle<const N: usize> {
-    r: [[f64; N]; N],
-}
-
-impl<const N: usize> Default for Triangle<N> {
-    fn default() -> Self {
-        Self { r: [[0.0; N]; N] }
-    }
-}
-
-impl<const N: usize> Triangle<N> {
-    fn push(&mut self, mut row: [f64; N]) {
-        for i in 0..N {
-            if row[i] == 0.0 {
-                continue;
-            }
-            let (a, b) = (self.r[i][i], row[i]);
-            let norm = a.hypot(b);
-            let (cos, sin) = (a / norm, b / norm);
-            self.r[i][i] = norm;
-            for (top, bottom) in self.r[i].iter_mut().zip(&mut row).skip(i + 1) {
-                (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
-            }
-        }
-    }
-
-    fn length_squared(&self, column: usize) -> f64 {
-        self.r.iter().map(|row| row[column].powi(2)).sum()
-    }
-}
-
-impl Triangle<BODY> {
-    /// The inverse, refused where columns of these lengths do not tell their parameters apart.
-    fn inverse(&self, lengths: &[f64; BODY]) -> Result<[[f64; BODY]; BODY], ExpectedError> {
-        let mut unit = self.r;
-        for row in &mut unit {
-            for (value, length) in row.iter_mut().zip(lengths) {
-                *value /= length;
-            }
-        }
-        let mut inverse = [[0.0; BODY]; BODY];
-        for column in 0..BODY {
-            for i in (0..=column).rev() {
-                let known: f64 = (i + 1..=column)
-                    .map(|j| unit[i][j] * inverse[j][column])
-                    .sum();
-                // A pivot smaller than its own rounding is that rounding.
-                let pivot = unit[i][i].max(f64::EPSILON);
-                inverse[i][column] = (f64::from(u8::from(i == column)) - known) / pivot;
-            }
-        }
-        let (condition, blind) = largest_singular(&inverse);
-        if condition.is_nan() || condition > CONDITION_MAX {
-            return Err(ExpectedError::Inseparable {
-                names: named(&blind),
-            });
-        }
-        for (row, length) in inverse.iter_mut().zip(lengths) {
-            row.iter_mut().for_each(|value| *value /= length);
-        }
-        Ok(inverse)
-    }
-}
-
-/// Largest singular value of a matrix and its left vector, by power iteration: what the inverse of a
-/// design enlarges most is what the design is blind to. Twenty steps leave nothing of the others
-/// where it matters, that is, where one value is far larger than the rest.
-fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
-    let mut vector = [1.0, 0.9, -0.8, 0.7, -0.6];
-    let mut value = 0.0;
-    for _ in 0..20 {
-        let across: [f64; BODY] =
-            std::array::from_fn(|k| (0..BODY).map(|i| matrix[i][k] * vector[i]).sum());
-        let back: [f64; BODY] =
-            std::array::from_fn(|i| (0..BODY).map(|k| matrix[i][k] * across[k]).sum());
-        let norm = back.iter().map(|value| value * value).sum::<f64>().sqrt();
-        let before = vector.iter().map(|value| value * value).sum::<f64>().sqrt();
-        value = (norm / before).sqrt();
-        vector = back.map(|value| value / norm);
-    }
-    (value, vector)
-}
-
-fn named(blind: &[f64; BODY]) -> String {
-    let largest = blind.iter().fold(0.0f64, |max, value| max.max(value.abs()));
-    let names: Vec<&str> = PARAMETER_NAMES
-        .into_iter()
-        .zip(blind)
-        .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
-        .map(|(name, _)| name)
-        .collect();
-    match names.as_slice() {
-        [one, other] => format!("{one} from {other}"),
-        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
-        [only] => format!("{only} from initial force and offset"),
-        _ => "the parameters".into(),
     }
 }

@@ -29,7 +29,9 @@ mod information;
 mod noise;
 mod protocol;
 mod response;
+mod rig;
 mod search;
+mod triangle;
 
 pub use curves::{Curve, Curves, curves};
 pub use information::{
@@ -37,4 +39,5 @@ pub use information::{
 };
 pub use noise::{Memory, Noise, Unknowns};
 pub use protocol::{Piece, Protocol};
-pub use search::{Family, Proposal, Rig, Target, shortest};
+pub use rig::Rig;
+pub use search::{Family, Proposal, Target, shortest};

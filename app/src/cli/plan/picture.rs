@@ -80,7 +80,7 @@ fn heading(report: &PlanReport) -> String {
         format!(" and {sd} mN over {} s", plain(memory.time.0))
     });
     format!(
-        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep",
+        "95 % interval of {} in percent: noise of {} mN{slow}, {} mm deep; dashed: wanted, dot: proposed",
         report.targets[0].parameter,
         digits(report.noise.white.0 * 1e3, 3),
         plain(report.rig.depth.0)

@@ -1,0 +1,140 @@
+//! A small orthogonal factorisation, and what its columns cannot tell apart.
+
+use super::information::{BODY, PARAMETER_NAMES};
+
+/// A design with columns of unit length and a smallest singular value below the inverse of this
+/// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
+/// 1e4, a single ramp above 1e10.
+const CONDITION_MAX: f64 = 1e6;
+
+/// Parameters with at least this share of the largest entry belong to the blind combination.
+const NAMED_SHARE: f64 = 0.2;
+
+/// Upper triangle of an orthogonal factorisation that takes one row at a time (Givens rotations;
+/// Golub & Van Loan, Matrix Computations, section 5.2.5).
+#[derive(Clone, Debug)]
+pub(super) struct Triangle<const N: usize> {
+    pub r: [[f64; N]; N],
+}
+
+impl<const N: usize> Default for Triangle<N> {
+    fn default() -> Self {
+        Self { r: [[0.0; N]; N] }
+    }
+}
+
+impl<const N: usize> Triangle<N> {
+    /// Rotates one row into the triangle.
+    pub fn push(&mut self, mut row: [f64; N]) {
+        for i in 0..N {
+            if row[i] == 0.0 {
+                continue;
+            }
+            let (a, b) = (self.r[i][i], row[i]);
+            let norm = a.hypot(b);
+            let (cos, sin) = (a / norm, b / norm);
+            self.r[i][i] = norm;
+            for (top, bottom) in self.r[i].iter_mut().zip(&mut row).skip(i + 1) {
+                (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
+            }
+        }
+    }
+
+    /// Of one column.
+    pub fn length_squared(&self, column: usize) -> f64 {
+        self.r.iter().map(|row| row[column].powi(2)).sum()
+    }
+}
+
+impl Triangle<BODY> {
+    /// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
+    pub fn inverse(&self, lengths: &[f64; BODY]) -> Result<[[f64; BODY]; BODY], String> {
+        let mut unit = self.r;
+        for row in &mut unit {
+            for (value, length) in row.iter_mut().zip(lengths) {
+                *value /= length;
+            }
+        }
+        let columns: [[f64; BODY]; BODY] = std::array::from_fn(|column| {
+            let mut solution = [0.0; BODY];
+            for i in (0..=column).rev() {
+                let known: f64 = (i + 1..=column).map(|j| unit[i][j] * solution[j]).sum();
+                // A pivot smaller than its own rounding is that rounding.
+                let pivot = unit[i][i].max(f64::EPSILON);
+                solution[i] = (f64::from(u8::from(i == column)) - known) / pivot;
+            }
+            solution
+        });
+        let inverse = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+        let (condition, blind) = largest_singular(&inverse);
+        if condition.is_nan() || condition > CONDITION_MAX {
+            return Err(named(&blind));
+        }
+        Ok(std::array::from_fn(|i| {
+            inverse[i].map(|value| value / lengths[i])
+        }))
+    }
+}
+
+/// Largest singular value of a matrix and its left vector, by power iteration: what the inverse of a
+/// design enlarges most is what the design is blind to. Twenty steps leave nothing of the others
+/// where it matters, that is, where one value is far larger than the rest.
+fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
+    let mut vector = [1.0, 0.9, -0.8, 0.7, -0.6];
+    let mut value = 0.0;
+    for _ in 0..20 {
+        let across: [f64; BODY] =
+            std::array::from_fn(|k| (0..BODY).map(|i| matrix[i][k] * vector[i]).sum());
+        let back: [f64; BODY] =
+            std::array::from_fn(|i| (0..BODY).map(|k| matrix[i][k] * across[k]).sum());
+        let norm = back.iter().map(|value| value * value).sum::<f64>().sqrt();
+        let before = vector.iter().map(|value| value * value).sum::<f64>().sqrt();
+        value = (norm / before).sqrt();
+        vector = back.map(|value| value / norm);
+    }
+    (value, vector)
+}
+
+fn named(blind: &[f64; BODY]) -> String {
+    let largest = blind.iter().fold(0.0f64, |max, value| max.max(value.abs()));
+    let names: Vec<&str> = PARAMETER_NAMES
+        .into_iter()
+        .zip(blind)
+        .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
+        .map(|(name, _)| name)
+        .collect();
+    match names.as_slice() {
+        [one, other] => format!("{one} from {other}"),
+        [rest @ .., last] if !rest.is_empty() => format!("{} and {last}", rest.join(", ")),
+        [only] => format!("{only} from initial force and offset"),
+        _ => "the parameters".into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_inverse_is_one_and_blindness_has_a_name() {
+        let mut triangle = Triangle::<BODY>::default();
+        let mut alike = Triangle::<BODY>::default();
+        for i in 0..50 {
+            let x = f64::from(i) * 0.02;
+            triangle.push([1.0, x, x * x, x.powi(3), (7.0 * x).sin()]);
+            alike.push([1.0, x, x * x, x.powi(3), -3.0 * x]);
+        }
+        let lengths =
+            |triangle: &Triangle<BODY>| std::array::from_fn(|k| triangle.length_squared(k).sqrt());
+        let inverse = triangle.inverse(&lengths(&triangle)).unwrap();
+        for (i, row) in triangle.r.iter().enumerate() {
+            for j in 0..BODY {
+                let product: f64 = (0..BODY).map(|k| row[k] * inverse[k][j]).sum();
+                let one = if i == j { 1.0 } else { 0.0 };
+                assert!((product - one).abs() < 1e-11, "{i} {j} {product}");
+            }
+        }
+        let blind = alike.inverse(&lengths(&alike)).unwrap_err();
+        assert_eq!(blind, "mu1 from tau_sig");
+    }
+}
