@@ -260,6 +260,11 @@ fn run_text(report: &RunReport) -> String {
     if let Some(live) = &report.live {
         lines.push("live fit:".into());
         lines.extend(crate::report::text::parameter_lines(&live.parameters));
+        let reasons = live
+            .verdicts
+            .iter()
+            .filter_map(|verdict| verdict.reason.as_ref());
+        lines.extend(reasons.map(|reason| format!("  {reason}")));
     }
     lines.join("\n")
 }

@@ -141,6 +141,8 @@ mod tests {
             r2: 0.999_123_4,
             rmse_n: 0.003_45,
             samples: 900,
+            censored: 0,
+            noise: None,
             warnings: vec!["beware".into()],
             findings: vec!["found".into()],
         };

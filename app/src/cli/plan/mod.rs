@@ -292,7 +292,17 @@ fn offer(proposal: Proposal, bench: &OpenRig, depth: Depth) -> Offer {
     };
     let runs: Option<Vec<(String, Preview)>> = presses
         .into_iter()
-        .map(|(speed, hold)| run_of(RampHold { speed, depth, hold }, bench))
+        .map(|(speed, hold)| {
+            run_of(
+                RampHold {
+                    speed,
+                    depth,
+                    hold,
+                    until: None,
+                },
+                bench,
+            )
+        })
         .collect();
     let (commands, previews): (Vec<String>, Vec<Preview>) =
         runs.unwrap_or_default().into_iter().unzip();
