@@ -100,22 +100,27 @@ fn run(arguments: &Arguments) -> Result<bool, String> {
     let is_pinned = pin_to_one_core();
     let records = Records::new(INTERVALS);
     let both = [&records.noiseless, &records.noisy];
+    // What runs now goes to stderr, the tables to stdout.
+    eprintln!("palpate ...");
     let [noiseless, noisy] = both.map(|samples| ours::cold_fit(samples, REPEATS));
     let palpate = [noiseless?, noisy?];
+    let live = ours::live(&records, [&palpate[0], &palpate[1]])?;
+    let profile = ours::profile_intervals(&records.noisy);
+    eprintln!("varpro ...");
+    let varpro = both.map(|samples| varpro_peer::fit(samples, TAU_START, 3));
+    eprintln!("scipy and lmfit ...");
+    let python = &arguments.python;
+    let peers = peers::run(python, &records, TAU_START, arguments.with_intervals);
+    eprintln!("series of sample counts ...");
     let report = Report {
         samples: records.noiseless.len(),
         is_pinned,
-        varpro: both.map(|samples| varpro_peer::fit(samples, TAU_START, 3)),
-        peers: peers::run(
-            &arguments.python,
-            &records,
-            TAU_START,
-            arguments.with_intervals,
-        ),
-        profile: ours::profile_intervals(&records.noisy),
-        live: ours::live(&records, [&palpate[0], &palpate[1]])?,
-        scaling: ours::scaling(arguments.largest)?,
         palpate,
+        varpro,
+        peers,
+        profile,
+        live,
+        scaling: ours::scaling(arguments.largest)?,
     };
     if let Some(path) = &arguments.json {
         let text = serde_json::to_string_pretty(&report).map_err(|err| err.to_string())?;

@@ -1,6 +1,7 @@
 //! The printed tables.
 
 use crate::Report;
+use crate::ours::Scaling;
 use crate::record::NOISE_N;
 use crate::result::Fit;
 
@@ -73,10 +74,15 @@ pub fn print(report: &Report) -> bool {
             seconds * 1e9 / *samples as f64
         );
     }
-    println!(
-        "cost goes as samples^{:.3}; from 1e5 samples on ^{:.3}",
-        report.scaling.exponent, report.scaling.exponent_large
-    );
+    let Scaling {
+        exponent,
+        exponent_large,
+        ..
+    } = report.scaling;
+    println!("cost goes as samples^{exponent:.3}");
+    if exponent_large.is_finite() {
+        println!("from 1e5 samples on as samples^{exponent_large:.3}");
+    }
     is_good
 }
 
@@ -87,7 +93,8 @@ fn error_title(which: usize) -> &'static str {
 /// One participant; false if it does not agree with palpate.
 fn line(name: &str, fit: &Fit, palpate: &Fit, which: usize) -> bool {
     let shown = [fit.error(), fit.difference(palpate)][which];
-    let is_wrong = !(fit.difference(palpate) <= AGREEMENT);
+    let difference = fit.difference(palpate);
+    let is_wrong = difference > AGREEMENT || difference.is_nan();
     let remark = if is_wrong {
         "  WRONG: parameters differ by more than 1e-6"
     } else {

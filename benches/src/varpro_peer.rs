@@ -14,7 +14,8 @@ use varpro::statistics::FitStatistics;
 /// Depth counts in its greatest value, 30 mm, so that the columns are of one size.
 const DEPTH_MM: f64 = 30.0;
 
-/// Columns of the modified Kelvin body and their derivatives by tau, cached for one tau.
+/// Columns of the modified Kelvin body and their derivatives by ln tau, cached for one tau. The solver
+/// sees ln tau: it knows no bounds, and with a negative tau its decomposition never ends.
 struct Kelvin {
     t: Vec<f64>,
     depth: Vec<f64>,
@@ -52,14 +53,14 @@ impl Kelvin {
                 let forcing = powers(x0, d, &weights.psi);
                 let by_r = powers(x0, d, &weights.psi_by_r);
                 let kept = 1.0 - weights.psi[0];
-                // d r / d tau.
-                let r_by_tau = -dt / (self.tau * self.tau);
+                // d r / d ln tau.
+                let r_by_log_tau = -dt / self.tau;
                 for k in 0..4 {
                     let (forcing, by_r) = match k {
                         3 => (forcing[0] * d / dt, by_r[0] * d / dt),
                         _ => (forcing[k], by_r[k]),
                     };
-                    slope[k] += r_by_tau * (by_r - kept * state[k]) - weights.psi[0] * slope[k];
+                    slope[k] += r_by_log_tau * (by_r - kept * state[k]) - weights.psi[0] * slope[k];
                     state[k] += forcing - weights.psi[0] * state[k];
                 }
             }
@@ -70,7 +71,7 @@ impl Kelvin {
                 slopes[(row, k)] = slope[k];
             }
             columns[(row, 4)] = decay;
-            slopes[(row, 4)] = decay * since / (self.tau * self.tau);
+            slopes[(row, 4)] = decay * since / self.tau;
             columns[(row, 5)] = 1.0;
         }
         (self.columns, self.slopes) = (columns, slopes);
@@ -126,15 +127,13 @@ impl SeparableNonlinearModel for Kelvin {
     }
 
     fn set_params(&mut self, parameters: DVector<f64>) -> Result<(), Infallible> {
-        if parameters[0] != self.tau {
-            self.tau = parameters[0];
-            self.evaluate();
-        }
+        self.tau = parameters[0].exp();
+        self.evaluate();
         Ok(())
     }
 
     fn params(&self) -> DVector<f64> {
-        DVector::from_element(1, self.tau)
+        DVector::from_element(1, self.tau.ln())
     }
 
     fn eval(&self) -> Result<DMatrix<f64>, Infallible> {
@@ -178,15 +177,15 @@ fn once(
     let statistics = FitStatistics::try_from(&result).map_err(|err| err.to_string())?;
     let linear = result.linear_coefficients().ok_or("no coefficients")?;
     let linear_variance = statistics.linear_coefficients_variance();
-    let tau_variance = statistics.nonlinear_parameters_variance()[0];
+    let log_tau_variance = statistics.nonlinear_parameters_variance()[0];
     let units = [1, 2, 3, 2].map(|power| DEPTH_MM.powi(power));
     let in_mm = |k: usize| linear[k] / units[k];
     let deviation = |k: usize| linear_variance[k].sqrt() / units[k];
-    let tau = result.nonlinear_parameters()[0];
+    let tau = result.nonlinear_parameters()[0].exp();
     Ok((
         [tau, in_mm(0), in_mm(1), in_mm(2), in_mm(3)],
         [
-            tau_variance.sqrt(),
+            tau * log_tau_variance.sqrt(),
             deviation(0),
             deviation(1),
             deviation(2),
