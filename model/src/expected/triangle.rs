@@ -128,8 +128,13 @@ mod tests {
             |triangle: &Triangle<BODY>| std::array::from_fn(|k| triangle.length_squared(k).sqrt());
         let inverse = triangle.inverse(&lengths(&triangle)).unwrap();
         for (i, row) in triangle.r.iter().enumerate() {
-            for j in 0..BODY {
-                let product: f64 = (0..BODY).map(|k| row[k] * inverse[k][j]).sum();
+            let mut products = [0.0; BODY];
+            for (share, line) in row.iter().zip(&inverse) {
+                for (product, value) in products.iter_mut().zip(line) {
+                    *product += share * value;
+                }
+            }
+            for (j, product) in products.iter().enumerate() {
                 let one = if i == j { 1.0 } else { 0.0 };
                 assert!((product - one).abs() < 1e-11, "{i} {j} {product}");
             }
