@@ -1,6 +1,6 @@
 //! What the exact fit leaves over, under the force and over the same time.
 
-use super::style::quiet;
+use super::style::{quiet, round_marks};
 use crate::theme::Tokens;
 use crate::workers::fit::ExactFit;
 use eframe::egui::{Ui, Vec2b};
@@ -12,6 +12,8 @@ pub fn residual_ui(ui: &mut Ui, exact: &ExactFit, shown: RangeInclusive<f64>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let plot = quiet(Plot::new("residual"), tokens)
         .y_axis_label("residual (mN)")
+        // Low as it is, it has room for three numbers.
+        .y_grid_spacer(|input| round_marks(input, 2.5))
         .show_x(false)
         .allow_drag(false)
         .auto_bounds(Vec2b::new(false, true));

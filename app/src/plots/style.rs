@@ -22,7 +22,8 @@ pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         .y_grid_spacer(|input| round_marks(input, STEPS_UP))
         .x_axis_formatter(|mark, _| mark_text(mark))
         .y_axis_formatter(|mark, _| mark_text(mark))
-        .y_axis_min_width(34.0)
+        // One width for all, so that plots above each other share their time axis.
+        .y_axis_min_width(46.0)
         .label_formatter(|hover| match hover {
             HoverPosition::NearDataPoint { position, .. } => {
                 Some(format!("{:.3}\n{:.4} N", position.x, position.y))
@@ -32,7 +33,7 @@ pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
-fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
+pub(super) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {

@@ -21,6 +21,7 @@ const LETTERS: usize = 120;
 #[must_use]
 pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> String {
     let modelled = report.predict(samples);
+    let span = span(samples);
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let columns = (RIGHT - LEFT) as usize;
     let pairs = || samples.iter().zip(&modelled);
@@ -39,13 +40,13 @@ pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> Str
         source,
         &format!("{}; {}", report.model, quality(report)),
     );
-    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], &[&measured, &fitted]);
+    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &[&measured, &fitted]);
     upper.axes(&mut svg, ["", "force (N)"], look());
     // Wide under narrow, so that both are seen where they agree.
-    upper.line(&mut svg, &measured, LIGHT.series, 3.0);
-    upper.line(&mut svg, &fitted, LIGHT.limit, 1.2);
+    upper.line(&mut svg, &measured, LIGHT.series, 2.6);
+    upper.line(&mut svg, &fitted, LIGHT.limit, 1.4);
     legend(&mut svg);
-    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], &[&residual]);
+    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], span, &[&residual]);
     lower.axes(&mut svg, ["time (s)", "residual (mN)"], look());
     lower.line(&mut svg, &residual, LIGHT.series, 1.0);
     let mut y = table(&mut svg, report, 580.0);
@@ -65,11 +66,19 @@ pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String
     );
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, source, "not fitted");
-    let panel = Panel::around([LEFT, 66.0, RIGHT, 360.0], &[&depth]);
+    let panel = Panel::around([LEFT, 66.0, RIGHT, 360.0], span(samples), &[&depth]);
     panel.axes(&mut svg, ["time (s)", "depth (mm)"], look());
     panel.line(&mut svg, &depth, LIGHT.series, 1.6);
     let y = sentence_lines(&mut svg, 434.0, Ink::plain(LIGHT.alarm_text), sentence);
     svg.finish(y, LIGHT.canvas, &format!("Refused fit of {source}"))
+}
+
+/// From the first sample to the last, in s. A refused record may have times out of order.
+fn span(samples: &[FitSample]) -> [f64; 2] {
+    let start = samples.first().map_or(0.0, |sample| sample.t.0);
+    let passed = samples.iter().map(|sample| sample.t.0 - start);
+    let last = passed.filter(|t| t.is_finite()).fold(0.0, f64::max);
+    [0.0, if last > 0.0 { last } else { 1.0 }]
 }
 
 fn look() -> Look {

@@ -121,27 +121,21 @@ pub struct Panel {
 }
 
 impl Panel {
-    /// A panel in which all of these points are seen.
-    pub fn around(place: [f64; 4], series: &[&[[f64; 2]]]) -> Self {
-        let range = |k: usize, margin: f64| {
-            let values = series.iter().flat_map(|points| points.iter());
-            let (low, high) = values
-                .map(|point| point[k])
-                .fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| {
-                    (low.min(value), high.max(value))
-                });
-            if low > high {
-                return [0.0, 1.0];
-            }
+    /// A panel for a range of x in which all of these points are seen.
+    pub fn around(place: [f64; 4], x: [f64; 2], series: &[&[[f64; 2]]]) -> Self {
+        const MARGIN: f64 = 0.05;
+        let values = series.iter().flat_map(|points| points.iter());
+        let (low, high) = values.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), point| {
+            (low.min(point[1]), high.max(point[1]))
+        });
+        let y = if low > high {
+            [0.0, 1.0]
+        } else {
             // A flat line still needs some height to be drawn in.
-            let span = (high - low).max(1e-6 * high.abs()).max(1e-12);
-            [low - margin * span, high + margin * span]
+            let height = (high - low).max(1e-6 * high.abs()).max(1e-12);
+            [low - MARGIN * height, high + MARGIN * height]
         };
-        Self {
-            place,
-            x: range(0, 0.0),
-            y: range(1, 0.05),
-        }
+        Self { place, x, y }
     }
 
     fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
@@ -269,9 +263,9 @@ mod tests {
         };
         assert_eq!(panel.at([5.0, 0.0]), [200.0, 60.0]);
         assert_eq!(panel.at([10.0, 1.0]), [300.0, 10.0]);
-        let nothing = Panel::around(panel.place, &[&[]]);
-        assert_eq!((nothing.x, nothing.y), ([0.0, 1.0], [0.0, 1.0]));
-        let flat = Panel::around(panel.place, &[&[[0.0, 3.0], [1.0, 3.0]]]);
+        let nothing = Panel::around(panel.place, [0.0, 1.0], &[&[]]);
+        assert_eq!(nothing.y, [0.0, 1.0]);
+        let flat = Panel::around(panel.place, [0.0, 1.0], &[&[[0.0, 3.0], [1.0, 3.0]]]);
         assert!(flat.at([0.5, 3.0]).iter().all(|number| number.is_finite()));
     }
 }
