@@ -269,6 +269,8 @@ fn every_sentence_of_a_report_is_on_the_screen() {
         r2: 0.99,
         rmse_n: 0.01,
         samples: 10,
+        censored: 0,
+        noise: None,
         warnings: vec!["the errors are too small".into()],
         findings: vec!["unstable from 5 to 8 mm".into()],
     };
