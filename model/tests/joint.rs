@@ -1,11 +1,5 @@
 //! Several records together, censored forces, and the intervals that need more than one pass.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail by panicking and say what they measured"
-)]
-
 mod support;
 
 use palpate_model::fit::{Bootstrap, FitError, FitOptions, FitSample, Fitted, fit, fit_joint};

@@ -5,12 +5,6 @@
 //! or 50 s, whichever is longer; 100 Hz, no noise. `PALPATE_RANDOM_BODIES=1000` draws a thousand
 //! bodies instead of sixty, the first sixty the same.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail by panicking and print the worst case"
-)]
-
 mod support;
 
 use palpate_model::fit::{FitOptions, fit};
