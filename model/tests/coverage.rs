@@ -75,9 +75,11 @@ fn intervals_cover_under_white_and_remembering_noise() {
                 "{name}: {shares:?}"
             );
         }
-        // The five agree with each other to about 0.6, so their mean varies less.
+        // The five agree with each other to about 0.6, so their mean varies less; many draws leave
+        // chance no say in it.
+        let chance = if draws < 500 { 0.7 * chance } else { 0.0 };
         assert!(
-            (92.0 - 0.7 * chance..=97.0 + 0.7 * chance).contains(&mean),
+            (92.0 - chance..=97.0 + chance).contains(&mean),
             "{name}: {mean}"
         );
     }

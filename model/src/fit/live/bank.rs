@@ -4,6 +4,7 @@
 //! and stored once for all of them. Nodes lie side by side in chunks: the same operation on eight
 //! neighbours is what a compiler turns into vector instructions on any machine.
 
+use crate::vectors::wide;
 use crate::viscoelastic::{NEGLIGIBLE, Pieces, psi_all};
 
 /// Relaxation times in the bank.
@@ -175,9 +176,15 @@ impl Bank {
 
     /// Takes the samples that wait.
     pub fn flush(&mut self) {
-        for chunk in &mut self.chunks {
-            chunk.take(&self.waiting);
-        }
+        let (chunks, waiting) = (&mut self.chunks, &self.waiting);
+        wide(
+            #[inline(always)]
+            || {
+                for chunk in chunks.iter_mut() {
+                    chunk.take(waiting);
+                }
+            },
+        );
         self.waiting.clear();
     }
 
@@ -219,6 +226,7 @@ impl Bank {
 }
 
 impl Chunk {
+    #[inline(always)]
     fn take(&mut self, pieces: &[Piece]) {
         let mut rows = [[[0.0; WIDTH]; BATCH]; FILTERED];
         for (slot, piece) in pieces.iter().enumerate() {
@@ -239,7 +247,7 @@ impl Chunk {
         }
     }
 
-    #[inline]
+    #[inline(always)]
     fn step(&mut self, piece: &Piece) {
         let [p0, p1, p2, p3] = &self.psi;
         let [q1, q2, q3, g, e] = &mut self.states;
@@ -265,7 +273,7 @@ impl Chunk {
     }
 
     /// Adds the products of a batch of rows.
-    #[inline]
+    #[inline(always)]
     fn fold(&mut self, rows: &[[Lane; BATCH]; FILTERED], pieces: &[Piece]) {
         let mut pairs = self.pairs.iter_mut();
         for i in 0..FILTERED {
@@ -284,7 +292,7 @@ impl Chunk {
     }
 }
 
-#[inline]
+#[inline(always)]
 fn add_products(sum: &mut Lane, a: &[Lane; BATCH], b: &[Lane; BATCH]) {
     let mut sums = *sum;
     for (a, b) in a.iter().zip(b) {
