@@ -79,6 +79,35 @@ pub fn fit_joint(
 }
 
 /// A finished fit that still has its records, for intervals that need more than one pass.
+///
+/// ```
+/// use palpate_model::fit::{Bootstrap, FitOptions, Fitted};
+/// # use palpate_model::fit::FitSample;
+/// # use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+/// # use palpate_model::{Depth, Newtons, Seconds};
+/// # let mut state = KelvinState::at_rest();
+/// # let samples: Vec<FitSample> = (0..900)
+/// #     .map(|i| {
+/// #         let t = f64::from(i) * 0.1;
+/// #         let depth = Depth((0.75 * t).min(30.0));
+/// #         let dt = Seconds(if i == 0 { 0.0 } else { 0.1 });
+/// #         let error = 0.02 * f64::from(i * i * 37 % 101 - 50) / 29.0;
+/// #         let force = Newtons(state.step(&ModifiedKelvin::THESIS, depth, dt).0 + error);
+/// #         FitSample { t: Seconds(t), depth, force, sigma: Newtons(0.02) }
+/// #     })
+/// #     .collect();
+/// // `samples` as in the example of `fit`, with some noise.
+/// let fitted = Fitted::of(&samples, &FitOptions::default())?;
+/// let report = fitted.report();
+/// let tau = report.parameter("tau_eps").and_then(|tau| tau.ci95);
+/// let profile = fitted.profile(0)?;
+/// let repeated = fitted.bootstrap(0, Bootstrap { seed: 1, repeats: 20 }, |_| ());
+/// for sentence in report.sentences() {
+///     assert!(!sentence.is_empty());
+/// }
+/// assert!(tau.is_some() && profile.len() == 7 && repeated.len() == 7);
+/// # Ok::<(), palpate_model::fit::FitError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Fitted<'a> {
     pub(super) system: System<'a>,
