@@ -79,7 +79,9 @@ pub fn print(report: &Report) -> bool {
         exponent_large,
         ..
     } = report.scaling;
-    println!("cost goes as samples^{exponent:.3}");
+    if exponent.is_finite() {
+        println!("cost goes as samples^{exponent:.3}");
+    }
     if exponent_large.is_finite() {
         println!("from 1e5 samples on as samples^{exponent_large:.3}");
     }
