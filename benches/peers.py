@@ -132,7 +132,7 @@ def main():
         params["f_offset"].set(value=0.0, vary=False)
         minimizer = lmfit.Minimizer(of, params)
         best = minimizer.minimize(method="leastsq")
-        seconds, found = timed(lambda: lmfit.conf_interval(minimizer, best, p_names=NAMES[:5], sigmas=[2]), 1)
+        seconds, found = timed(lambda: lmfit.conf_interval(minimizer, best, p_names=NAMES[:5], sigmas=[0.95]), 1)
         bounds = [[found[name][0][1], found[name][-1][1]] for name in NAMES[:5]]
         intervals = {"seconds": seconds, "bounds": bounds}
     json.dump({"python": sys.version.split()[0], "numpy": np.__version__, "scipy": scipy.__version__,

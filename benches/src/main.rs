@@ -39,7 +39,7 @@ struct Report {
     palpate: [Fit; 2],
     varpro: [Result<Fit, String>; 2],
     peers: Result<Peers, String>,
-    profile: Option<(f64, [[f64; 2]; 5])>,
+    profile: Result<(f64, [[f64; 2]; 5]), String>,
     live: ours::Live,
     scaling: ours::Scaling,
 }

@@ -3,9 +3,12 @@
 use crate::record::{self, Records};
 use crate::result::{BODY, Fit, median, seconds};
 use palpate_model::Depth;
-use palpate_model::fit::{FitOptions, FitReport, FitSample, LiveFit, fit};
+use palpate_model::fit::{FitOptions, FitReport, FitSample, Fitted, LiveFit, fit};
 use serde::Serialize;
 use std::hint::black_box;
+
+/// Repeats of the profile intervals.
+const PROFILE_REPEATS: usize = 7;
 
 /// A cold fit with covariance, seven free parameters, no guess: the median of `repeats`.
 pub fn cold_fit(samples: &[FitSample], repeats: usize) -> Result<Fit, String> {
@@ -27,13 +30,27 @@ pub fn cold_fit(samples: &[FitSample], repeats: usize) -> Result<Fit, String> {
     })
 }
 
-/// Five profile-likelihood intervals at two sigma, f0 and f_offset fixed at 0, as `conf_interval`
-/// of lmfit is asked for them: low and high of each parameter.
-///
-/// The one place to fill once the model crate has profile intervals; until then there are none and
-/// the table says so.
-pub fn profile_intervals(_samples: &[FitSample]) -> Option<(f64, [[f64; 2]; 5])> {
-    None
+/// Five 95 % profile intervals after a fit, f0 and f_offset fixed at 0, as `conf_interval` of lmfit
+/// is asked for them: median seconds without the fit, as lmfit's are, and low and high of each.
+pub fn profile_intervals(samples: &[FitSample]) -> Result<(f64, [[f64; 2]; 5]), String> {
+    let text = |err: palpate_model::fit::FitError| err.to_string();
+    let mut options = FitOptions::default();
+    options.fix("f0", 0.0).map_err(text)?;
+    options.fix("f_offset", 0.0).map_err(text)?;
+    let fitted = Fitted::of(samples, &options).map_err(text)?;
+    let mut times = Vec::new();
+    let mut bounds = [[f64::NAN; 2]; 5];
+    for _ in 0..PROFILE_REPEATS {
+        let (time, intervals) = seconds(|| black_box(&fitted).profile(0));
+        times.push(time);
+        let intervals = intervals.map_err(text)?;
+        for (slot, (name, _)) in bounds.iter_mut().zip(BODY) {
+            if let Some(found) = intervals.iter().find(|interval| interval.name == name) {
+                *slot = [found.low, found.high].map(|end| end.unwrap_or(f64::NAN));
+            }
+        }
+    }
+    Ok((median(&mut times), bounds))
 }
 
 /// What the live fit costs.

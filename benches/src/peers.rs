@@ -35,7 +35,7 @@ pub struct PeerFit {
     pub fit: Fit,
 }
 
-/// Five intervals at two sigma.
+/// Five 95 % intervals.
 #[derive(Debug, Serialize, Deserialize)]
 pub struct Intervals {
     /// Wall time of all five.

@@ -106,7 +106,7 @@ fn bias(svg: &mut String, body: Maxwell) -> Result<(), Box<dyn Error>> {
     axes.draw(
         svg,
         [
-            "Noiseless simulated records: fitted over true eta and k",
+            "Simulated records: fitted over true eta and k",
             "r = sampling interval / relaxation time",
             "",
         ],

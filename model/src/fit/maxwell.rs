@@ -221,3 +221,38 @@ fn report(samples: &[StrainSample], log_tau: f64, integrator: Integrator) -> Max
         samples: samples.len(),
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn slope_of_the_response_agrees_with_differences() {
+        // Uneven steps and a strain that turns, so that no term is a multiple of another.
+        let times = [0.0, 0.3, 0.35, 1.1, 1.2, 2.9, 3.0];
+        let samples = times.map(|t: f64| StrainSample {
+            t: Seconds(t),
+            strain: (2.0 * t).sin(),
+            stress: 0.0,
+        });
+        for integrator in [Integrator::Exact, Integrator::BackwardDifference] {
+            let at = |log_tau: f64| {
+                let mut rows = Vec::new();
+                walk(&samples, log_tau, integrator, |_, response, slope| {
+                    rows.push((response, slope));
+                });
+                rows
+            };
+            let (centre, h) = (-0.2, 1e-3);
+            let [far_below, below, here, above, far_above] =
+                [-2.0, -1.0, 0.0, 1.0, 2.0].map(|steps| at(centre + steps * h));
+            for i in 0..samples.len() {
+                let numerical = (far_below[i].0 - far_above[i].0 + 8.0 * (above[i].0 - below[i].0))
+                    / (12.0 * h);
+                // h^4 of truncation and a rounding of 1e-16 over h.
+                let miss = (here[i].1 - numerical).abs();
+                assert!(miss < 1e-11, "{integrator:?}, row {i}: {miss:e}");
+            }
+        }
+    }
+}
