@@ -254,6 +254,41 @@ fn a_record_shorter_than_its_unknowns_is_refused() {
     assert!(intervals(&BODY, &protocol, &noise, Unknowns::default()).is_err());
 }
 
+#[test]
+fn long_records_of_a_body_that_relaxes_between_samples_are_refused() {
+    let hasty = ModifiedKelvin {
+        tau_eps: 1e-3,
+        ..BODY
+    };
+    let noise = Noise::white(Newtons(0.02));
+    let refusal = intervals(&hasty, &thesis_protocol(1e3), &noise, Unknowns::default());
+    let text = refusal.unwrap_err().to_string();
+    assert!(text.contains("sample at 2000 per second"), "{text}");
+    // At a rate that resolves it, the plan is the same question on another scale of time: speeds
+    // and times in units of tau, with the viscous coefficient to match.
+    let (slow, quick) = (BODY, 0.01);
+    let scaled = ModifiedKelvin {
+        tau_eps: slow.tau_eps * quick,
+        tau_sig: slow.tau_sig * quick,
+        ..slow
+    };
+    let fast = Protocol::ramp_hold(
+        MmPerS(0.75 / quick),
+        DEPTH,
+        Seconds(50.0 * quick),
+        1e3 / quick,
+    );
+    let one = intervals(&scaled, &fast, &noise, Unknowns::default()).unwrap();
+    for (one, other) in
+        relative(&one)
+            .into_iter()
+            .zip(percents(&thesis_protocol(1e3), &noise, Unknowns::default()))
+    {
+        // The same numbers but for rounding through a condition of some hundreds.
+        assert!((one / other - 1.0).abs() < 1e-9, "{one} {other}");
+    }
+}
+
 /// Observed over expected variance of real fits, per parameter.
 fn variance_ratios(clean: &[FitSample], noise: &Noise, draws: u32) -> [f64; 5] {
     let rate = 1.0 / (clean[1].t.0 - clean[0].t.0);

@@ -5,8 +5,8 @@
 //! press says of the body alone, and the rows of all presses are triangularised together.
 
 use super::noise::{Noise, Unknowns};
-use super::protocol::Protocol;
-use super::response::{COLUMNS, NUISANCES, Press};
+use super::protocol::{Protocol, duration_of};
+use super::response::{COLUMNS, DIRECT_MAX, NUISANCES, Press, STEPS_PER_TAU_MIN};
 use super::triangle::Triangle;
 use crate::units::{Newtons, Seconds};
 use crate::viscoelastic::{BodyError, ModifiedKelvin};
@@ -39,6 +39,20 @@ pub enum ExpectedError {
         what: &'static str,
         /// Its value.
         value: f64,
+    },
+    /// A long record of a body that relaxes between samples.
+    #[error(
+        "a body that relaxes in {tau_s} s cannot be planned for at {sample_rate_hz} samples per second over {duration_s:.0} s; sample at {wanted_hz:.0} per second at least"
+    )]
+    TooCoarse {
+        /// Relaxation time.
+        tau_s: f64,
+        /// Samples per second asked for.
+        sample_rate_hz: f64,
+        /// Time of the press.
+        duration_s: f64,
+        /// Samples per second that would do.
+        wanted_hz: f64,
     },
     /// Different parameters give the same force on this path.
     #[error("this protocol cannot separate {names}; add a hold of about 5 tau or a second speed")]
@@ -144,6 +158,8 @@ pub fn intervals(
     let mut lengths = [0.0; BODY];
     let mut forces = [f64::INFINITY, f64::NEG_INFINITY];
     for pieces in &protocol.presses {
+        let secs = duration_of(pieces);
+        check_resolved(body.tau_eps, protocol.sample_rate_hz, secs)?;
         let press = Press {
             body,
             pieces,
@@ -190,6 +206,23 @@ pub fn intervals(
         force_min: Newtons(forces[0]),
         force_max: Newtons(forces[1]),
         duration: protocol.duration(),
+    })
+}
+
+/// Whether sums over a press of this length can be had.
+pub(super) fn check_resolved(
+    tau_s: f64,
+    sample_rate_hz: f64,
+    duration_s: f64,
+) -> Result<(), ExpectedError> {
+    if duration_s * sample_rate_hz <= DIRECT_MAX || tau_s * sample_rate_hz >= STEPS_PER_TAU_MIN {
+        return Ok(());
+    }
+    Err(ExpectedError::TooCoarse {
+        tau_s,
+        sample_rate_hz,
+        duration_s,
+        wanted_hz: (STEPS_PER_TAU_MIN / tau_s).ceil(),
     })
 }
 

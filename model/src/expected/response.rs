@@ -4,8 +4,10 @@
 //! last sample. Behind every corner of the path the force is a polynomial plus exponentials, so the
 //! stretch behind it is cut into blocks that double in length, the first as long as the shortest time
 //! constant, and each block gets Gauss's eight points (exact to degree 15). What remains (Euler and
-//! Maclaurin) is `(dt / tau)^2 / 6` of a sum, half of that in an interval. Where a body relaxes within
-//! [`STEPS_PER_TAU`] samples, or a press has fewer than [`DIRECT_MAX`], all samples are visited.
+//! Maclaurin) is `(dt / tau)^2 / 6` of a sum, half of that in an interval: 0.13 % with
+//! [`STEPS_PER_TAU`] samples to a relaxation time. With fewer of them, or in a press of fewer than
+//! [`DIRECT_MIN`], all samples are visited; but not more than [`DIRECT_MAX`], beyond which the
+//! integral has to do down to [`STEPS_PER_TAU_MIN`], with 2 %, and below that nothing is said.
 
 use super::noise::{Noise, Unknowns};
 use super::protocol::{Piece, duration_of};
@@ -16,10 +18,11 @@ pub(super) const COLUMNS: usize = 7;
 /// How many of them are not the body's.
 pub(super) const NUISANCES: usize = 2;
 
-/// Below so many samples every one is visited.
-const DIRECT_MAX: f64 = 1000.0;
-/// Below so many samples per relaxation time every one is visited.
+const DIRECT_MIN: f64 = 1000.0;
+/// Half a microsecond each, a thousand presses to a plan: so many are some seconds.
+pub(super) const DIRECT_MAX: f64 = 5000.0;
 const STEPS_PER_TAU: f64 = 8.0;
+pub(super) const STEPS_PER_TAU_MIN: f64 = 2.0;
 /// The formulas for slow noise divide by the difference of the two times; closer than this (relative)
 /// they are moved apart, which changes nothing that a plan could show.
 const TIMES_APART: f64 = 1e-3;
@@ -111,7 +114,8 @@ impl Press<'_> {
     /// Calls `take` at every point.
     pub fn visit(&self, take: impl FnMut(Point)) {
         let samples = duration_of(self.pieces) * self.sample_rate_hz;
-        if samples <= DIRECT_MAX || self.sample_rate_hz * self.body.tau_eps < STEPS_PER_TAU {
+        let is_coarse = self.body.tau_eps * self.sample_rate_hz < STEPS_PER_TAU;
+        if samples <= DIRECT_MIN || (is_coarse && samples <= DIRECT_MAX) {
             self.visit_samples(take);
         } else {
             self.visit_quadrature(take);

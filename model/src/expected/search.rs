@@ -4,7 +4,7 @@
 //! to what the rig makes. For each speed the shortest hold (or the smallest number of cycles) that
 //! reaches every target is found by bisection. No randomness: the same question, the same answer.
 
-use super::information::{Expected, ExpectedError, PARAMETER_NAMES, intervals};
+use super::information::{Expected, ExpectedError, PARAMETER_NAMES, check_resolved, intervals};
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
 use super::rig::{Rig, TURNS, allowed_speeds, pulls};
@@ -121,6 +121,7 @@ pub fn shortest(
 ) -> Result<Vec<Proposal>, ExpectedError> {
     noise.check()?;
     let speeds = allowed_speeds(&body.checked()?, rig)?;
+    check_resolved(body.tau_eps, rig.sample_rate_hz, rig.duration_max.0)?;
     let mut search = Search {
         body,
         noise,
