@@ -66,15 +66,24 @@ pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSourc
     }
     let session = Session::open(path)?;
     let samples = samples_of(&session)?;
+    let start = start_of(&session);
+    let mut notes = session.notes;
+    let censored = samples.iter().filter(|one| !one.is_measured()).count();
+    if censored > 0 {
+        notes.push(format!(
+            "{censored} samples count with their depth only: the converter was at the end of its range, or an interlock had tripped"
+        ));
+    }
     Ok(FitSource {
         samples,
-        start: start_of(&session),
-        notes: session.notes,
+        start,
+        notes,
     })
 }
 
 /// The ramp and hold of a session, each force weighted by what the signal's noise and the
-/// calibration curve's sensitivity make of it.
+/// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
+/// one at an end of the converter's range, and every one after an interlock.
 pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let bad = |detail: String| SourceError::Calibration { detail };
     let calibration: Calibration = serde_json::from_value(session.manifest.calibration.clone())
@@ -82,17 +91,25 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let curve = calibration.curve().map_err(|err| bad(err.to_string()))?;
     let noise = noise_of(session).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;
-    let rows = session.rows.iter().filter(|row| is_fitted(row));
+    let trusted = trusted_samples(session);
+    let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
+    let rows = session.rows.iter().enumerate();
     let mut first_tick = None;
     let samples: Vec<FitSample> = rows
-        .filter_map(|row| {
+        .filter(|(_, row)| is_fitted(row))
+        .filter_map(|(index, row)| {
             let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
             let first_tick = *first_tick.get_or_insert(row.tick);
+            let sigma = if is_known(index, row) {
+                curve.force_sigma(force, noise)
+            } else {
+                Newtons(f64::INFINITY)
+            };
             Some(FitSample {
                 t: Seconds((row.tick - first_tick) as f64 * tick_secs),
                 depth,
                 force,
-                sigma: curve.force_sigma(force, noise),
+                sigma,
             })
         })
         .collect();
@@ -107,6 +124,32 @@ fn is_fitted(row: &Row) -> bool {
     matches!(row.phase, Phase::Ramp | Phase::Hold) && row.force.is_some() && row.depth.is_some()
 }
 
+/// At the end of its range a converter says no more than that the signal is there or beyond.
+fn is_saturated(session: &Session, row: &Row) -> bool {
+    let ends = session.manifest.rig.adc;
+    let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
+    matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
+}
+
+/// How many samples came before an interlock tripped; all of them if none did.
+fn trusted_samples(session: &Session) -> usize {
+    let tripped = decisions(session)
+        .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
+    tripped.map_or(usize::MAX, |(after_sample, _)| after_sample as usize)
+}
+
+/// What the engine decided, each after so many samples.
+fn decisions(session: &Session) -> impl Iterator<Item = (u64, Effect)> {
+    session
+        .entries
+        .iter()
+        .filter(|entry| entry.kind == EntryKind::Decision)
+        .filter_map(|entry| {
+            let effect = serde_json::from_value(entry.body.clone()).ok()?;
+            Some((entry.after_sample, effect))
+        })
+}
+
 /// Session time of the first sample that a fit takes.
 fn start_of(session: &Session) -> Seconds {
     let first = session.rows.iter().find(|row| is_fitted(row));
@@ -115,15 +158,10 @@ fn start_of(session: &Session) -> Seconds {
 
 /// The signal's noise as the tare found it.
 fn noise_of(session: &Session) -> Option<Volts> {
-    session
-        .entries
-        .iter()
-        .filter(|entry| entry.kind == EntryKind::Decision)
-        .filter_map(|entry| serde_json::from_value(entry.body.clone()).ok())
-        .find_map(|effect| match effect {
-            Effect::Record(Record::Tared { noise, .. }) => Some(noise),
-            _ => None,
-        })
+    decisions(session).find_map(|(_, effect)| match effect {
+        Effect::Record(Record::Tared { noise, .. }) => Some(noise),
+        _ => None,
+    })
 }
 
 /// A table knows nothing of its noise: every sample counts alike.
@@ -136,4 +174,73 @@ fn samples_of_table(table: &palpate_sessions::import::Table) -> Vec<FitSample> {
             sigma: Newtons(1.0),
         })
         .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::fit::{FitOptions, fit};
+    use palpate_sessions::record::Entry;
+
+    fn recorded(name: &str) -> Session {
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        Session::open(&sessions.join(name)).unwrap()
+    }
+
+    #[test]
+    fn a_saturated_converter_does_not_bend_the_fit() {
+        let mut session = recorded("ramp-hold-lab");
+        let options = FitOptions::default();
+        let whole = fit(&samples_of(&session).unwrap(), &options).unwrap();
+        assert_eq!(whole.censored, 0);
+        let adc = session.manifest.rig.adc.unwrap();
+        let hold = session
+            .rows
+            .iter_mut()
+            .filter(|row| row.phase == Phase::Hold);
+        let mut expected = 0;
+        for (i, row) in hold.enumerate().filter(|(i, _)| i % 10 == 3) {
+            // Both ends of the range, each with the force that its count would be.
+            let is_low = i % 20 == 3;
+            row.counts = Some(if is_low {
+                adc.counts_min
+            } else {
+                adc.counts_max
+            });
+            row.force = Some(if is_low { -9.0 } else { 90.0 });
+            expected += 1;
+        }
+        let samples = samples_of(&session).unwrap();
+        let report = fit(&samples, &options).unwrap();
+        assert!(expected > 0 && report.censored == expected);
+        for (one, other) in whole.parameters.iter().zip(&report.parameters) {
+            let error = one.std_error.unwrap_or(0.0);
+            // A tenth of the hold is lost: the values move by a part of their errors.
+            let moved = (one.value - other.value).abs();
+            assert!(moved <= error, "{}: {moved} of {error}", one.name);
+        }
+    }
+
+    #[test]
+    fn forces_after_an_interlock_do_not_count() {
+        let mut session = recorded("ramp-hold-lab");
+        let samples = samples_of(&session).unwrap();
+        let first = session.rows.iter().position(is_fitted).unwrap();
+        let tripped = Effect::Record(Record::InterlockTripped {
+            interlock: crate::engine::Interlock::Signal,
+            reason: "on purpose".into(),
+        });
+        session.entries.push(Entry {
+            kind: EntryKind::Decision,
+            order: u64::MAX,
+            after_sample: (first + 100) as u64,
+            now: palpate_model::Nanos::ZERO,
+            body: serde_json::to_value(&tripped).unwrap(),
+        });
+        let censored = samples_of(&session).unwrap();
+        assert_eq!(censored.len(), samples.len());
+        let measured = censored.iter().take_while(|one| one.is_measured()).count();
+        assert_eq!(measured, 100);
+        assert!(censored[100..].iter().all(|one| !one.is_measured()));
+    }
 }

@@ -13,7 +13,7 @@ pub fn residual_ui(ui: &mut Ui, exact: &ExactFit, shown: RangeInclusive<f64>) {
     let plot = quiet(Plot::new("residual"), tokens)
         .y_axis_label("residual (mN)")
         // Low as it is, it has room for three numbers.
-        .y_grid_spacer(|input| round_marks(input, 2.5))
+        .y_grid_spacer(|input| round_marks(input, 4.0))
         .show_x(false)
         .allow_drag(false)
         .auto_bounds(Vec2b::new(false, true));

@@ -25,13 +25,15 @@ pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> Str
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let columns = (RIGHT - LEFT) as usize;
     let pairs = || samples.iter().zip(&modelled);
+    // A force that is not known leaves nothing over.
+    let known = || pairs().filter(|(one, _)| one.is_measured());
     let measured = thin(
-        samples.iter().map(|one| [one.t.0 - start, one.force.0]),
+        known().map(|(one, _)| [one.t.0 - start, one.force.0]),
         columns,
     );
     let fitted = thin(pairs().map(|(one, fit)| [one.t.0 - start, fit.0]), columns);
     let residual = thin(
-        pairs().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]),
+        known().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]),
         columns,
     );
     let mut svg = Svg::new(WIDTH);

@@ -144,8 +144,8 @@ fn exact(folder: &Path) -> Result<ExactFit, String> {
     let start = fitted.start.0;
     let pairs = || fitted.samples.iter().zip(&modelled);
     let curve = pairs().map(|(sample, fit)| [start + sample.t.0, fit.0]);
-    let residual =
-        pairs().map(|(sample, fit)| [start + sample.t.0, (sample.force.0 - fit.0) * 1e3]);
+    let known = pairs().filter(|(sample, _)| sample.is_measured());
+    let residual = known.map(|(sample, fit)| [start + sample.t.0, (sample.force.0 - fit.0) * 1e3]);
     Ok(ExactFit {
         curve: points(&thin(curve, COLUMNS)),
         residual: points(&thin(residual, COLUMNS)),
