@@ -31,11 +31,7 @@ pub(super) fn log_tau_range(samples: &[FitSample]) -> (f64, f64) {
 /// Scaled contact positions searched: within the record. Before its first depth a contact cannot be
 /// told from other elastic coefficients and an offset, since a shifted cubic is a cubic.
 pub(super) fn contact_range(record: &Record<'_>, depth_mm: f64) -> (f64, f64) {
-    let shallowest = record
-        .samples
-        .iter()
-        .map(|sample| sample.depth.0 / depth_mm)
-        .fold(f64::INFINITY, f64::min);
+    let shallowest = record.depths.0 / depth_mm;
     (shallowest, shallowest + CONTACT_SHARE_MAX)
 }
 

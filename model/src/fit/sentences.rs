@@ -82,11 +82,7 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
             noise.effective_samples
         ));
     }
-    let deepest = fitted.system.records[record]
-        .samples
-        .iter()
-        .map(|sample| sample.depth.0)
-        .fold(0.0, f64::max);
+    let (_, deepest) = fitted.system.records[record].depths;
     let contact = report.parameters[7].value;
     findings.extend(admissibility::sentences(&report.body(), deepest - contact));
     findings

@@ -47,6 +47,10 @@ pub(super) struct Record<'a> {
     pub thin: Thin,
     /// Samples whose force counts.
     pub measured: usize,
+    /// Depths reached, in mm.
+    pub depths: (f64, f64),
+    /// Weighted sum of squared forces.
+    pub force_square: f64,
 }
 
 /// One number the fit finds: a parameter of one record, or of all.
@@ -113,7 +117,7 @@ impl<'a> System<'a> {
         let own = options.free_count() - if several { count(&shared, &fixed) } else { 0 };
         let mut depth_mm = 0.0f64;
         for (name, samples) in records {
-            let measured = samples.iter().filter(|sample| sample.is_measured()).count();
+            let measured = measured(samples);
             if measured < own.max(2) {
                 let reason = FitError::TooFewSamples {
                     samples: measured,
@@ -122,9 +126,12 @@ impl<'a> System<'a> {
                 return Err(named(name, reason));
             }
             check_samples(samples).map_err(|reason| named(name, reason))?;
-            let scale =
-                depth_scale(samples, fixed[CONTACT]).map_err(|reason| named(name, reason))?;
-            depth_mm = depth_mm.max(scale);
+            let (shallowest, deepest) = depths(samples);
+            let contact = fixed[CONTACT].unwrap_or(shallowest);
+            if deepest <= contact {
+                return Err(named(name, FitError::NeverInTissue { deepest, contact }));
+            }
+            depth_mm = depth_mm.max(deepest - contact);
         }
         let sigma_scale = records
             .iter()
@@ -137,7 +144,9 @@ impl<'a> System<'a> {
                 name,
                 samples,
                 thin: Thin::new(samples, depth_mm, sigma_scale),
-                measured: samples.iter().filter(|sample| sample.is_measured()).count(),
+                measured: measured(samples),
+                depths: depths(samples),
+                force_square: force_square(samples, sigma_scale),
             })
             .collect();
         let unknowns = unknowns(&fixed, &shared, records.len());
@@ -389,11 +398,7 @@ impl<'a> System<'a> {
 
     /// Weighted sum of squared forces.
     pub fn force_square(&self) -> f64 {
-        let samples = self.records.iter().flat_map(|record| record.samples);
-        samples
-            .filter(|sample| sample.is_measured())
-            .map(|sample| (sample.force.0 * self.weight(sample)).powi(2))
-            .sum()
+        self.records.iter().map(|record| record.force_square).sum()
     }
 
     /// How many outer parameters a record has.
@@ -642,13 +647,22 @@ fn unknowns(fixed: &[Option<f64>; 8], shared: &[bool; 8], records: usize) -> Vec
         .collect()
 }
 
-fn depth_scale(samples: &[FitSample], contact: Option<f64>) -> Result<f64, FitError> {
-    let depths = || samples.iter().map(|sample| sample.depth.0);
-    let deepest = depths().fold(f64::NEG_INFINITY, f64::max);
-    let contact = contact.unwrap_or_else(|| depths().fold(f64::INFINITY, f64::min));
-    if deepest > contact {
-        Ok(deepest - contact)
-    } else {
-        Err(FitError::NeverInTissue { deepest, contact })
-    }
+fn measured(samples: &[FitSample]) -> usize {
+    samples.iter().filter(|sample| sample.is_measured()).count()
+}
+
+/// Shallowest and deepest sample in mm.
+fn depths(samples: &[FitSample]) -> (f64, f64) {
+    let outside = (f64::INFINITY, f64::NEG_INFINITY);
+    samples.iter().fold(outside, |(low, high), sample| {
+        (low.min(sample.depth.0), high.max(sample.depth.0))
+    })
+}
+
+fn force_square(samples: &[FitSample], sigma_scale: f64) -> f64 {
+    samples
+        .iter()
+        .filter(|sample| sample.is_measured())
+        .map(|sample| (sample.force.0 * sigma_scale / sample.sigma.0).powi(2))
+        .sum()
 }

@@ -108,16 +108,22 @@ fn reduce(r: &mut [f64], width: usize, block: &mut [Lane]) {
     }
 }
 
-/// Eight partial sums, so that the additions do not wait for each other.
+/// Thirty-two partial sums, so that the additions do not wait for each other.
 #[inline(always)]
 fn dot(a: &Lane, b: &Lane) -> f64 {
-    let mut sums = [0.0; 8];
-    for (a, b) in a.chunks_exact(8).zip(b.chunks_exact(8)) {
-        for (sum, (a, b)) in sums.iter_mut().zip(a.iter().zip(b)) {
-            *sum += a * b;
+    const PARTS: usize = LANES / 2;
+    let mut sums = [0.0; PARTS];
+    for i in 0..PARTS {
+        sums[i] = a[i] * b[i] + a[i + PARTS] * b[i + PARTS];
+    }
+    let mut width = PARTS;
+    while width > 1 {
+        width /= 2;
+        for i in 0..width {
+            sums[i] += sums[i + width];
         }
     }
-    (sums[0] + sums[4]) + (sums[1] + sums[5]) + ((sums[2] + sums[6]) + (sums[3] + sums[7]))
+    sums[0]
 }
 
 /// A finished triangle whose last column is the measured force.
