@@ -1,6 +1,8 @@
 //! `palpate fit`: the force model fitted to a session or a table, or to folders full of them.
 
 mod batch;
+mod intervals;
+mod joint;
 mod sources;
 
 use super::Failure;
@@ -8,6 +10,7 @@ use super::output::Output;
 use crate::report::{picture, text};
 use crate::workers::fit::{Fitted, fit_source};
 use clap::Args;
+use intervals::Intervals;
 use palpate_model::fit::{FitOptions, FitReport};
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
@@ -33,6 +36,19 @@ pub struct FitArgs {
     /// Draw the fit, or why there is none, as a new SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
+    /// Fit all sources together with these parameters the same in all, as in tau_eps,mu1;
+    /// body stands for the five of the tissue
+    #[arg(long, value_name = "NAMES", conflicts_with_all = ["picture", "profile", "bootstrap"])]
+    share: Option<String>,
+    /// Add 95 % intervals from the profile likelihood
+    #[arg(long)]
+    profile: bool,
+    /// Add 95 % intervals from this many fits to residuals shuffled in blocks
+    #[arg(long, value_name = "N")]
+    bootstrap: Option<usize>,
+    /// Seed of the bootstrap, 1 without it
+    #[arg(long, value_name = "SEED")]
+    seed: Option<u64>,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -57,6 +73,8 @@ impl Recipe {
 struct FitOutput<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
+    #[serde(flatten)]
+    intervals: &'a Intervals,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -67,14 +85,18 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         options: options(args)?,
         columns: columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?,
     };
+    intervals::check(args)?;
+    if let Some(shared) = &args.share {
+        return joint::run(&args.sources, shared, &recipe, output);
+    }
     if let [source] = args.sources.as_slice()
         && !sources::is_collection(source)
     {
-        return one(source, &recipe, args.picture.as_deref(), output);
+        return one(source, &recipe, args, output);
     }
-    if args.picture.is_some() {
+    if args.picture.is_some() || args.profile || args.bootstrap.is_some() {
         return Err(Failure::usage(
-            "--picture draws one fit; name a single session or table",
+            "--picture, --profile and --bootstrap are for one fit; name a single session or table",
         ));
     }
     let found = sources::find(&args.sources)?;
@@ -82,7 +104,8 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     batch::run(&found, jobs.map_or(1, NonZeroUsize::get), &recipe, output)
 }
 
-fn one(source: &Path, recipe: &Recipe, to: Option<&Path>, output: &Output) -> Result<(), Failure> {
+fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
+    let to = args.picture.as_deref();
     if let Some(to) = to.filter(|to| to.exists()) {
         return Err(Failure::usage(format!(
             "{} exists already; give the picture another name",
@@ -112,11 +135,17 @@ fn one(source: &Path, recipe: &Recipe, to: Option<&Path>, output: &Output) -> Re
         .result
         .map_err(|err| Failure::failed(format!("{err}, in {name}")))?;
     super::last_fit::remember(&report, source, output);
+    let intervals = Intervals::of(args, &fitted.samples, &recipe.options, output)?;
     let object = FitOutput {
         report: &report,
+        intervals: &intervals,
         seconds: fitted.seconds,
     };
-    output.result(&object, || text::whole(&report));
+    output.result(&object, || {
+        let mut lines = vec![text::whole(&report)];
+        lines.extend(intervals.lines(&report));
+        lines.join("\n")
+    });
     Ok(())
 }
 

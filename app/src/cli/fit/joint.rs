@@ -1,0 +1,113 @@
+//! Several sources fitted together, with some parameters the same in all.
+
+use super::super::{Failure, output::Output};
+use super::{Recipe, sources};
+use crate::report::text;
+use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
+use palpate_protocols::analysis;
+use palpate_protocols::runner::Stopwatch;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// The five parameters of the tissue, which `--share body` stands for.
+const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
+
+#[derive(Serialize)]
+struct JointOutput<'a> {
+    #[serde(flatten)]
+    report: &'a JointReport,
+    /// The fit alone, without reading.
+    seconds: f64,
+}
+
+/// Fits all sources together; `shared` is a list of names with commas.
+pub(super) fn run(
+    given: &[PathBuf],
+    shared: &str,
+    recipe: &Recipe,
+    output: &Output,
+) -> Result<(), Failure> {
+    let found = sources::find(given)?;
+    if found.len() < 2 {
+        return Err(Failure::usage(
+            "--share needs at least two recordings; name them all, or a folder of them",
+        ));
+    }
+    let shared = names(shared);
+    let mut records: Vec<(String, Vec<FitSample>)> = Vec::with_capacity(found.len());
+    for path in &found {
+        let source = analysis::read_named(path, recipe.columns.as_ref())
+            .map_err(super::super::source_failure)?;
+        let name = path.display().to_string();
+        for note in &source.notes {
+            output.note(&format!("{name}: {note}"));
+        }
+        records.push((name, source.samples));
+    }
+    let borrowed: Vec<(&str, &[FitSample])> = records
+        .iter()
+        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
+        .collect();
+    let watch = Stopwatch::start();
+    let report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {
+        use palpate_model::fit::FitError::{NotShareable, UnknownParameter};
+        match err {
+            NotShareable { .. } | UnknownParameter { .. } => Failure::usage(err),
+            _ => Failure::failed(err),
+        }
+    })?;
+    let seconds = watch.seconds();
+    let object = JointOutput {
+        report: &report,
+        seconds,
+    };
+    output.result(&object, || whole(&report));
+    Ok(())
+}
+
+fn names(shared: &str) -> Vec<&str> {
+    shared
+        .split(',')
+        .map(str::trim)
+        .flat_map(|name| match name {
+            "body" => BODY.to_vec(),
+            name => vec![name],
+        })
+        .collect()
+}
+
+/// What is shared once, then every record with what is its own.
+fn whole(report: &JointReport) -> String {
+    let is_shared = |parameter: &Parameter| report.shared.contains(&parameter.name);
+    let part = |named: &NamedReport, wanted: bool| -> Vec<String> {
+        let chosen: Vec<Parameter> = named
+            .report
+            .parameters
+            .iter()
+            .filter(|parameter| is_shared(parameter) == wanted)
+            .cloned()
+            .collect();
+        text::parameter_lines(&chosen)
+    };
+    let mut lines = Vec::new();
+    if let Some(first) = report.records.first() {
+        lines.push(format!(
+            "{}, {} records together",
+            first.report.model,
+            report.records.len()
+        ));
+        lines.extend(part(first, true));
+    }
+    for named in &report.records {
+        lines.push(named.record.clone());
+        lines.extend(part(named, false));
+        lines.push(format!("  {}", text::quality(&named.report)));
+        lines.extend(
+            named
+                .report
+                .sentences()
+                .map(|sentence| format!("  - {sentence}")),
+        );
+    }
+    lines.join("\n")
+}
