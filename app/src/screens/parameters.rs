@@ -3,7 +3,7 @@
 use crate::report::text::{ParameterText, typeset};
 use crate::theme::Tokens;
 use eframe::egui::{Align, Layout, RichText, Ui, vec2};
-use palpate_model::fit::Parameter;
+use palpate_model::fit::{LiveEstimate, Parameter};
 use palpate_model::rig::Phase;
 use palpate_protocols::runner::RunView;
 
@@ -31,12 +31,15 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
                 name,
                 parameter.map_or(unit, |known| &known.unit),
                 parameter,
+                live.and_then(|live| reason(live, name)),
             );
         }
     });
-    let remark = match run {
-        None => Some("parameters appear during the ramp".to_string()),
-        Some(run) => remark(run.phase, found),
+    let blind = live.and_then(|live| SHOWN.iter().find_map(|(name, _)| reason(live, name)));
+    let remark = match (run, blind) {
+        (None, _) => Some("parameters appear during the ramp".to_string()),
+        (Some(_), Some(reason)) => Some(reason.to_owned()),
+        (Some(run), None) => remark(run.phase, found),
     };
     if let Some(live) = live {
         let text = format!(
@@ -60,7 +63,22 @@ pub(super) fn tight(ui: &mut Ui, rows: impl FnOnce(&mut Ui)) {
     });
 }
 
-fn row_ui(ui: &mut Ui, name: &str, unit: &str, parameter: Option<&Parameter>) {
+/// What the live fit says of a parameter that it cannot identify yet.
+fn reason<'a>(live: &'a LiveEstimate, name: &str) -> Option<&'a str> {
+    let verdict = live
+        .verdicts
+        .iter()
+        .find(|verdict| verdict.parameter == name)?;
+    verdict.reason.as_deref()
+}
+
+fn row_ui(
+    ui: &mut Ui,
+    name: &str,
+    unit: &str,
+    parameter: Option<&Parameter>,
+    reason: Option<&str>,
+) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         cell(ui, 54.0, |ui| {
@@ -73,7 +91,10 @@ fn row_ui(ui: &mut Ui, name: &str, unit: &str, parameter: Option<&Parameter>) {
             } else {
                 tokens.text_quiet
             };
-            ui.label(RichText::new(text).monospace().color(ink));
+            let label = ui.label(RichText::new(text).monospace().color(ink));
+            if let Some(reason) = reason {
+                label.on_hover_text(reason);
+            }
         });
         let unit = typeset(unit);
         ui.label(RichText::new(unit).color(tokens.text_quiet).small());

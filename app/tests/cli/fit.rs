@@ -226,3 +226,88 @@ fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
     assert!(fitted >= 1 && left >= 1, "{fitted} {left}");
     assert_eq!(fitted + left, 40);
 }
+
+#[test]
+fn recordings_are_fitted_together_and_say_what_they_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(&at.join("a.csv"), &rows(900, 0.1, 1.0));
+    table(&at.join("b.csv"), &rows(600, 0.1, 1.2));
+    let joint = palpate(
+        at,
+        &[
+            "fit",
+            "a.csv",
+            "b.csv",
+            "--share",
+            "tau_eps,tau_sig",
+            "--json",
+        ],
+    );
+    succeeded(&joint);
+    let object = json(&joint);
+    assert_eq!(object["shared"], serde_json::json!(["tau_eps", "tau_sig"]));
+    let value = |record: usize, parameter: usize| {
+        object["records"][record]["report"]["parameters"][parameter]["value"]
+            .as_f64()
+            .unwrap()
+    };
+    assert_eq!(value(0, 0), value(1, 0));
+    // The second specimen is a fifth stiffer in its cubic term, and told so.
+    assert!((value(1, 3) / value(0, 3) - 1.2).abs() < 0.01);
+    let text = stdout(&palpate(at, &["fit", "a.csv", "b.csv", "--share", "body"]));
+    assert!(text.contains("2 records together"), "{text}");
+    assert_eq!(text.matches("tau_eps ").count(), 1, "{text}");
+    for (arguments, words) in [
+        (
+            &["fit", "a.csv", "b.csv", "--share", "f0"][..],
+            "cannot be shared",
+        ),
+        (&["fit", "a.csv", "b.csv", "--share", "mu9"], "'mu9'"),
+        (&["fit", "a.csv", "--share", "body"], "at least two"),
+        (
+            &["fit", "a.csv", "--seed", "3"],
+            "--seed is for --bootstrap",
+        ),
+        (&["fit", "a.csv", "--bootstrap", "3"], "too few"),
+        (&["fit", "a.csv", "b.csv", "--profile"], "are for one fit"),
+    ] {
+        let refused = palpate(at, arguments);
+        assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+}
+
+#[test]
+fn more_intervals_come_on_request_and_repeat_with_their_seed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(&at.join("a.csv"), &rows(900, 0.1, 1.0));
+    let asked = [
+        "fit",
+        "a.csv",
+        "--profile",
+        "--bootstrap",
+        "50",
+        "--seed",
+        "4",
+        "--json",
+    ];
+    let (first, second) = (json(&palpate(at, &asked)), json(&palpate(at, &asked)));
+    assert_eq!(first["bootstrap"], second["bootstrap"]);
+    assert_eq!(first["bootstrap_seed"], 4);
+    assert_eq!(first["profile"].as_array().unwrap().len(), 7);
+    for (profile, parameter) in first["profile"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .zip(first["parameters"].as_array().unwrap())
+    {
+        let value = parameter["value"].as_f64().unwrap();
+        assert!(profile["low"].as_f64().unwrap() < value);
+        assert!(value < profile["high"].as_f64().unwrap());
+    }
+    let text = stdout(&palpate(at, &asked[..7]));
+    assert!(text.contains("95 % from the profile likelihood"), "{text}");
+    assert!(text.contains("95 % from the bootstrap, seed 4"), "{text}");
+}
