@@ -53,8 +53,8 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
         if is_long || noise.effective_samples < EFFECTIVE_MIN * unknowns {
             warnings.push(format!(
                 "the residuals have a long memory: this body does not describe the record to within \
-                 its noise, and intervals from about {:.0} independent samples are rough",
-                noise.effective_samples
+                 its noise, and intervals from about {} are rough",
+                independent(noise.effective_samples)
             ));
         }
     }
@@ -75,17 +75,25 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
     {
         findings.push(format!(
             "the residuals have memory: {:.0} % of their variance lasts about {}; {} samples tell as \
-             much as {:.0} independent ones, and the intervals allow for it",
+             much as {}, and the intervals allow for it",
             100.0 * noise.slow_share,
             span(time),
             report.samples,
-            noise.effective_samples
+            independent(noise.effective_samples)
         ));
     }
     let (_, deepest) = fitted.system.records[record].depths;
     let contact = report.parameters[7].value;
     findings.extend(admissibility::sentences(&report.body(), deepest - contact));
     findings
+}
+
+fn independent(samples: f64) -> String {
+    if samples < 1.5 {
+        "one independent sample".to_owned()
+    } else {
+        format!("{samples:.0} independent samples")
+    }
 }
 
 /// A time in words of its size.
