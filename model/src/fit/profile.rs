@@ -15,8 +15,8 @@ use super::system::{Outer, Point};
 use super::uncertainty::{Error, Uncertainty};
 use serde::{Deserialize, Serialize};
 
-/// Relaxation times evaluated; polynomials of degree ten over four standard errors each way.
-const NODES: usize = 11;
+/// Relaxation times evaluated; polynomials of degree eight over some standard errors each way.
+const NODES: usize = 9;
 /// The first range, in half-widths of the symmetric interval.
 const REACH: f64 = 1.3;
 /// Times the range is widened before an end counts as open.
