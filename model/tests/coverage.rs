@@ -24,13 +24,16 @@ const TRUTH: [(&str, f64); 5] = [
 ];
 
 /// Slow noise in N, its memory in s, white noise in N; the sum of squares is always 0.02^2.
-const NOISES: [(&str, (f64, f64, f64)); 5] = [
+const NOISES: [(&str, (f64, f64, f64)); 6] = [
     ("white", (0.0, 1.0, 0.02)),
     ("0.05 s", (0.02, 0.05, 0.0)),
     ("0.5 s", (0.02, 0.5, 0.0)),
     // 0.3 of the variance is white.
     ("0.05 s and white", (0.016_733_2, 0.05, 0.010_954_5)),
     ("0.5 s and white", (0.016_733_2, 0.5, 0.010_954_5)),
+    // Half a percent of the variance remembers: invisible among neighbouring samples, and still half
+    // of what a mean over a quarter of a second varies by.
+    ("0.5 s far under white", (0.0015, 0.5, 0.019_944)),
 ];
 
 fn draws() -> u64 {
