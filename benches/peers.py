@@ -53,6 +53,22 @@ class Model:
         ]
         self.rate = d / self.h
 
+    def force_by_column(self, p):
+        """The same model as most would write it: filter every column, then combine."""
+        tau, mu1, mu2, mu3, tau_sig, f0, f_offset = p
+        if tau <= 0:
+            return np.full(len(self.t), 1e6)
+        r = self.h / tau
+        weights = psi(r)
+        first, second, third = (sum(w * part for w, part in zip(weights, parts)) for parts in self.parts)
+
+        def filtered(drive):
+            return np.concatenate(([0.0], lfilter([1.0], [1.0, -math.exp(-r)], drive)))
+
+        columns = np.stack([filtered(first), filtered(second), filtered(third),
+                            filtered(self.rate * first), np.exp(-self.t / tau), np.ones(len(self.t))], axis=1)
+        return columns @ np.array([mu1, mu2, mu3, tau_sig, f0, f_offset])
+
     def force(self, p):
         tau, mu1, mu2, mu3, tau_sig, f0, f_offset = p
         if tau <= 0:
@@ -124,6 +140,13 @@ def main():
             params.add(name, value=value, min=1e-3 if name == "tau_eps" else -np.inf)
         seconds, result = timed(lambda: lmfit.minimize(of, params, method="leastsq"))
         fits.append(entry("lmfit leastsq", record, seconds, [result.params[n].value for n in NAMES],
+                          [result.params[n].stderr or math.nan for n in NAMES]))
+
+        def by_column(params):
+            return model.force_by_column([params[name].value for name in NAMES]) - force
+
+        seconds, result = timed(lambda: lmfit.minimize(by_column, params, method="leastsq"))
+        fits.append(entry("lmfit, by column", record, seconds, [result.params[n].value for n in NAMES],
                           [result.params[n].stderr or math.nan for n in NAMES]))
     intervals = None
     if "--skip-intervals" not in sys.argv:

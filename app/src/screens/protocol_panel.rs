@@ -51,12 +51,7 @@ fn fields_ui(
     quantity_ui(ui, "speed", "mm/s", &mut form.speed);
     quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
     quantity_ui(ui, "hold", "s", &mut form.hold);
-    quantity_ui(
-        ui,
-        "end at",
-        "% tau interval; empty: whole hold",
-        &mut form.until,
-    );
+    quantity_ui(ui, "end at", "% of tau known", &mut form.until);
     folder_ui(ui, form, facts, commands);
 }
 

@@ -15,8 +15,12 @@ use super::system::{Outer, Point};
 use super::uncertainty::{Error, Uncertainty};
 use serde::{Deserialize, Serialize};
 
-/// Relaxation times evaluated; polynomials of degree eight over some standard errors each way.
-const NODES: usize = 9;
+/// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
+/// leave less than a thousandth of an interval.
+const NODES: usize = 7;
+/// And over a wider one.
+const NODES_WIDE: usize = 15;
+const NARROW: f64 = 0.5;
 /// The first range, in half-widths of the symmetric interval.
 const REACH: f64 = 1.3;
 /// Times the range is widened before an end counts as open.
@@ -261,9 +265,14 @@ impl Profile {
 
 /// Chebyshev points of the second kind from one end to the other.
 fn chebyshev([from, to]: [f64; 2]) -> Vec<f64> {
-    (0..NODES)
+    let count = if to - from < NARROW {
+        NODES
+    } else {
+        NODES_WIDE
+    };
+    (0..count)
         .map(|i| {
-            let angle = std::f64::consts::PI * i as f64 / (NODES - 1) as f64;
+            let angle = std::f64::consts::PI * i as f64 / (count - 1) as f64;
             0.5 * (from + to) - 0.5 * (to - from) * angle.cos()
         })
         .collect()

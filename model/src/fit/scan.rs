@@ -199,7 +199,7 @@ impl<F: Fn(f64) -> f64> CostFunction for Cost<F> {
 
 /// Brent's minimum inside a bracket, as close as comparing values allows.
 fn minimum((low, high): (f64, f64), cost: impl Fn(f64) -> f64) -> Option<f64> {
-    let solver = BrentOpt::new(low, high).set_tolerance(1e-9, 1e-8);
+    let solver = BrentOpt::new(low, high).set_tolerance(1e-8, 1e-6);
     let result = Executor::new(Cost(cost), solver)
         .configure(|state| state.max_iters(40))
         .run()

@@ -74,9 +74,9 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
         && let Some(time) = noise.correlation_time_s
     {
         findings.push(format!(
-            "the residuals have memory: {:.0} % of their variance lasts about {}; {} samples tell as \
+            "the residuals have memory: {} % of their variance lasts about {}; {} samples tell as \
              much as {}, and the intervals allow for it",
-            100.0 * noise.slow_share,
+            percent(noise.slow_share),
             span(time),
             report.samples,
             independent(noise.effective_samples)
@@ -94,6 +94,18 @@ fn independent(samples: f64) -> String {
     } else {
         format!("{samples:.0} independent samples")
     }
+}
+
+/// A share in percent, two digits of it.
+fn percent(share: f64) -> String {
+    let percent = 100.0 * share;
+    let decimals = match percent {
+        10.0.. => 0,
+        1.0.. => 1,
+        0.1.. => 2,
+        _ => 3,
+    };
+    format!("{percent:.decimals$}")
 }
 
 /// A time in words of its size.

@@ -10,11 +10,11 @@ use super::sample::FitSample;
 use super::triangle::{Factor, Triangle};
 
 /// Long blocks in a record, about.
-const BLOCKS: usize = 400;
+const BLOCKS: usize = 250;
 /// Rows that may be spent on refinement at corners.
 const CORNER_ROWS: usize = 1500;
 /// Blocks of one length after a corner before the length doubles.
-const PER_OCTAVE: usize = 8;
+const PER_OCTAVE: usize = 6;
 /// Tolerance of redrawing, as a share of the greatest depth.
 const TOLERANCE_SHARE: f64 = 0.002;
 /// The tolerance grows to the height of measured stairs, but not beyond this share.
