@@ -309,7 +309,11 @@ fn records_that_cannot_be_fitted_are_refused_in_words() {
     assert!(bad.to_string().contains("times must increase"), "{bad}");
     let bad = refuse(&|record| record[7].t = Seconds(0.0));
     assert!(matches!(bad, FitError::TimeNotIncreasing { index: 7, .. }));
-    let bad = refuse(&|record| record.iter_mut().for_each(|s| s.depth = Depth(-1.0)));
+    let bad = refuse(&|record| {
+        record
+            .iter_mut()
+            .for_each(|s| s.depth = Depth(-31.0 + s.depth.0))
+    });
     assert!(bad.to_string().contains("never enters the tissue"), "{bad}");
 }
 

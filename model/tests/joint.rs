@@ -227,7 +227,7 @@ fn bootstrap_agrees_with_the_standard_errors_and_repeats() {
             repeats: 100,
         };
         let mut heard = 0;
-        let intervals = fitted.bootstrap(0, choice, |done| heard = done);
+        let intervals = fitted.bootstrap(0, choice, |done| heard = done).unwrap();
         assert_eq!(heard, 100);
         for interval in &intervals {
             let error = report.parameter(&interval.name).unwrap().std_error.unwrap();
@@ -240,7 +240,7 @@ fn bootstrap_agrees_with_the_standard_errors_and_repeats() {
                 interval.name
             );
         }
-        assert_eq!(fitted.bootstrap(0, choice, |_| ()), intervals);
+        assert_eq!(fitted.bootstrap(0, choice, |_| ()).unwrap(), intervals);
     }
 }
 

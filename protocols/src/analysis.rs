@@ -37,6 +37,14 @@ pub enum SourceError {
         "the session has no ramp and hold with known force and depth, so there is nothing to fit"
     )]
     Empty,
+    /// A recorded decision is not what this version knows.
+    #[error(
+        "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"
+    )]
+    Decision {
+        /// The parser's words.
+        detail: String,
+    },
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration {
@@ -89,9 +97,10 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let calibration: Calibration = serde_json::from_value(session.manifest.calibration.clone())
         .map_err(|err| bad(err.to_string()))?;
     let curve = calibration.curve().map_err(|err| bad(err.to_string()))?;
-    let noise = noise_of(session).ok_or(SourceError::Empty)?;
+    let decisions = decisions(session)?;
+    let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;
-    let trusted = trusted_samples(session);
+    let trusted = trusted_samples(&decisions);
     let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
     let mut first_tick = None;
@@ -132,22 +141,27 @@ fn is_saturated(session: &Session, row: &Row) -> bool {
 }
 
 /// How many samples came before an interlock tripped; all of them if none did.
-fn trusted_samples(session: &Session) -> usize {
-    let tripped = decisions(session)
+fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
+    let tripped = decisions
+        .iter()
         .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
-    tripped.map_or(usize::MAX, |(after_sample, _)| after_sample as usize)
+    tripped.map_or(usize::MAX, |(after_sample, _)| *after_sample as usize)
 }
 
 /// What the engine decided, each after so many samples.
-fn decisions(session: &Session) -> impl Iterator<Item = (u64, Effect)> {
+fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     session
         .entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Decision)
-        .filter_map(|entry| {
-            let effect = serde_json::from_value(entry.body.clone()).ok()?;
-            Some((entry.after_sample, effect))
+        .map(|entry| match serde_json::from_value(entry.body.clone()) {
+            Ok(effect) => Ok((entry.after_sample, effect)),
+            // It might say that forces are not to be trusted.
+            Err(err) => Err(SourceError::Decision {
+                detail: err.to_string(),
+            }),
         })
+        .collect()
 }
 
 /// Session time of the first sample that a fit takes.
@@ -157,9 +171,9 @@ fn start_of(session: &Session) -> Seconds {
 }
 
 /// The signal's noise as the tare found it.
-fn noise_of(session: &Session) -> Option<Volts> {
-    decisions(session).find_map(|(_, effect)| match effect {
-        Effect::Record(Record::Tared { noise, .. }) => Some(noise),
+fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
+    decisions.iter().find_map(|(_, effect)| match effect {
+        Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
         _ => None,
     })
 }

@@ -8,7 +8,7 @@ use super::design::walk;
 use super::options::{CONTACT, PARAMETER_NAMES};
 use super::refine::refine;
 use super::report::scaled_powers;
-use super::sample::FitSample;
+use super::sample::{FitError, FitSample};
 use super::solve::Fitted;
 use super::system::Record;
 use super::uncertainty::Uncertainty;
@@ -17,6 +17,9 @@ use serde::{Deserialize, Serialize};
 
 /// Correlation times in a block; beyond three the ends of blocks hardly matter.
 const MEMORIES: f64 = 4.0;
+
+/// Fewer blocks than this cannot be shuffled to any purpose.
+const BLOCKS_MIN: usize = 8;
 
 /// What to repeat.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,17 +43,26 @@ pub struct BootstrapInterval {
 
 impl Fitted<'_> {
     /// Bootstrap intervals of the free parameters of one record; `progress` hears how many fits are
-    /// done.
+    /// done. Refused where the residuals remember so long that the record has too few blocks.
     pub fn bootstrap(
         &self,
         record: usize,
         choice: Bootstrap,
         mut progress: impl FnMut(usize),
-    ) -> Vec<BootstrapInterval> {
+    ) -> Result<Vec<BootstrapInterval>, FitError> {
+        if record >= self.system.records.len() {
+            return Ok(Vec::new());
+        }
         let uncertainty = Uncertainty::of(&self.system, &self.refined);
         let sources: Vec<Residuals> = (0..self.system.records.len())
             .map(|record| self.residual_source(&uncertainty, record))
             .collect();
+        if let Some(short) = sources.iter().find(|source| source.blocks() < BLOCKS_MIN) {
+            return Err(FitError::TooFewBlocks {
+                blocks: short.blocks(),
+                needed: BLOCKS_MIN,
+            });
+        }
         let free: Vec<usize> = (0..=CONTACT)
             .filter(|&k| self.system.fixed(k).is_none())
             .collect();
@@ -80,7 +92,8 @@ impl Fitted<'_> {
             }
             progress(done + 1);
         }
-        free.iter()
+        Ok(free
+            .iter()
             .zip(found)
             .filter(|(_, list)| list.len() > 1)
             .map(|(&parameter, mut list)| {
@@ -94,7 +107,7 @@ impl Fitted<'_> {
                     ci95: [0.025, 0.975].map(|share| quantile(&list, share)),
                 }
             })
-            .collect()
+            .collect())
     }
 
     /// Model and residuals of a record, the latter in units of each sample's sigma and widened by
@@ -153,6 +166,11 @@ struct Residuals {
 }
 
 impl Residuals {
+    /// How many blocks the record has.
+    fn blocks(&self) -> usize {
+        self.residuals.len() / self.length
+    }
+
     fn shuffled(&self, samples: &[FitSample], random: &mut SplitMix) -> Vec<FitSample> {
         let starts = self.residuals.len() - self.length + 1;
         let (mut at, mut left) = (0, 0);

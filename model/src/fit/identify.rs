@@ -58,9 +58,15 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
         .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
         .map(|(unknown, _)| name(system, unknown))
         .collect();
-    let is_speed = names
-        .iter()
-        .all(|name| name.starts_with("mu1") || name.starts_with("tau_sig"));
+    if names.is_empty() {
+        return Err(FitError::Overflow);
+    }
+    let begins = |start: &str| names.iter().any(|name| name.starts_with(start));
+    let is_speed = begins("mu1")
+        && begins("tau_sig")
+        && names
+            .iter()
+            .all(|name| name.starts_with("mu1") || name.starts_with("tau_sig"));
     let advice = if is_speed {
         "the depth moves at one speed only; add a hold of about 5 tau or a second speed"
     } else {

@@ -31,6 +31,8 @@ const COLUMNS_MAX: usize = 12;
 pub(super) struct Blocks {
     pub residuals: Vec<f64>,
     pub columns: Vec<Vec<f64>>,
+    /// Position of each block in time; censored stretches leave gaps.
+    pub places: Vec<usize>,
     /// Samples in a block.
     pub length: f64,
 }
@@ -65,12 +67,16 @@ impl Memory {
     }
 
     /// `z' Gamma z` for a weight on each block.
-    pub fn quadratic(&self, z: &[f64]) -> f64 {
+    pub fn quadratic(&self, z: &[f64], places: &[usize]) -> f64 {
         let (mut diagonal, mut lagged, mut past) = (0.0, 0.0, 0.0);
-        for &z in z {
+        let mut next = 0;
+        for (&z, &place) in z.iter().zip(places) {
+            // What a gap of so many blocks leaves of the past.
+            past *= self.forgetting.powi(place.saturating_sub(next) as i32);
             diagonal += z * z;
             lagged += z * past;
             past = self.forgetting * past + z;
+            next = place + 1;
         }
         self.level * (diagonal + 2.0 * self.neighbour * lagged)
     }
@@ -221,6 +227,8 @@ fn uncertainty(at: [f64; 2], of: impl Fn([f64; 2]) -> f64, spare: f64) -> f64 {
 /// Residual and orthonormal columns by block, ready to be whitened for any memory.
 struct Whitened {
     rows: Vec<[f64; COLUMNS_MAX]>,
+    /// Whether a row has no neighbour before it.
+    is_first: Vec<bool>,
     /// Columns, the residual not counted.
     columns: usize,
 }
@@ -249,7 +257,10 @@ impl Whitened {
             row[columns.len()] = blocks.residuals[b];
             row
         });
+        let places = &blocks.places;
+        let is_first = (0..count).map(|b| b == 0 || places[b] != places[b - 1] + 1);
         Some(Self {
+            is_first: is_first.collect(),
             rows: rows.collect(),
             columns: columns.len(),
         })
@@ -271,8 +282,9 @@ impl Whitened {
         let mut past = [0.0; COLUMNS_MAX];
         let mut innovation = [0.0; COLUMNS_MAX];
         let (mut variance, mut logs) = (gamma, 0.0);
-        for (index, row) in self.rows.iter().enumerate() {
-            if index > 0 {
+        for (row, is_first) in self.rows.iter().zip(&self.is_first) {
+            // After a gap the process begins anew.
+            if !is_first {
                 let share = theta / variance;
                 for k in 0..COLUMNS_MAX {
                     innovation[k] = row[k] - phi * past[k] - share * innovation[k];
@@ -280,6 +292,7 @@ impl Whitened {
                 variance = 1.0 + theta * (theta - share);
             } else {
                 innovation = *row;
+                variance = gamma;
             }
             past = *row;
             let weight = 1.0 / variance;
@@ -381,22 +394,22 @@ pub(super) fn triangle<'b>(blocks: impl Iterator<Item = &'b Blocks>, unknowns: u
 /// Variance of a combination of unknowns under the memories found over that under independent
 /// noise of variance `white`, and the variance of its logarithm; `factor` is the [`triangle`].
 pub(super) fn inflation(
-    records: &[(Blocks, Option<Memory>)],
+    records: &[(Blocks, Option<Memory>, f64)],
     factor: &Factor,
     combination: &[f64],
     white: f64,
 ) -> (f64, f64) {
     let influence = factor.influence(combination);
     let (mut with, mut without, mut uncertain) = (0.0, 0.0, 0.0);
-    for (blocks, memory) in records {
+    for (blocks, memory, own) in records {
         let weights: Vec<f64> = (0..blocks.residuals.len())
             .map(|b| {
                 let shares = influence.iter().zip(&blocks.columns);
                 shares.map(|(share, column)| share * column[b]).sum()
             })
             .collect();
-        let memory = memory.unwrap_or_else(|| Memory::none(white));
-        let part = memory.quadratic(&weights);
+        let memory = memory.unwrap_or_else(|| Memory::none(*own));
+        let part = memory.quadratic(&weights, &blocks.places);
         with += part;
         without += white * weights.iter().map(|z| z * z).sum::<f64>();
         uncertain += memory.uncertainty * part * part;

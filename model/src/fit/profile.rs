@@ -58,6 +58,9 @@ impl Fitted<'_> {
     /// Refused with a free contact or several relaxation times: the profile would have more than
     /// one dimension.
     pub fn profile(&self, record: usize) -> Result<Vec<ProfileInterval>, FitError> {
+        if record >= self.system.records.len() {
+            return Ok(Vec::new());
+        }
         let outer = &self.system.unknowns[self.system.linear..];
         if outer.len() > 1 || outer.iter().any(|unknown| unknown.parameter == CONTACT) {
             return Err(FitError::ProfileTooWide);

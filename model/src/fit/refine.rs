@@ -44,6 +44,9 @@ pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) ->
     let (linear, all) = (system.linear, system.unknowns.len());
     let mut points = start.to_vec();
     let force_square = system.force_square();
+    // The sum bends more sharply over the contact than over the relaxation time.
+    let is_contact_free = system.fixed(CONTACT).is_none();
+    let share = if is_contact_free { 0.01 } else { 1.0 } * STEP_SHARE;
     let mut best: Option<Refined> = None;
     // The step that led from the best point to the present one.
     let mut step = vec![0.0; all - linear];
@@ -92,12 +95,14 @@ pub(super) fn refine(system: &System<'_>, start: &[Point], ranges: &[Ranges]) ->
         for (record, point) in target.iter_mut().enumerate() {
             point.at = system.changed(record, &points[record].at, change);
         }
-        let scatter = (sum / (system.measured() - all).max(1) as f64).sqrt();
+        // Of what the step leaves: without noise that is rounding, and the iteration goes on.
+        let scatter =
+            (pass.joint.residual_sum(all) / (system.measured() - all).max(1) as f64).sqrt();
         let is_lost_in_noise = step.iter().enumerate().all(|(i, step)| {
             let mut outer = vec![0.0; all];
             outer[linear + i] = 1.0;
             let error = pass.joint.deviation(&outer) * scatter;
-            step.abs() < (STEP_SHARE * error).min(STEP_LONG)
+            step.abs() < (share * error).min(STEP_LONG)
         });
         let is_last = is_lost_in_noise || length(&step) < STEP_MIN;
         let is_converged = length(&step) < STEP_ZERO || (is_whole && is_last);

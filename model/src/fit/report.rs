@@ -181,11 +181,16 @@ impl Fitted<'_> {
             self.system.fixed(k).is_some()
         });
         let noise = uncertainty.memory(record).map(|memory| {
-            let scatter = uncertainty.scatter.unwrap_or(0.0);
             let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
             let interval = length / (samples.len() - 1) as f64;
             let block = uncertainty.block_length(record);
-            noise_found(&memory, scatter * scatter, interval, block, measured)
+            noise_found(
+                &memory,
+                uncertainty.variance(record),
+                interval,
+                block,
+                measured,
+            )
         });
         let mut report = FitReport {
             model: MODEL_NAME.to_owned(),
@@ -273,7 +278,9 @@ pub(super) fn parameters(
                 std_error: errors[index].map(|error| error.std_error),
                 ci95: errors[index].map(|error| {
                     let half = student_t975(error.freedom) * error.std_error;
-                    [value - half, value + half]
+                    // No relaxation time is negative.
+                    let lowest = if index == TAU { 0.0 } else { f64::NEG_INFINITY };
+                    [(value - half).max(lowest), value + half]
                 }),
                 is_fixed: is_fixed(index),
             }

@@ -104,6 +104,32 @@ pub enum FitError {
         /// The parameter.
         name: String,
     },
+    /// Residuals that remember too long for a bootstrap.
+    #[error(
+        "the residuals remember so long that the record has {blocks} block(s) to shuffle, and a bootstrap needs {needed}; use the intervals of the fit or of the profile"
+    )]
+    TooFewBlocks {
+        /// Blocks longer than the memory in the record.
+        blocks: usize,
+        /// Blocks needed.
+        needed: usize,
+    },
+    /// A record whose force never changes.
+    #[error(
+        "the force never changes from {force} N, so it says nothing of the tissue; check the load cell and the columns"
+    )]
+    ConstantForce {
+        /// The force in N.
+        force: f64,
+    },
+    /// A record whose depth never changes.
+    #[error(
+        "the depth never changes from {depth} mm, so the tissue is not indented; move deeper, or check the columns"
+    )]
+    ConstantDepth {
+        /// The depth in mm.
+        depth: f64,
+    },
     /// A profile over more than one dimension.
     #[error(
         "profile intervals need one relaxation time and a fixed contact; fix x_contact, or share tau_eps"

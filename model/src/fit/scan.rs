@@ -21,11 +21,26 @@ const CONTACT_GRID: (usize, usize) = (20, 28);
 /// Deepest contact position tried, as a share of the travel.
 const CONTACT_SHARE_MAX: f64 = 0.85;
 
-/// The searched range of `ln tau`: one sample interval to ten lengths of the record.
+/// Shortest relaxation time searched, as a share of the shortest sample interval: what relaxes within
+/// an interval still shows in the samples after a corner.
+const INTERVALS: f64 = 0.125;
+
+/// The searched range of `ln tau`: a share of a sample interval to ten lengths of the record.
 pub(super) fn log_tau_range(samples: &[FitSample]) -> (f64, f64) {
     let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
     let interval = length / (samples.len() - 1) as f64;
-    (interval.ln(), (LENGTHS * length).ln())
+    let shortest = samples
+        .windows(2)
+        .map(|pair| pair[1].t.0 - pair[0].t.0)
+        .fold(interval, f64::min);
+    ((INTERVALS * shortest).ln(), (LENGTHS * length).ln())
+}
+
+/// The range that holds all of them.
+pub(super) fn union(ranges: impl Iterator<Item = (f64, f64)>) -> (f64, f64) {
+    ranges
+        .reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
+        .unwrap_or_default()
 }
 
 /// Scaled contact positions searched: within the record. Before its first depth a contact cannot be
@@ -43,12 +58,12 @@ pub(super) fn best_start(system: &System<'_>) -> Vec<Point> {
         let contacts: Vec<f64> = (0..count)
             .map(|record| contact(&system.alone(record)))
             .collect();
-        let range = system
-            .records
-            .iter()
-            .map(|record| log_tau_range(record.samples))
-            .reduce(|all, one| (all.0.min(one.0), all.1.max(one.1)))
-            .unwrap_or_default();
+        let range = union(
+            system
+                .records
+                .iter()
+                .map(|record| log_tau_range(record.samples)),
+        );
         let at = |tau: f64| outers(&contacts, tau);
         at(best_tau(system, range, at))
     } else {

@@ -8,6 +8,10 @@ use crate::viscoelastic::admissibility;
 const MEMORY_LONG: f64 = 1.0;
 /// Fewer effective samples than this for every unknown make any interval rough.
 const EFFECTIVE_MIN: f64 = 10.0;
+/// Initial forces and offsets beyond this many ranges of the force are not what they are called.
+const LEVEL_LARGE: f64 = 3.0;
+/// Memory this share of the record long is the longest that is looked for.
+const LONGEST_SHARE: f64 = 0.45;
 /// A relaxation time less certain than this share of its value is hardly known.
 const UNCERTAIN_SHARE: f64 = 0.5;
 
@@ -45,12 +49,31 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
             "tau_eps is uncertain by more than half its value; record a longer hold".to_owned(),
         );
     }
+    let (low, high) = fitted.system.records[record].forces();
+    for parameter in &report.parameters[5..7] {
+        if parameter.value.abs() > LEVEL_LARGE * (high - low) {
+            warnings.push(format!(
+                "{} is far larger than the force ever changes, so it stands for something the model \
+                 does not know; fix it, or check the record's beginning",
+                parameter.name
+            ));
+        }
+    }
     if let Some(noise) = &report.noise {
         let unknowns = fitted.system.unknowns.len() as f64;
-        let is_long = noise
-            .correlation_time_s
-            .is_some_and(|time| time > MEMORY_LONG * tau.value);
-        if is_long || noise.effective_samples < EFFECTIVE_MIN * unknowns {
+        let is_few = noise.effective_samples < EFFECTIVE_MIN * unknowns;
+        if noise.correlation_time_s.is_none() {
+            if is_few {
+                warnings.push(format!(
+                    "{} samples for {unknowns} parameters are few; the intervals are rough",
+                    report.samples
+                ));
+            }
+        } else if is_few
+            || noise
+                .correlation_time_s
+                .is_some_and(|time| time > MEMORY_LONG * tau.value)
+        {
             warnings.push(format!(
                 "the residuals have a long memory: this body does not describe the record to within \
                  its noise, and intervals from about {} are rough",
@@ -70,11 +93,19 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
             report.censored
         ));
     }
+    let samples = fitted.system.records[record].samples;
+    let length = samples[samples.len() - 1].t.0 - samples[0].t.0;
     if let Some(noise) = &report.noise
         && let Some(time) = noise.correlation_time_s
+        && noise.effective_samples < 0.95 * report.samples as f64
     {
+        let about = if time > LONGEST_SHARE * length {
+            "at least"
+        } else {
+            "about"
+        };
         findings.push(format!(
-            "the residuals have memory: {} % of their variance lasts about {}; {} samples tell as \
+            "the residuals have memory: {} % of their variance lasts {about} {}; {} samples tell as \
              much as {}, and the intervals allow for it",
             percent(noise.slow_share),
             span(time),

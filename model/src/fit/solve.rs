@@ -1,11 +1,11 @@
 //! Search, refinement, judgement: the fit from end to end.
 
 use super::identify::{self, Judged};
-use super::options::{CONTACT, FitOptions, PARAMETER_NAMES};
+use super::options::{CONTACT, FitOptions, PARAMETER_NAMES, TAU};
 use super::refine::{Ranges, Refined, refine};
 use super::report::{FitReport, JointReport};
 use super::sample::{FitError, FitSample};
-use super::scan::{best_start, contact_range, log_tau_range};
+use super::scan::{best_start, contact_range, log_tau_range, union};
 use super::system::System;
 
 /// Identifies the modified Kelvin body
@@ -101,7 +101,7 @@ pub fn fit_joint(
 /// let report = fitted.report();
 /// let tau = report.parameter("tau_eps").and_then(|tau| tau.ci95);
 /// let profile = fitted.profile(0)?;
-/// let repeated = fitted.bootstrap(0, Bootstrap { seed: 1, repeats: 20 }, |_| ());
+/// let repeated = fitted.bootstrap(0, Bootstrap { seed: 1, repeats: 20 }, |_| ())?;
 /// for sentence in report.sentences() {
 ///     assert!(!sentence.is_empty());
 /// }
@@ -157,7 +157,7 @@ impl<'a> Fitted<'a> {
     }
 
     fn solve(system: System<'a>) -> Result<Self, FitError> {
-        let ranges: Vec<Ranges> = system
+        let mut ranges: Vec<Ranges> = system
             .records
             .iter()
             .map(|record| Ranges {
@@ -165,6 +165,11 @@ impl<'a> Fitted<'a> {
                 contact: contact_range(record, system.depth_mm),
             })
             .collect();
+        if system.is_shared(TAU) {
+            // One relaxation time, one range: what any of the records can show.
+            let all = union(ranges.iter().map(|range| range.log_tau));
+            ranges.iter_mut().for_each(|range| range.log_tau = all);
+        }
         let start = best_start(&system);
         if system.fixed(CONTACT).is_some() {
             identify::check(&system, &start, Judged::Linear)?;

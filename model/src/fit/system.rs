@@ -79,7 +79,10 @@ pub(super) struct System<'a> {
 #[derive(Clone, Copy, Debug)]
 pub(super) struct NoiseBlock {
     pub sums: [f64; WIDTH_MAX],
+    /// Samples whose force counts.
     pub count: usize,
+    /// Position among all blocks of the record, those with too few such samples included.
+    pub place: usize,
 }
 
 /// One record, triangularised at a point.
@@ -94,6 +97,17 @@ pub(super) struct RecordFactor {
 pub(super) struct Pass {
     pub joint: Factor,
     pub records: Vec<RecordFactor>,
+}
+
+impl Record<'_> {
+    /// Smallest and largest force that counts, in N.
+    pub fn forces(&self) -> (f64, f64) {
+        let outside = (f64::INFINITY, f64::NEG_INFINITY);
+        let measured = self.samples.iter().filter(|sample| sample.is_measured());
+        measured.fold(outside, |(low, high), sample| {
+            (low.min(sample.force.0), high.max(sample.force.0))
+        })
+    }
 }
 
 impl<'a> System<'a> {
@@ -127,6 +141,13 @@ impl<'a> System<'a> {
             }
             check_samples(samples).map_err(|reason| named(name, reason))?;
             let (shallowest, deepest) = depths(samples);
+            if shallowest == deepest {
+                let depth = deepest;
+                return Err(named(name, FitError::ConstantDepth { depth }));
+            }
+            if let Some(force) = constant_force(samples) {
+                return Err(named(name, FitError::ConstantForce { force }));
+            }
             let contact = fixed[CONTACT].unwrap_or(shallowest);
             if deepest <= contact {
                 return Err(named(name, FitError::NeverInTissue { deepest, contact }));
@@ -428,7 +449,7 @@ impl<'a> System<'a> {
                     self.forces(block, columns);
                     subtract(columns, &point.at);
                     self.weigh(block, columns);
-                    sums.add(columns, block.len());
+                    sums.add(columns, block);
                     triangle.push_lanes(columns, block.len());
                 },
             );
@@ -540,7 +561,10 @@ struct NoiseSums {
     blocks: Vec<NoiseBlock>,
     length: usize,
     sums: [f64; WIDTH_MAX],
+    /// Samples in the present block, and those of them whose force counts.
+    taken: usize,
     count: usize,
+    place: usize,
 }
 
 impl NoiseSums {
@@ -555,12 +579,15 @@ impl NoiseSums {
             blocks: Vec::with_capacity(samples / length + 1),
             length,
             sums: [0.0; WIDTH_MAX],
+            taken: 0,
             count: 0,
+            place: 0,
         }
     }
 
     #[inline(always)]
-    fn add(&mut self, columns: &[Lane], count: usize) {
+    fn add(&mut self, columns: &[Lane], samples: &[FitSample]) {
+        let count = samples.len();
         // The walk visits the first sample alone; it joins the first block.
         let part = if count == 1 {
             1
@@ -573,27 +600,31 @@ impl NoiseSums {
             for (sum, column) in self.sums.iter_mut().zip(columns) {
                 *sum += column[start..end].iter().sum::<f64>();
             }
-            self.count += end - start;
+            let part = &samples[start..end];
+            self.count += part.iter().filter(|sample| sample.is_measured()).count();
+            self.taken += end - start;
             start = end;
-            if self.count >= self.length {
+            if self.taken >= self.length {
                 self.close();
             }
         }
     }
 
+    /// Ends a block; one with forces for less than half its length is left out.
     fn close(&mut self) {
-        self.blocks.push(NoiseBlock {
-            sums: self.sums,
-            count: self.count,
-        });
-        (self.sums, self.count) = ([0.0; WIDTH_MAX], 0);
+        if 2 * self.count >= self.length {
+            self.blocks.push(NoiseBlock {
+                sums: self.sums,
+                count: self.count,
+                place: self.place,
+            });
+        }
+        self.place += 1;
+        (self.sums, self.taken, self.count) = ([0.0; WIDTH_MAX], 0, 0);
     }
 
-    /// The blocks; a last one of less than half the length is left out.
     fn finish(mut self) -> Vec<NoiseBlock> {
-        if 2 * self.count >= self.length {
-            self.close();
-        }
+        self.close();
         self.blocks
     }
 }
@@ -657,6 +688,18 @@ fn depths(samples: &[FitSample]) -> (f64, f64) {
     samples.iter().fold(outside, |(low, high), sample| {
         (low.min(sample.depth.0), high.max(sample.depth.0))
     })
+}
+
+/// The force if it never changes beyond rounding.
+fn constant_force(samples: &[FitSample]) -> Option<f64> {
+    let mut forces = samples
+        .iter()
+        .filter(|sample| sample.is_measured())
+        .map(|sample| sample.force.0);
+    let first = forces.next()?;
+    forces
+        .all(|force| (force - first).abs() <= 1e-12 * first.abs())
+        .then_some(first)
 }
 
 fn force_square(samples: &[FitSample], sigma_scale: f64) -> f64 {

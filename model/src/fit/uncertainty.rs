@@ -18,7 +18,8 @@ const ROUNDING: f64 = 1e-24;
 pub(super) struct Uncertainty {
     /// Standard deviation of weighted residuals; `None` without a spare sample.
     pub scatter: Option<f64>,
-    records: Vec<(Blocks, Option<Memory>)>,
+    /// Blocks, memory, and variance of the weighted residuals.
+    records: Vec<(Blocks, Option<Memory>, f64)>,
     block_factor: Factor,
 }
 
@@ -55,12 +56,15 @@ impl Uncertainty {
         let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
         let records = blocks
             .into_iter()
-            .map(|blocks| {
+            .enumerate()
+            .map(|(record, blocks)| {
+                // Records may scatter differently from what their sigmas say.
+                let own = own_variance(system, refined, record, &change).unwrap_or(white);
                 let memory = match is_rounding {
                     true => Some(Memory::none(white)),
-                    false => noise::memory(&blocks, white),
+                    false => noise::memory(&blocks, own),
                 };
-                (blocks, memory)
+                (blocks, memory, own)
             })
             .collect();
         Self {
@@ -73,6 +77,11 @@ impl Uncertainty {
     /// Samples in a block of a record.
     pub fn block_length(&self, record: usize) -> f64 {
         self.records[record].0.length
+    }
+
+    /// Variance of the weighted residuals of a record.
+    pub fn variance(&self, record: usize) -> f64 {
+        self.records[record].2
     }
 
     /// What the residuals of a record remember; `None` where it is too short to tell.
@@ -101,11 +110,42 @@ impl Uncertainty {
     }
 }
 
+/// Variance of the weighted residuals of one of several records; `None` for the only one, where
+/// it is the joint one, and for one without spare samples.
+fn own_variance(
+    system: &System<'_>,
+    refined: &Refined,
+    record: usize,
+    change: &[f64],
+) -> Option<f64> {
+    if system.records.len() == 1 {
+        return None;
+    }
+    let factor = &refined.pass.records[record].factor;
+    let map = system.map(record, true);
+    let square: f64 = (0..factor.width())
+        .map(|i| {
+            let row = factor.row(i);
+            let explained = map.iter().zip(change);
+            let explained: f64 = explained
+                .map(|(column, value)| column.of(row) * value)
+                .sum();
+            (row[factor.width() - 1] - explained).powi(2)
+        })
+        .sum();
+    // Its share of the unknowns, as if they were spread over the samples.
+    let measured = system.records[record].measured as f64;
+    let all = system.measured() as f64;
+    let spare = measured * (1.0 - system.unknowns.len() as f64 / all);
+    (spare > 0.0).then(|| square / spare)
+}
+
 fn blocks(system: &System<'_>, sums: &[NoiseBlock], map: &[Mapped], solution: &[f64]) -> Blocks {
     let last = sums.first().map_or(0, |_| width(system) - 1);
     let mut blocks = Blocks {
         residuals: Vec::with_capacity(sums.len()),
         columns: vec![Vec::with_capacity(sums.len()); map.len()],
+        places: sums.iter().map(|block| block.place).collect(),
         length: sums.first().map_or(1.0, |block| block.count as f64),
     };
     for block in sums {

@@ -22,6 +22,9 @@ pub struct Band {
     pub to: f64,
 }
 
+/// Bands that end before this are of no consequence, in mm.
+const SHALLOW_MM: f64 = 5e-4;
+
 /// Depths at which the elastic force falls with depth.
 #[must_use]
 pub fn unstable(body: &ModifiedKelvin) -> Vec<Band> {
@@ -73,14 +76,14 @@ pub fn sentences(body: &ModifiedKelvin, deepest: f64) -> Vec<String> {
 }
 
 fn words(band: &Band, deepest: f64) -> Option<String> {
-    if band.from >= deepest {
+    if band.from >= deepest || band.to < SHALLOW_MM {
         return None;
     }
     Some(match (band.from > 0.0, band.to < deepest) {
         (true, true) => format!("between {:.3} and {:.3} mm", band.from, band.to),
         (true, false) => format!("beyond {:.3} mm", band.from),
         (false, true) => format!("below {:.3} mm", band.to),
-        (false, false) => format!("down to {deepest:.3} mm, all that was recorded,"),
+        (false, false) => format!("anywhere down to {deepest:.3} mm"),
     })
 }
 

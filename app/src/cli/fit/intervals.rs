@@ -57,7 +57,9 @@ impl Intervals {
             let bar = output.count_bar(repeats as u64);
             bar.set_message("bootstrap");
             let choice = Bootstrap { seed, repeats };
-            found.bootstrap = fitted.bootstrap(0, choice, |done| bar.set_position(done as u64));
+            found.bootstrap = fitted
+                .bootstrap(0, choice, |done| bar.set_position(done as u64))
+                .map_err(Failure::failed)?;
             bar.finish_and_clear();
             found.bootstrap_seed = Some(seed);
         }

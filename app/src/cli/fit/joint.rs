@@ -34,6 +34,17 @@ pub(super) fn run(
         ));
     }
     let shared = names(shared);
+    let mut real: Vec<PathBuf> = found
+        .iter()
+        .map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()))
+        .collect();
+    real.sort();
+    if let Some(pair) = real.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Failure::usage(format!(
+            "{} is given twice; fitted together it would count as two recordings",
+            pair[0].display()
+        )));
+    }
     let mut records: Vec<(String, Vec<FitSample>)> = Vec::with_capacity(found.len());
     for path in &found {
         let source = analysis::read_named(path, recipe.columns.as_ref())

@@ -34,7 +34,7 @@ const IDENTIFIED_SHARE: f64 = 0.5;
 
 /// Blocks in which the memory of the residuals is judged: coarser than in the fit of record, since
 /// it is judged again with every answer.
-const NOISE_BLOCKS: usize = 128;
+const NOISE_BLOCKS: usize = 256;
 /// Residuals this small beside the forces are rounding of sums of products.
 const ROUNDING: f64 = 1e-6;
 
@@ -47,6 +47,8 @@ pub struct LiveFit {
     path: Path,
     /// Time and scaled depth of the newest sample.
     last: Option<(f64, f64)>,
+    /// Time of the newest force that counts.
+    measured_until: f64,
     samples: u64,
 }
 
@@ -101,6 +103,7 @@ impl LiveFit {
             blocks: Blocks::new(),
             path: Path::default(),
             last: None,
+            measured_until: f64::NEG_INFINITY,
             samples: 0,
         }
     }
@@ -125,6 +128,7 @@ impl LiveFit {
         if !is_censored {
             self.bank.weigh(force.0, sigma.0.powi(-2));
             self.samples += 1;
+            self.measured_until = t.0;
         }
         self.blocks.count(t.0, &mut self.bank);
     }
@@ -138,7 +142,8 @@ impl LiveFit {
         let mut bank = self.bank.clone();
         bank.flush();
         let grams: Vec<_> = (0..NODES).map(|node| bank.gram(node)).collect();
-        let corners = self.path.corners();
+        // What the probe did while no force counted identifies nothing.
+        let corners = path::until(self.path.corners(), self.measured_until);
         let judge = |minimum: &Minimum| {
             let jet = minimum.stencil.jet(minimum.place);
             let values = self.maps().map(|map| minimum.value(&jet, &map));
@@ -238,16 +243,17 @@ impl LiveFit {
         let mut blocks = noise::Blocks {
             residuals: Vec::new(),
             columns: vec![Vec::new(); seen.len()],
+            places: Vec::new(),
             length: (means.samples_per_block * joined as u64) as f64,
         };
-        for range in ranges {
+        for (place, range) in ranges.enumerate() {
             // Sums of weighted residuals over the root of the sum of weights.
             let weight: f64 = means.weights[range.clone()].iter().sum();
-            let over_root = if weight > 0.0 {
-                1.0 / weight.sqrt()
-            } else {
-                0.0
-            };
+            if weight <= 0.0 {
+                continue;
+            }
+            blocks.places.push(place);
+            let over_root = 1.0 / weight.sqrt();
             let sum = |of: &dyn Fn(usize) -> f64| -> f64 {
                 range.clone().map(|i| means.weights[i] * of(i)).sum()
             };
@@ -263,7 +269,7 @@ impl LiveFit {
         }
         let memory = noise::memory(&blocks, white);
         let factor = noise::triangle(std::iter::once(&blocks), seen.len()).finish();
-        let records = [(blocks, memory)];
+        let records = [(blocks, memory, white)];
         for (place, &k) in seen.iter().enumerate() {
             let mut unit = vec![0.0; seen.len()];
             unit[place] = 1.0;

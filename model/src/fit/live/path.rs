@@ -77,6 +77,20 @@ impl Path {
     }
 }
 
+/// The path up to a time within it.
+pub(super) fn until(mut corners: Vec<(f64, f64)>, end: f64) -> Vec<(f64, f64)> {
+    while let [.., before, last] = corners[..]
+        && last.0 > end
+    {
+        corners.pop();
+        if before.0 < end {
+            let share = (end - before.0) / (last.0 - before.0);
+            corners.push((end, before.1 + share * (last.1 - before.1)));
+        }
+    }
+    corners
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -101,6 +115,14 @@ mod tests {
         );
         let straight = drawn(|t| (0.75 * t / 0.015).floor() * 0.015 / 45.0);
         assert_eq!(straight.len(), 2, "{straight:?}");
+    }
+
+    #[test]
+    fn a_path_ends_where_it_is_cut() {
+        let corners = vec![(0.0, 0.0), (2.0, 1.0), (4.0, 1.0)];
+        assert_eq!(until(corners.clone(), 1.0), [(0.0, 0.0), (1.0, 0.5)]);
+        assert_eq!(until(corners.clone(), 2.0), [(0.0, 0.0), (2.0, 1.0)]);
+        assert_eq!(until(corners.clone(), 4.0), corners);
     }
 
     #[test]
