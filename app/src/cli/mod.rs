@@ -151,6 +151,8 @@ fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
         SourceError::Table(_) => Failure::usage(err),
-        SourceError::Empty | SourceError::Calibration { .. } => Failure::failed(err),
+        SourceError::Empty | SourceError::Calibration { .. } | SourceError::Decision { .. } => {
+            Failure::failed(err)
+        }
     }
 }
