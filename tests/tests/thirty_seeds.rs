@@ -65,12 +65,29 @@ fn errors(fits: &[(FitReport, [f64; 5], f64)], i: usize) -> Vec<f64> {
         .collect()
 }
 
+/// Mean standard error claimed, in percent of the true value, and how many 95 % intervals cover it.
+fn claims(fits: &[(FitReport, [f64; 5], f64)], i: usize) -> (f64, usize) {
+    let mut claimed = 0.0;
+    let mut covered = 0;
+    for (report, truth, _) in fits {
+        let parameter = report.parameter(NAMES[i]).expect("a parameter");
+        claimed += 100.0 * parameter.std_error.expect("identified") / truth[i].abs();
+        let [low, high] = parameter.ci95.expect("identified");
+        covered += usize::from(low <= truth[i] && truth[i] <= high);
+    }
+    (claimed / fits.len() as f64, covered)
+}
+
 fn print(title: &str, fits: &[(FitReport, [f64; 5], f64)]) {
     println!("{title}: bias and spread over {SEEDS} seeds, in percent of the true value");
     for (i, name) in NAMES.iter().enumerate() {
         let errors = errors(fits, i);
         let (mean, sd) = mean_and_sd(&errors);
-        println!("  {name:<8} bias {mean:+8.3}  spread {sd:7.3}");
+        let (claimed, covered) = claims(fits, i);
+        println!(
+            "  {name:<8} bias {mean:+8.3}  spread {sd:7.3}  claimed {claimed:7.3}  \
+             95 % covers {covered} of {SEEDS}"
+        );
     }
     let contact: Vec<f64> = fits.iter().map(|(_, _, error)| *error).collect();
     let (mean, sd) = mean_and_sd(&contact);
@@ -104,15 +121,7 @@ fn ideal_runs_scatter_as_the_protocol_allows() {
             (10.5..66.0).contains(&squares),
             "{name}: sum of squared z {squares:.1}"
         );
-        let claimed = fits.iter().map(|(report, truth, _)| {
-            let parameter = report
-                .parameters
-                .iter()
-                .find(|one| one.name == *name)
-                .expect("named");
-            100.0 * parameter.std_error.expect("identified") / truth[i].abs()
-        });
-        let mean = claimed.sum::<f64>() / SEEDS as f64;
+        let (mean, _) = claims(&fits, i);
         assert!(
             (mean / EXPECTED_PERCENT[i] - 1.0).abs() < 0.2,
             "{name}: claims {mean:.3} %"

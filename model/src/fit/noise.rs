@@ -132,12 +132,18 @@ pub(super) fn memory(blocks: &Blocks, white: f64) -> Option<Memory> {
     let forgetting = (-(-at[0]).exp()).exp();
     let neighbour = neighbour(forgetting, expit(at[1]));
     let level = whitened.at(forgetting, neighbour)?.square / spare;
-    let uncertainty = uncertainty(at, of, spare);
-    Some(Memory {
+    let found = Memory {
         level,
         neighbour,
         forgetting,
-        uncertainty,
+        uncertainty: uncertainty(at, of, spare),
+    };
+    // Residuals that alternate add up to less than independent ones; that is no memory, and no
+    // reason for narrower intervals.
+    Some(if found.long_run() > white {
+        found
+    } else {
+        Memory::none(white)
     })
 }
 
