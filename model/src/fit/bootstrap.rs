@@ -6,11 +6,11 @@
 
 use super::design::walk;
 use super::options::{CONTACT, PARAMETER_NAMES};
+use super::record::Record;
 use super::refine::refine;
 use super::report::scaled_powers;
 use super::sample::{FitError, FitSample};
 use super::solve::Fitted;
-use super::system::Record;
 use super::uncertainty::Uncertainty;
 use crate::units::Newtons;
 use serde::{Deserialize, Serialize};

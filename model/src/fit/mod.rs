@@ -4,6 +4,7 @@
 //! linear in everything else, so the fit is a search over one number with a small least-squares
 //! problem inside.
 
+mod block_sums;
 mod bootstrap;
 mod design;
 mod identify;
@@ -12,6 +13,7 @@ mod maxwell;
 mod noise;
 mod options;
 mod profile;
+mod record;
 mod refine;
 mod report;
 mod sample;

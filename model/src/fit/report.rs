@@ -3,9 +3,10 @@
 use super::design::walk;
 use super::noise::Memory;
 use super::options::{CONTACT, LINEAR, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
+use super::record::Record;
 use super::sample::FitSample;
 use super::solve::Fitted;
-use super::system::{Point, Record};
+use super::system::Point;
 use super::uncertainty::{Error, Uncertainty};
 use super::{design::Scale, design::powers_from_legendre, sentences};
 use crate::units::Newtons;

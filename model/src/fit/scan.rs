@@ -5,8 +5,9 @@
 //! Brent's minimiser inside each of the deepest brackets, on the thinned record.
 
 use super::options::TAU;
+use super::record::Record;
 use super::sample::FitSample;
-use super::system::{Outer, Point, Record, System};
+use super::system::{Outer, Point, System};
 use argmin::core::{CostFunction, Error, Executor, State};
 use argmin::solver::brent::BrentOpt;
 

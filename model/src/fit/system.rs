@@ -6,17 +6,17 @@
 //! small triangles with its columns mapped to the joint unknowns. So one record is the joint fit
 //! of one, and fixing or sharing a parameter never touches the samples again.
 
+use super::block_sums::{NoiseBlock, NoiseSums};
 use super::design::{
     Coefficients, LANES, Lane, Rows, Scale, legendre_from_powers, powers_from_legendre, walk,
 };
 use super::options::{CONTACT, FitOptions, LINEAR, LINEAR_COUNT, TAU};
+use super::record::{Record, constant_force, depths, force_square, measured};
 use super::sample::{FitError, FitSample, check_samples};
 use super::thin::{Thin, unit};
 use super::triangle::{Factor, Triangle};
 use crate::vectors::wide;
 
-/// Blocks of residuals kept for judging their memory, at most about.
-const NOISE_BLOCKS: usize = 400;
 /// Column of the slope by `log tau` in a record's own triangle; that by contact follows.
 const TAU_SLOPE: usize = LINEAR_COUNT;
 /// Columns of a record's own triangle at most: six linear, two slopes, the force.
@@ -37,20 +37,6 @@ pub(super) struct Outer {
 pub(super) struct Point {
     pub outer: Outer,
     pub at: Coefficients,
-}
-
-/// A record and its thinned form.
-#[derive(Clone, Debug)]
-pub(super) struct Record<'a> {
-    pub name: &'a str,
-    pub samples: &'a [FitSample],
-    pub thin: Thin,
-    /// Samples whose force counts.
-    pub measured: usize,
-    /// Depths reached, in mm.
-    pub depths: (f64, f64),
-    /// Weighted sum of squared forces.
-    pub force_square: f64,
 }
 
 /// One number the fit finds: a parameter of one record, or of all.
@@ -75,16 +61,6 @@ pub(super) struct System<'a> {
     pub linear: usize,
 }
 
-/// Sums over one block of samples of all columns of a record's triangle, times their weights.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct NoiseBlock {
-    pub sums: [f64; WIDTH_MAX],
-    /// Samples whose force counts.
-    pub count: usize,
-    /// Position among all blocks of the record, those with too few such samples included.
-    pub place: usize,
-}
-
 /// One record, triangularised at a point.
 #[derive(Clone, Debug)]
 pub(super) struct RecordFactor {
@@ -97,17 +73,6 @@ pub(super) struct RecordFactor {
 pub(super) struct Pass {
     pub joint: Factor,
     pub records: Vec<RecordFactor>,
-}
-
-impl Record<'_> {
-    /// Smallest and largest force that counts, in N.
-    pub fn forces(&self) -> (f64, f64) {
-        let outside = (f64::INFINITY, f64::NEG_INFINITY);
-        let measured = self.samples.iter().filter(|sample| sample.is_measured());
-        measured.fold(outside, |(low, high), sample| {
-            (low.min(sample.force.0), high.max(sample.force.0))
-        })
-    }
 }
 
 impl<'a> System<'a> {
@@ -556,79 +521,6 @@ impl Mapped {
     }
 }
 
-/// Block sums of the columns, in blocks of a power of two or of whole lanes.
-struct NoiseSums {
-    blocks: Vec<NoiseBlock>,
-    length: usize,
-    sums: [f64; WIDTH_MAX],
-    /// Samples in the present block, and those of them whose force counts.
-    taken: usize,
-    count: usize,
-    place: usize,
-}
-
-impl NoiseSums {
-    fn new(samples: usize) -> Self {
-        let wanted = samples.div_ceil(NOISE_BLOCKS);
-        let length = if wanted <= LANES {
-            wanted.next_power_of_two()
-        } else {
-            wanted.div_ceil(LANES) * LANES
-        };
-        Self {
-            blocks: Vec::with_capacity(samples / length + 1),
-            length,
-            sums: [0.0; WIDTH_MAX],
-            taken: 0,
-            count: 0,
-            place: 0,
-        }
-    }
-
-    #[inline(always)]
-    fn add(&mut self, columns: &[Lane], samples: &[FitSample]) {
-        let count = samples.len();
-        // The walk visits the first sample alone; it joins the first block.
-        let part = if count == 1 {
-            1
-        } else {
-            self.length.min(LANES)
-        };
-        let mut start = 0;
-        while start < count {
-            let end = (start + part).min(count);
-            for (sum, column) in self.sums.iter_mut().zip(columns) {
-                *sum += column[start..end].iter().sum::<f64>();
-            }
-            let part = &samples[start..end];
-            self.count += part.iter().filter(|sample| sample.is_measured()).count();
-            self.taken += end - start;
-            start = end;
-            if self.taken >= self.length {
-                self.close();
-            }
-        }
-    }
-
-    /// Ends a block; one with forces for less than half its length is left out.
-    fn close(&mut self) {
-        if 2 * self.count >= self.length {
-            self.blocks.push(NoiseBlock {
-                sums: self.sums,
-                count: self.count,
-                place: self.place,
-            });
-        }
-        self.place += 1;
-        (self.sums, self.taken, self.count) = ([0.0; WIDTH_MAX], 0, 0);
-    }
-
-    fn finish(mut self) -> Vec<NoiseBlock> {
-        self.close();
-        self.blocks
-    }
-}
-
 /// What to divide scaled coefficients of powers by for N/mm, N/mm^2, N/mm^3, N*s/mm^2, N, N.
 pub(super) fn linear_units(depth_mm: f64) -> Coefficients {
     let x = depth_mm;
@@ -676,36 +568,4 @@ fn unknowns(fixed: &[Option<f64>; 8], shared: &[bool; 8], records: usize) -> Vec
         .filter(|&parameter| fixed[parameter].is_none())
         .flat_map(of)
         .collect()
-}
-
-fn measured(samples: &[FitSample]) -> usize {
-    samples.iter().filter(|sample| sample.is_measured()).count()
-}
-
-/// Shallowest and deepest sample in mm.
-fn depths(samples: &[FitSample]) -> (f64, f64) {
-    let outside = (f64::INFINITY, f64::NEG_INFINITY);
-    samples.iter().fold(outside, |(low, high), sample| {
-        (low.min(sample.depth.0), high.max(sample.depth.0))
-    })
-}
-
-/// The force if it never changes beyond rounding.
-fn constant_force(samples: &[FitSample]) -> Option<f64> {
-    let mut forces = samples
-        .iter()
-        .filter(|sample| sample.is_measured())
-        .map(|sample| sample.force.0);
-    let first = forces.next()?;
-    forces
-        .all(|force| (force - first).abs() <= 1e-12 * first.abs())
-        .then_some(first)
-}
-
-fn force_square(samples: &[FitSample], sigma_scale: f64) -> f64 {
-    samples
-        .iter()
-        .filter(|sample| sample.is_measured())
-        .map(|sample| (sample.force.0 * sigma_scale / sample.sigma.0).powi(2))
-        .sum()
 }

@@ -1,8 +1,9 @@
 //! Standard errors that allow for the memory of the residuals.
 
+use super::block_sums::NoiseBlock;
 use super::noise::{self, Blocks, Memory};
 use super::options::{CONTACT, PARAMETER_NAMES, TAU};
-use super::system::{Mapped, NoiseBlock, System};
+use super::system::{Mapped, System};
 use super::triangle::Factor;
 use super::{refine::Refined, solve::Fitted};
 
