@@ -29,6 +29,11 @@ pub(super) struct KnownFit {
 }
 
 impl KnownFit {
+    /// Why it is a poor ground for a plan, if it is.
+    pub fn doubt(&self) -> Option<&'static str> {
+        doubt(&self.parameters)
+    }
+
     /// The body found; a name that is missing is named.
     pub fn body(&self) -> Result<ModifiedKelvin, String> {
         let value = |name: &str| {
@@ -43,6 +48,20 @@ impl KnownFit {
             tau_sig: value("tau_sig")?,
         })
     }
+}
+
+/// Why a fit is a poor ground for a plan, if it is.
+pub(super) fn doubt(parameters: &[Parameter]) -> Option<&'static str> {
+    let tau = parameters
+        .iter()
+        .find(|parameter| parameter.name == "tau_eps")?;
+    let is_known = match tau.std_error {
+        Some(error) => error < 0.5 * tau.value,
+        None => tau.is_fixed,
+    };
+    (!is_known).then_some(
+        "tau_eps of that fit is hardly known, so a plan from it is a guess; name a better record with --like",
+    )
 }
 
 /// Keeps a fit for later commands. That it cannot be kept is worth a note and nothing more.
@@ -130,6 +149,23 @@ fn state_file_from(
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_relaxation_time_that_is_hardly_known_is_doubted() {
+        let tau = |std_error, is_fixed| Parameter {
+            name: "tau_eps".into(),
+            value: 1.0,
+            unit: "s".into(),
+            std_error,
+            ci95: None,
+            is_fixed,
+        };
+        assert_eq!(doubt(&[tau(Some(0.01), false)]), None);
+        assert_eq!(doubt(&[tau(None, true)]), None);
+        for poor in [tau(Some(2.0), false), tau(None, false)] {
+            assert!(doubt(&[poor]).is_some());
+        }
+    }
 
     #[cfg(not(windows))]
     #[test]

@@ -237,6 +237,7 @@ fn rig_of(args: &PlanArgs, bench: &OpenRig) -> Result<Rig, Failure> {
 
 fn assumed(like: Option<&Path>, output: &Output) -> Result<Assumed, Failure> {
     let from_fit = |known: &KnownFit, source: String| {
+        known.doubt().iter().for_each(|doubt| output.note(doubt));
         Ok(Assumed {
             body: known.body().map_err(Failure::usage)?,
             noise: Newtons(known.rmse_n),
@@ -267,6 +268,9 @@ fn assumed(like: Option<&Path>, output: &Output) -> Result<Assumed, Failure> {
     record.notes.iter().for_each(|note| output.note(note));
     let report = fit(&record.samples, &FitOptions::default())
         .map_err(|err| Failure::failed(format!("{err}, in {source}")))?;
+    last_fit::doubt(&report.parameters)
+        .iter()
+        .for_each(|doubt| output.note(doubt));
     Ok(Assumed {
         body: report.body(),
         noise: Newtons(report.rmse_n),
