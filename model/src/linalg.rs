@@ -4,7 +4,7 @@
 /// Upper triangle of `[A | y]`, `N` columns with the response as the last.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct Triangle<const N: usize> {
-    r: [[f64; N]; N],
+    pub r: [[f64; N]; N],
 }
 
 impl<const N: usize> Default for Triangle<N> {

@@ -7,7 +7,7 @@
 use super::noise::{Noise, Unknowns};
 use super::protocol::{Protocol, duration_of};
 use super::response::{COLUMNS, DIRECT_MAX, NUISANCES, Press, STEPS_PER_TAU_MIN};
-use super::triangle::Triangle;
+use crate::linalg::Triangle;
 use crate::units::{Newtons, Seconds};
 use crate::viscoelastic::{BodyError, ModifiedKelvin};
 use serde::Serialize;

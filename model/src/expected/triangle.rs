@@ -1,6 +1,7 @@
-//! A small orthogonal factorisation, and what its columns cannot tell apart.
+//! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
 
 use super::information::{BODY, PARAMETER_NAMES};
+use crate::linalg::Triangle;
 
 /// A design with columns of unit length and a smallest singular value below the inverse of this
 /// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
@@ -10,37 +11,8 @@ const CONDITION_MAX: f64 = 1e6;
 /// Parameters with at least this share of the largest entry belong to the blind combination.
 const NAMED_SHARE: f64 = 0.2;
 
-/// Upper triangle of an orthogonal factorisation that takes one row at a time (Givens rotations;
-/// Golub & Van Loan, Matrix Computations, section 5.2.5).
-#[derive(Clone, Debug)]
-pub(super) struct Triangle<const N: usize> {
-    pub r: [[f64; N]; N],
-}
-
-impl<const N: usize> Default for Triangle<N> {
-    fn default() -> Self {
-        Self { r: [[0.0; N]; N] }
-    }
-}
-
 impl<const N: usize> Triangle<N> {
-    /// Rotates one row into the triangle.
-    pub fn push(&mut self, mut row: [f64; N]) {
-        for i in 0..N {
-            if row[i] == 0.0 {
-                continue;
-            }
-            let (a, b) = (self.r[i][i], row[i]);
-            let norm = a.hypot(b);
-            let (cos, sin) = (a / norm, b / norm);
-            self.r[i][i] = norm;
-            for (top, bottom) in self.r[i].iter_mut().zip(&mut row).skip(i + 1) {
-                (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
-            }
-        }
-    }
-
-    /// Of one column.
+    /// Squared length of one column.
     pub fn length_squared(&self, column: usize) -> f64 {
         self.r.iter().map(|row| row[column].powi(2)).sum()
     }

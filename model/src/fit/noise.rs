@@ -16,14 +16,21 @@ const SPARE_MIN: usize = 12;
 /// Twice the gain in log-likelihood that memory must bring: the 95 % point of chi-square with three
 /// degrees of freedom (strength, duration, level).
 const GAIN_MIN: f64 = 7.81;
-/// Memories tried, in blocks, before refinement; the longest is the record itself.
+/// Memories tried before refinement, evenly in their logarithm from [`SHORTEST`] to half the record.
 const MEMORIES: usize = 9;
+/// Shortest memory tried, in blocks: of a shorter one next to nothing reaches the next block (4 %).
+const SHORTEST: f64 = 0.3;
+/// Step in both coordinates over which the likelihood's curvature is taken: a third in the memory,
+/// small beside what a record can tell of it.
+const CURVATURE_STEP: f64 = 0.3;
+/// Shares of the lasting part looked at: their logit, 0.1 % to 99.9 %.
+const LOGIT_MAX: f64 = 7.0;
 /// Shares of the lasting part tried at each.
 const SHARES: [f64; 5] = [0.02, 0.1, 0.3, 0.65, 1.0];
 /// Variance of the logarithm of the long-run variance when next to nothing is known of it.
 const UNCERTAINTY_MAX: f64 = 0.5;
-/// Columns at most, the residual included; more are dropped by joining (see `Whitened`).
-const COLUMNS_MAX: usize = 12;
+/// Columns at most, the residual included: a record has eight parameters.
+const COLUMNS_MAX: usize = 9;
 
 /// Residuals of one record in blocks, each over the root of its count: `residuals[b]` and, for
 /// every unknown, its column.
@@ -98,7 +105,7 @@ pub(super) fn memory(blocks: &Blocks, white: f64) -> Option<Memory> {
     let without = spare * white.ln() + alone.square / white + alone.logs;
     let count = whitened.rows.len() as f64;
     let longest = (count / 2.0).ln();
-    let shortest = 0.3f64.ln();
+    let shortest = SHORTEST.ln();
     let memory = |i: f64| (shortest + (longest - shortest) * i / (MEMORIES - 1) as f64).exp();
     let deviance = |log_blocks: f64, share: f64| {
         let forgetting = (-(-log_blocks).exp()).exp();
@@ -120,7 +127,7 @@ pub(super) fn memory(blocks: &Blocks, white: f64) -> Option<Memory> {
         }
     }
     let of = |[log_blocks, logit]: [f64; 2]| {
-        if log_blocks > longest || log_blocks < shortest - 1.0 || logit.abs() > 7.0 {
+        if log_blocks > longest || log_blocks < shortest - 1.0 || logit.abs() > LOGIT_MAX {
             return f64::INFINITY;
         }
         deviance(log_blocks, expit(logit))
@@ -198,7 +205,7 @@ fn descend(from: [f64; 2], value: f64, of: impl Fn([f64; 2]) -> f64) -> ([f64; 2
 /// Variance of the logarithm of the long-run variance, from the curvature of the deviance (twice
 /// the negative log-likelihood) along both coordinates and the scatter of the level itself.
 fn uncertainty(at: [f64; 2], of: impl Fn([f64; 2]) -> f64, spare: f64) -> f64 {
-    let h = 0.3;
+    let h = CURVATURE_STEP;
     let shifted = |a: f64, b: f64| of([at[0] + a * h, at[1] + b * h]);
     let (here, right, left) = (of(at), shifted(1.0, 0.0), shifted(-1.0, 0.0));
     let (up, down) = (shifted(0.0, 1.0), shifted(0.0, -1.0));
@@ -352,8 +359,8 @@ fn moving_average(forgetting: f64, neighbour: f64) -> Option<f64> {
     })
 }
 
-/// An orthonormal basis of the columns (Householder, through the triangle); columns that depend on
-/// the others are left out.
+/// An orthonormal basis of the columns (Gram-Schmidt, twice); columns that depend on the others, or
+/// touch other records only, are left out.
 fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for column in columns {
