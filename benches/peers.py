@@ -53,14 +53,18 @@ class Model:
         ]
         self.rate = d / self.h
 
+    def drives(self, tau):
+        """Step over tau, and the weighted forcing of x, x^2, x^3."""
+        r = self.h / tau
+        weights = psi(r)
+        return r, [sum(w * part for w, part in zip(weights, parts)) for parts in self.parts]
+
     def force_by_column(self, p):
         """The same model as most would write it: filter every column, then combine."""
         tau, mu1, mu2, mu3, tau_sig, f0, f_offset = p
         if tau <= 0:
             return np.full(len(self.t), 1e6)
-        r = self.h / tau
-        weights = psi(r)
-        first, second, third = (sum(w * part for w, part in zip(weights, parts)) for parts in self.parts)
+        r, (first, second, third) = self.drives(tau)
 
         def filtered(drive):
             return np.concatenate(([0.0], lfilter([1.0], [1.0, -math.exp(-r)], drive)))
@@ -74,9 +78,7 @@ class Model:
         if tau <= 0:
             # LM knows no bounds; a residual this large makes it take a shorter step.
             return np.full(len(self.t), 1e6)
-        r = self.h / tau
-        weights = psi(r)
-        first, second, third = (sum(w * part for w, part in zip(weights, parts)) for parts in self.parts)
+        r, (first, second, third) = self.drives(tau)
         # The filter is linear, so one pass over the weighted sum serves all columns.
         drive = mu1 * first + mu2 * second + mu3 * third + tau_sig * self.rate * first
         force = np.empty(len(self.t))

@@ -1,6 +1,6 @@
 //! `palpate fit`: one source, many, pictures, tables of all kinds.
 
-use super::{json, palpate, short_run, stderr, succeeded};
+use super::{json, palpate, short_run, stderr, stdout, succeeded};
 use palpate_app::report::text;
 use palpate_app::workers::fit::fit_source;
 use palpate_model::fit::FitOptions;
@@ -31,10 +31,6 @@ fn rows(count: usize, step_secs: f64, stiffness: f64) -> String {
 
 fn table(path: &Path, rows: &str) {
     std::fs::write(path, format!("t_s,x_mm,F_N\n{rows}")).expect("a table is written");
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8(output.stdout.clone()).expect("output is text")
 }
 
 #[test]

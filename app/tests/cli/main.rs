@@ -2,6 +2,7 @@
 
 mod disk;
 mod fit;
+mod plan;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -15,6 +16,10 @@ fn palpate(folder: &Path, args: &[&str]) -> Output {
         .stdin(Stdio::null())
         .output()
         .expect("palpate starts")
+}
+
+fn stdout(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned()
 }
 
 fn json(output: &Output) -> Value {

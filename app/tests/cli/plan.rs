@@ -1,40 +1,11 @@
 //! `palpate plan` as a user meets it.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
-
+use super::{json, palpate, stderr, stdout, succeeded};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
-
-fn palpate(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(args)
-        .current_dir(folder)
-        .env("PALPATE_HOME", folder.join("library"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("palpate starts")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn json(output: &Output) -> Value {
-    let text = stdout(output);
-    serde_json::from_str(&text).unwrap_or_else(|err| panic!("{err}: {text}{}", stderr(output)))
-}
-
-fn succeeded(output: &Output) {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-}
 
 /// Half-width of the 95 % interval in percent, as planned or as fitted.
 fn percent(parameters: &Value, name: &str) -> f64 {
