@@ -10,7 +10,7 @@ use serde_json::Value;
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
 use std::path::Path;
-use std::process::{Command, Output, Stdio};
+use std::process::{Command, Stdio};
 
 /// Rows of a ramp and hold of the thesis body, 0.75 mm/s to 30 mm, for as long as `count` says.
 fn rows(count: usize, step_secs: f64, stiffness: f64) -> String {

@@ -9,11 +9,14 @@ use std::path::Path;
 
 /// Half-width of the 95 % interval in percent, as planned or as fitted.
 fn percent(parameters: &Value, name: &str) -> f64 {
-    let all = parameters.as_array().unwrap();
-    let one = all.iter().find(|one| one["name"] == name).unwrap();
+    let all = parameters.as_array().expect("the plan names it");
+    let one = all
+        .iter()
+        .find(|one| one["name"] == name)
+        .expect("the plan names it");
     one["percent"].as_f64().unwrap_or_else(|| {
-        let [low, high] = [0, 1].map(|side| one["ci95"][side].as_f64().unwrap());
-        50.0 * (high - low) / one["value"].as_f64().unwrap().abs()
+        let [low, high] = [0, 1].map(|side| one["ci95"][side].as_f64().expect("the plan names it"));
+        50.0 * (high - low) / one["value"].as_f64().expect("the plan names it").abs()
     })
 }
 
@@ -28,7 +31,7 @@ fn table(at: &Path, body: &ModifiedKelvin) {
         // A millinewton of converter steps, so that residuals are not zero.
         let _ = writeln!(text, "{t},{depth},{:.3}", force);
     }
-    std::fs::write(at.join("press.csv"), text).unwrap();
+    std::fs::write(at.join("press.csv"), text).expect("the plan names it");
 }
 
 #[test]
