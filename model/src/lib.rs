@@ -10,6 +10,7 @@
 
 pub mod calibration;
 pub mod expected;
+pub mod families;
 pub mod fit;
 mod linalg;
 pub mod rig;

@@ -7,6 +7,7 @@
 mod block_sums;
 mod bootstrap;
 mod design;
+mod family;
 mod identify;
 mod live;
 mod maxwell;
@@ -26,6 +27,7 @@ mod triangle;
 mod uncertainty;
 
 pub use bootstrap::{Bootstrap, BootstrapInterval};
+pub use family::{FamilyFit, FamilyOptions, FamilyParameter, RecordFit, fit_family};
 pub use live::{LiveEstimate, LiveFit, ResidualBlocks, Verdict};
 pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};

@@ -153,6 +153,14 @@ pub enum FitError {
         /// What it must be.
         reason: &'static str,
     },
+    /// A family that these records do not hold.
+    #[error("{family}: {reason}")]
+    Unsupported {
+        /// The family.
+        family: String,
+        /// Why not.
+        reason: String,
+    },
     /// The numbers overflowed.
     #[error(
         "the fit produced numbers that are not finite; check the units of depth (mm) and force (N)"

@@ -10,6 +10,5 @@ pub(crate) use exact_step::{Compensated, NEGLIGIBLE, Pieces, StepWeights, forcin
 pub use kelvin::{BodyError, KelvinState, ModifiedKelvin};
 pub(crate) use maxwell::MaxwellStep;
 pub use maxwell::{Integrator, Maxwell, MaxwellState};
-pub(crate) use psi::psi_all;
-pub(crate) use psi::{PSI_COUNT, psi_derivatives};
+pub(crate) use psi::{PSI_COUNT, psi_all, psi_derivatives, psi_first};
 pub use psi::{psi, psi_derivative};

@@ -60,13 +60,18 @@ pub fn psi_derivative(j: u32, r: f64) -> f64 {
 }
 
 /// `psi_0 ..= psi_4` together.
+pub(crate) fn psi_all(r: f64) -> [f64; PSI_COUNT] {
+    psi_first(r)
+}
+
+/// The first `N` of the functions together.
 ///
 /// Below 1 only the highest comes from its series; the others follow downwards by
 /// `psi_{j-1} = (r / j)(1 - psi_j)`, which damps errors because `psi_j < 1/2` there.
-pub(crate) fn psi_all(r: f64) -> [f64; PSI_COUNT] {
-    let mut all = [0.0; PSI_COUNT];
+pub(crate) fn psi_first<const N: usize>(r: f64) -> [f64; N] {
+    let mut all = [0.0; N];
     if r < 1.0 {
-        let top = PSI_COUNT - 1;
+        let top = N - 1;
         all[top] = series(top as f64, r);
         for j in (1..=top).rev() {
             all[j - 1] = r / j as f64 * (1.0 - all[j]);
@@ -150,6 +155,8 @@ mod tests {
                 assert!(relative < 1e-15, "all, psi_{j}({r:e}): {relative:e}");
                 worst = worst.max(relative);
             }
+            let relative = (psi_first::<6>(r)[j as usize] - exact).abs() / exact;
+            assert!(relative < 1e-15, "first, psi_{j}({r:e}): {relative:e}");
         }
         println!("psi within {worst:.1e} of 50 digits");
     }

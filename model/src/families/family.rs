@@ -1,0 +1,107 @@
+//! What a model family is, as distinct from a fitted model.
+
+use super::model::ModelParameter;
+use super::relaxation::Relaxation;
+use std::fmt::Debug;
+
+/// A family of force models: an equation whose parameters are not known yet.
+///
+/// For given outer parameters the force is a linear combination of columns, each the exact response
+/// of a few relaxation terms to the depth history; so the fit of any family is a search over its
+/// outer parameters with a linear problem inside.
+pub trait Family: Debug + Send + Sync {
+    /// Short name for files and the command line, such as `series-3`.
+    fn key(&self) -> String;
+
+    /// Name in words.
+    fn name(&self) -> String;
+
+    /// The equation, with its source.
+    fn equation(&self) -> &'static str;
+
+    /// What no choice of parameters can represent, in one sentence.
+    fn cannot_represent(&self) -> &'static str;
+
+    /// Whether it can be fitted while a run goes on.
+    fn live(&self) -> Live {
+        Live::No(
+            "the live fit follows a bank of relaxation times for the modified Kelvin body of third order only",
+        )
+    }
+
+    /// Parameters in which it is not linear.
+    fn outer(&self) -> Vec<Outer>;
+
+    /// Its coefficients: name and unit.
+    fn linear(&self) -> Vec<(String, &'static str)>;
+
+    /// The columns for outer parameters in their units, one for each coefficient.
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>>;
+
+    /// Whether a coefficient must not be negative.
+    fn is_non_negative(&self, _coefficient: usize) -> bool {
+        false
+    }
+
+    /// The relaxation time, in s, by which a force present at the start fades; `None` where the
+    /// family has none or many.
+    fn fading(&self, _outer: &[f64]) -> Option<f64> {
+        None
+    }
+
+    /// The parameters as its literature writes them, where these are not the coefficients themselves.
+    fn derived(&self, _outer: &[f64], _linear: &[f64]) -> Vec<ModelParameter> {
+        Vec::new()
+    }
+}
+
+/// Whether a family can be fitted during a run.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Live {
+    /// Yes.
+    Yes,
+    /// No, and why.
+    No(&'static str),
+}
+
+/// A parameter in which a family is not linear.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outer {
+    /// Name.
+    pub name: String,
+    /// Unit.
+    pub unit: &'static str,
+    /// Where it is searched.
+    pub range: OuterRange,
+}
+
+/// Where an outer parameter is searched.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OuterRange {
+    /// A relaxation time: what the records can show, searched by its logarithm.
+    Time,
+    /// Per mm of depth: between two numbers over the greatest depth, by its logarithm.
+    PerDepth(f64, f64),
+    /// A positive number between two, by its logarithm.
+    Ratio(f64, f64),
+    /// A number between two, evenly.
+    Share(f64, f64),
+}
+
+impl OuterRange {
+    /// Whether a model may have this value, or what it must be. The range searched may be narrower.
+    pub fn allows(self, value: f64) -> Result<(), &'static str> {
+        match self {
+            Self::Share(low, high) if !(low..=high).contains(&value) => {
+                Err("within the range of its family")
+            }
+            Self::Time | Self::PerDepth(..) | Self::Ratio(..)
+                if !(value > 0.0 && value.is_finite()) =>
+            {
+                Err("a finite number above zero")
+            }
+            Self::Ratio(..) if value < 1.0 => Err("at least 1"),
+            _ => Ok(()),
+        }
+    }
+}

@@ -1,0 +1,130 @@
+//! The fractional Zener body: a spring beside a spring in series with a spring-pot.
+
+use super::family::{Family, Outer, OuterRange};
+use super::model::ModelParameter;
+use super::relaxation::{Drive, Relaxation};
+use std::f64::consts::PI;
+
+/// Relaxation modulus `k0 + k1 E_alpha(-(t / tau)^alpha)`, with the Mittag-Leffler function; as an
+/// equation `F + tau^alpha D^alpha F = k0 x + (k0 + k1) tau^alpha D^alpha x`.
+///
+/// Mainardi, "Fractional Calculus and Waves in Linear Viscoelasticity", section 3.2. The function is
+/// an integral of exponentials (Gorenflo & Mainardi 1997, section 3),
+/// `E_alpha(-s^alpha) = int K(u) exp(-s e^u) du`, `K = sin(alpha pi) / (2 pi (cosh(alpha u) + cos(alpha pi)))`,
+/// and `K` is analytic, so the trapezoid rule converges exponentially (Trefethen & Weideman, SIAM Rev.
+/// 56 (2014) 385-458): the body is a fixed pattern of Maxwell bodies.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct FractionalZener {
+    digits: u32,
+}
+
+/// Digits of the modulus unless asked otherwise.
+pub const FRACTIONAL_DIGITS: u32 = 6;
+/// Relaxation times that no recording can tell from none, or from for ever, relative to `tau`: twelve
+/// decades either way; what lies beyond is lumped into a dashpot and a spring.
+const DECADES: f64 = 12.0;
+
+impl Default for FractionalZener {
+    fn default() -> Self {
+        Self {
+            digits: FRACTIONAL_DIGITS,
+        }
+    }
+}
+
+impl FractionalZener {
+    /// The family with its modulus to about so many digits, 1 to 14; `None` for other numbers.
+    #[must_use]
+    pub fn of_digits(digits: u32) -> Option<Self> {
+        (1..=14).contains(&digits).then_some(Self { digits })
+    }
+
+    /// `(u, weight)`: shares of the modulus that relax by `exp(-s e^u)`. Shares beyond the ends are
+    /// given to the ends.
+    fn spectrum(&self, alpha: f64) -> Vec<(f64, f64)> {
+        let accuracy = f64::from(self.digits) * std::f64::consts::LN_10;
+        // Nearest poles of K lie at +-i pi (1 - alpha) / alpha, and exp(-s e^u) stays bounded up to
+        // +-i pi / 2: the rule errs by exp(-2 pi width / step).
+        let width = (PI * (1.0 - alpha) / alpha).min(PI / 2.0);
+        let step = 2.0 * PI * width / accuracy;
+        // K falls like exp(-alpha |u|).
+        let reach = (accuracy / alpha).min(DECADES * std::f64::consts::LN_10);
+        let count = (reach / step).ceil() as i32;
+        let kernel =
+            |u: f64| (alpha * PI).sin() / (2.0 * PI * ((alpha * u).cosh() + (alpha * PI).cos()));
+        // What the tails hold: K integrates to atan(tan(alpha pi / 2) tanh(alpha u / 2)) / (alpha pi).
+        let within =
+            |u: f64| ((alpha * PI / 2.0).tan() * (alpha * u / 2.0).tanh()).atan() / (alpha * PI);
+        let edge = step * (f64::from(count) + 0.5);
+        let tail = 0.5 - within(edge);
+        (-count..=count)
+            .map(|m| {
+                let u = step * f64::from(m);
+                let extra = if m.abs() == count { tail } else { 0.0 };
+                (u, step * kernel(u) + extra)
+            })
+            .collect()
+    }
+}
+
+impl Family for FractionalZener {
+    fn key(&self) -> String {
+        if self.digits == FRACTIONAL_DIGITS {
+            "fractional".into()
+        } else {
+            format!("fractional-{}", self.digits)
+        }
+    }
+
+    fn name(&self) -> String {
+        "fractional Kelvin-Zener".into()
+    }
+
+    fn equation(&self) -> &'static str {
+        "F + tau^alpha D^alpha F = k0 x + (k0 + k1) tau^alpha D^alpha x"
+    }
+
+    fn cannot_represent(&self) -> &'static str {
+        "stiffness that grows with depth; unloading that differs from loading; alpha above 0.95, which is a Kelvin body"
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        vec![
+            Outer {
+                name: "tau".into(),
+                unit: "s",
+                range: OuterRange::Time,
+            },
+            Outer {
+                name: "alpha".into(),
+                unit: "",
+                range: OuterRange::Share(0.1, 0.95),
+            },
+        ]
+    }
+
+    fn linear(&self) -> Vec<(String, &'static str)> {
+        vec![("k_0".into(), "N/mm"), ("k_1".into(), "N/mm")]
+    }
+
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+        let (tau, spring) = (outer[0], Drive::power(1, 1.0));
+        let relaxing = self
+            .spectrum(outer[1])
+            .into_iter()
+            .map(|(u, weight)| Relaxation::maxwell(spring, tau * (-u).exp()).scaled(weight));
+        vec![vec![Relaxation::spring(spring)], relaxing.collect()]
+    }
+
+    fn is_non_negative(&self, coefficient: usize) -> bool {
+        coefficient > 0
+    }
+
+    fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
+        vec![ModelParameter {
+            name: "k_instant".into(),
+            value: linear[0] + linear[1],
+            unit: "N/mm".into(),
+        }]
+    }
+}

@@ -1,0 +1,57 @@
+//! The Maxwell body: a spring and a dashpot in series.
+
+use super::family::{Family, Outer, OuterRange};
+use super::model::ModelParameter;
+use super::relaxation::{Drive, Relaxation};
+
+/// `F + (eta / k) F' = eta x'`, as the spring `k` and its relaxation time `tau = eta / k`.
+///
+/// Fung, "Biomechanics: Mechanical Properties of Living Tissues", 2nd ed., section 2.11.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Maxwell;
+
+impl Family for Maxwell {
+    fn key(&self) -> String {
+        "maxwell".into()
+    }
+
+    fn name(&self) -> String {
+        "Maxwell".into()
+    }
+
+    fn equation(&self) -> &'static str {
+        "F + tau F' = k tau x'"
+    }
+
+    fn cannot_represent(&self) -> &'static str {
+        "a force that stays while depth is held; stiffness that grows with depth; unloading that differs from loading"
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        vec![Outer {
+            name: "tau".into(),
+            unit: "s",
+            range: OuterRange::Time,
+        }]
+    }
+
+    fn linear(&self) -> Vec<(String, &'static str)> {
+        vec![("k".into(), "N/mm")]
+    }
+
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+        vec![vec![Relaxation::maxwell(Drive::power(1, 1.0), outer[0])]]
+    }
+
+    fn fading(&self, outer: &[f64]) -> Option<f64> {
+        Some(outer[0])
+    }
+
+    fn derived(&self, outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
+        vec![ModelParameter {
+            name: "eta".into(),
+            value: linear[0] * outer[0],
+            unit: "N*s/mm".into(),
+        }]
+    }
+}

@@ -1,0 +1,98 @@
+//! Families of force models and their fitted members.
+//!
+//! A [`Family`] is an equation; a [`Model`] is a family with numbers; a [`Body`] is a model that
+//! remembers its depth history. One family to a file. All share one exact step: every family is a sum of
+//! [`Relaxation`] terms driven by powers and exponentials of depth, and the response of such a term
+//! to a straight piece of depth has a closed form.
+//!
+//! Galford's four-element body is left out: no public text that defines it could be verified.
+
+mod exponential;
+mod exponential_step;
+mod family;
+mod fractional;
+mod kelvin;
+mod maxwell;
+mod model;
+mod power_series;
+mod prony;
+mod quadrature;
+mod quasi_linear;
+mod relaxation;
+mod response;
+mod voigt;
+
+pub use exponential::ExponentialKelvin;
+pub use family::{Family, Live, Outer, OuterRange};
+pub use fractional::{FRACTIONAL_DIGITS, FractionalZener};
+pub use kelvin::Kelvin;
+pub use maxwell::Maxwell;
+pub(crate) use model::joined;
+pub use model::{AlongError, Body, Model, ModelError, ModelParameter};
+pub use power_series::PowerSeries;
+pub use prony::{Prony, TERMS_MAX};
+pub use quasi_linear::{QUASI_LINEAR_NODES, QuasiLinear};
+pub use relaxation::{Drive, POWER_MAX, Relaxation};
+pub use response::{Response, StepError};
+pub use voigt::Voigt;
+
+use thiserror::Error;
+
+/// No family has this key.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("there is no model family '{key}'; there are {known}")]
+pub struct UnknownFamily {
+    /// What was asked for.
+    pub key: String,
+    /// Keys there are.
+    pub known: String,
+}
+
+/// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body.
+#[must_use]
+pub fn all() -> Vec<Box<dyn Family>> {
+    let mut all: Vec<Box<dyn Family>> = vec![Box::new(Voigt), Box::new(Maxwell), Box::new(Kelvin)];
+    for order in 1..=POWER_MAX {
+        all.extend(PowerSeries::of_order(order).map(|family| Box::new(family) as Box<dyn Family>));
+    }
+    all.push(Box::new(ExponentialKelvin));
+    for terms in 2..=TERMS_MAX {
+        all.extend(Prony::of_terms(terms).map(|family| Box::new(family) as Box<dyn Family>));
+    }
+    all.push(Box::new(FractionalZener::default()));
+    all.push(Box::new(QuasiLinear::default()));
+    all
+}
+
+/// The family of a key such as `series-3`, `prony-4` or `fung-8`.
+pub fn by_key(key: &str) -> Result<Box<dyn Family>, UnknownFamily> {
+    let boxed: Option<Box<dyn Family>> = match key {
+        "voigt" => Some(Box::new(Voigt)),
+        "maxwell" => Some(Box::new(Maxwell)),
+        "kelvin" => Some(Box::new(Kelvin)),
+        "exponential" => Some(Box::new(ExponentialKelvin)),
+        "fung" => Some(Box::new(QuasiLinear::default())),
+        "fractional" => Some(Box::new(FractionalZener::default())),
+        _ => key.split_once('-').and_then(|(kind, number)| {
+            let number: usize = number.parse().ok()?;
+            match kind {
+                "series" => PowerSeries::of_order(number).map(|one| Box::new(one) as _),
+                "prony" => Prony::of_terms(number).map(|one| Box::new(one) as _),
+                "fung" => QuasiLinear::of_nodes(number).map(|one| Box::new(one) as _),
+                "fractional" => u32::try_from(number)
+                    .ok()
+                    .and_then(FractionalZener::of_digits)
+                    .map(|one| Box::new(one) as _),
+                _ => None,
+            }
+        }),
+    };
+    boxed.ok_or_else(|| UnknownFamily {
+        key: key.to_owned(),
+        known: all()
+            .iter()
+            .map(|family| family.key())
+            .collect::<Vec<_>>()
+            .join(", "),
+    })
+}

@@ -1,0 +1,226 @@
+//! A fitted model: a family with its parameters known.
+
+use super::family::Family;
+use super::relaxation::Relaxation;
+use super::response::{Response, StepError};
+use super::{UnknownFamily, by_key};
+use crate::units::{Depth, Newtons, Seconds};
+use serde::{Deserialize, Serialize};
+use thiserror::Error;
+
+/// A named number with its unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ModelParameter {
+    /// Name.
+    pub name: String,
+    /// Value, in `unit`.
+    pub value: f64,
+    /// Unit.
+    pub unit: String,
+}
+
+/// A model of one family with all its parameters.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Model {
+    /// Key of the family.
+    pub family: String,
+    /// Outer parameters, in the family's order and units.
+    pub outer: Vec<f64>,
+    /// Coefficients, in the family's order and units.
+    pub linear: Vec<f64>,
+}
+
+/// Numbers that are no model.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ModelError {
+    /// No such family.
+    #[error(transparent)]
+    Family(#[from] UnknownFamily),
+    /// Too many or too few numbers.
+    #[error("a model of family {family} has {wanted} numbers and {given} were given; give {names}")]
+    Count {
+        /// The family.
+        family: String,
+        /// How many it has.
+        wanted: usize,
+        /// How many came.
+        given: usize,
+        /// Their names.
+        names: String,
+    },
+    /// A number out of its range.
+    #[error("{family}: {name} cannot be {value}; it must be {must}")]
+    Value {
+        /// The family.
+        family: String,
+        /// The parameter.
+        name: String,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        must: &'static str,
+    },
+}
+
+/// A path has no force.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum AlongError {
+    /// The model is none.
+    #[error(transparent)]
+    Model(#[from] ModelError),
+    /// A step has no answer.
+    #[error(transparent)]
+    Step(#[from] StepError),
+}
+
+impl Model {
+    /// The model, if its numbers describe one: positive times, finite coefficients.
+    pub fn checked(self) -> Result<Self, ModelError> {
+        let family = by_key(&self.family)?;
+        let (outer, linear) = (family.outer(), family.linear());
+        if outer.len() != self.outer.len() || linear.len() != self.linear.len() {
+            let names = outer.iter().map(|one| one.name.clone());
+            let names: Vec<String> = names
+                .chain(linear.iter().map(|(name, _)| name.clone()))
+                .collect();
+            return Err(ModelError::Count {
+                family: self.family.clone(),
+                wanted: outer.len() + linear.len(),
+                given: self.outer.len() + self.linear.len(),
+                names: names.join(", "),
+            });
+        }
+        let bad = |name: &str, value: f64, must: &'static str| ModelError::Value {
+            family: self.family.clone(),
+            name: name.to_owned(),
+            value,
+            must,
+        };
+        for (known, &value) in outer.iter().zip(&self.outer) {
+            if let Err(must) = known.range.allows(value) {
+                return Err(bad(&known.name, value, must));
+            }
+        }
+        for ((name, _), &value) in linear.iter().zip(&self.linear) {
+            if !value.is_finite() {
+                return Err(bad(name, value, "a finite number"));
+            }
+        }
+        Ok(self)
+    }
+
+    /// Its terms, those of one relaxation time joined, ready for any depth history.
+    pub fn terms(&self) -> Result<Vec<Relaxation>, ModelError> {
+        let family = by_key(&self.family)?;
+        Ok(joined(
+            &family.columns(&self.outer),
+            self.linear.iter().copied(),
+        ))
+    }
+
+    /// The body, relaxed with the probe at `depth`.
+    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, ModelError> {
+        Ok(Body {
+            response: Response::new(&[self.terms()?], depth),
+        })
+    }
+
+    /// The force in N along a path of `(time, depth)`, from a body relaxed at its first point.
+    pub fn along(
+        &self,
+        path: impl IntoIterator<Item = (Seconds, Depth)>,
+    ) -> Result<Vec<f64>, AlongError> {
+        let mut path = path.into_iter();
+        let Some((mut before, start)) = path.next() else {
+            return Ok(Vec::new());
+        };
+        let mut body = self.at_rest_from(start)?;
+        let mut forces = vec![body.force().0];
+        for (t, depth) in path {
+            forces.push(body.step(depth, Seconds(t.0 - before.0))?.0);
+            before = t;
+        }
+        Ok(forces)
+    }
+
+    /// All parameters: outer ones, coefficients, and what the literature makes of them.
+    pub fn parameters(&self) -> Result<Vec<ModelParameter>, ModelError> {
+        let family = by_key(&self.family)?;
+        let outer = family.outer();
+        let outer = outer.into_iter().zip(&self.outer);
+        let outer = outer.map(|(one, value)| ModelParameter {
+            name: one.name,
+            value: *value,
+            unit: one.unit.to_owned(),
+        });
+        let linear = family.linear();
+        let linear = linear.into_iter().zip(&self.linear);
+        let linear = linear.map(|((name, unit), value)| ModelParameter {
+            name,
+            value: *value,
+            unit: unit.to_owned(),
+        });
+        let mut all: Vec<ModelParameter> = outer.chain(linear).collect();
+        all.extend(family.derived(&self.outer, &self.linear));
+        Ok(all)
+    }
+}
+
+/// Columns times coefficients, terms of one relaxation time joined: each costs a state.
+pub(crate) fn joined(
+    columns: &[Vec<Relaxation>],
+    linear: impl IntoIterator<Item = f64>,
+) -> Vec<Relaxation> {
+    let mut joined: Vec<Relaxation> = Vec::new();
+    for (column, coefficient) in columns.iter().zip(linear) {
+        for term in column {
+            let term = term.scaled(coefficient);
+            match joined
+                .iter_mut()
+                .find_map(|one| one.plus(&term).map(|sum| (one, sum)))
+            {
+                Some((one, sum)) => *one = sum,
+                None => joined.push(term),
+            }
+        }
+    }
+    joined
+}
+
+/// A body of any family and what it remembers.
+#[derive(Clone, Debug)]
+pub struct Body {
+    response: Response,
+}
+
+impl Body {
+    /// Moves straight to `depth` within `dt` and returns the force there.
+    pub fn step(&mut self, depth: Depth, dt: Seconds) -> Result<Newtons, StepError> {
+        self.response.step(depth, dt)?;
+        Ok(self.force())
+    }
+
+    /// The force now.
+    #[must_use]
+    pub fn force(&self) -> Newtons {
+        Newtons(self.response.sum())
+    }
+
+    /// The depth now.
+    #[must_use]
+    pub fn depth(&self) -> Depth {
+        self.response.depth()
+    }
+}
+
+impl dyn Family + '_ {
+    /// A model of this family.
+    pub fn model(&self, outer: &[f64], linear: &[f64]) -> Result<Model, ModelError> {
+        Model {
+            family: self.key(),
+            outer: outer.to_vec(),
+            linear: linear.to_vec(),
+        }
+        .checked()
+    }
+}

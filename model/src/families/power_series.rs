@@ -1,0 +1,87 @@
+//! Power series in the modified Kelvin body: the elastic part cut off after one to five terms.
+
+use super::family::{Family, Live, Outer, OuterRange};
+use super::relaxation::{Drive, POWER_MAX, Relaxation};
+
+/// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x'`.
+///
+/// Equations 3.1 and 3.3 of the thesis this project implements; its own order is three.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct PowerSeries {
+    order: usize,
+}
+
+/// Units of `mu1 ..= mu5`.
+const UNITS: [&str; POWER_MAX] = ["N/mm", "N/mm^2", "N/mm^3", "N/mm^4", "N/mm^5"];
+
+impl PowerSeries {
+    /// The series cut off after `order` terms; `None` unless that is one to five.
+    #[must_use]
+    pub fn of_order(order: usize) -> Option<Self> {
+        (1..=POWER_MAX).contains(&order).then_some(Self { order })
+    }
+}
+
+impl Family for PowerSeries {
+    fn key(&self) -> String {
+        format!("series-{}", self.order)
+    }
+
+    fn name(&self) -> String {
+        format!("modified Kelvin, order {}", self.order)
+    }
+
+    fn equation(&self) -> &'static str {
+        match self.order {
+            1 => "F + tau_eps F' = mu1 x + tau_sig x x'",
+            2 => "F + tau_eps F' = mu1 x + mu2 x^2 + tau_sig x x'",
+            3 => "F + tau_eps F' = mu1 x + mu2 x^2 + mu3 x^3 + tau_sig x x' (equation 3.3)",
+            4 => "F + tau_eps F' = mu1 x + mu2 x^2 + mu3 x^3 + mu4 x^4 + tau_sig x x'",
+            _ => "F + tau_eps F' = mu1 x + mu2 x^2 + mu3 x^3 + mu4 x^4 + mu5 x^5 + tau_sig x x'",
+        }
+    }
+
+    fn cannot_represent(&self) -> &'static str {
+        "more than one relaxation time; unloading that differs from loading; anything deeper than the data, where a power series runs away"
+    }
+
+    fn live(&self) -> Live {
+        match self.order {
+            3 => Live::Yes,
+            _ => Live::No("the live fit keeps the columns of the third order only"),
+        }
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        vec![Outer {
+            name: "tau_eps".into(),
+            unit: "s",
+            range: OuterRange::Time,
+        }]
+    }
+
+    fn linear(&self) -> Vec<(String, &'static str)> {
+        let mu = (1..=self.order).map(|k| (format!("mu{k}"), UNITS[k - 1]));
+        mu.chain([("tau_sig".to_owned(), "N*s/mm^2")]).collect()
+    }
+
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+        let tau = outer[0];
+        let elastic = (1..=self.order).map(|k| Relaxation {
+            tau,
+            elastic: Drive::power(k, 1.0),
+            rate: Drive::default(),
+        });
+        // x x' is the rate of x^2 / 2.
+        let viscous = Relaxation {
+            tau,
+            elastic: Drive::default(),
+            rate: Drive::power(2, 0.5),
+        };
+        elastic.chain([viscous]).map(|term| vec![term]).collect()
+    }
+
+    fn fading(&self, outer: &[f64]) -> Option<f64> {
+        Some(outer[0])
+    }
+}

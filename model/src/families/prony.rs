@@ -1,0 +1,71 @@
+//! The generalised Maxwell body: a spring beside several Maxwell bodies.
+
+use super::family::{Family, Outer, OuterRange};
+use super::relaxation::{Drive, Relaxation};
+
+/// Most terms offered: beyond one for each decade that a recording shows, terms cannot be told apart.
+pub const TERMS_MAX: usize = 6;
+
+/// `F = k0 x + sum_i k_i m_i`, `m_i + tau_i m_i' = tau_i x'`: relaxation modulus `k0 + sum k_i e^(-t / tau_i)`
+/// (Prony series), all `k_i >= 0`.
+///
+/// Wiechert 1893; Tschoegl, "The Phenomenological Theory of Linear Viscoelastic Behavior", section
+/// 3.5. One term is the Kelvin body.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Prony {
+    terms: usize,
+}
+
+impl Prony {
+    /// The body with `terms` relaxation times, 1 to [`TERMS_MAX`]; `None` for other numbers.
+    #[must_use]
+    pub fn of_terms(terms: usize) -> Option<Self> {
+        (1..=TERMS_MAX).contains(&terms).then_some(Self { terms })
+    }
+}
+
+impl Family for Prony {
+    fn key(&self) -> String {
+        format!("prony-{}", self.terms)
+    }
+
+    fn name(&self) -> String {
+        format!("generalised Maxwell, {} terms", self.terms)
+    }
+
+    fn equation(&self) -> &'static str {
+        "F = k0 x + sum_i k_i m_i, m_i + tau_i m_i' = tau_i x', k_i >= 0"
+    }
+
+    fn cannot_represent(&self) -> &'static str {
+        "stiffness that grows with depth; unloading that differs from loading"
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        let time = |i| Outer {
+            name: format!("tau_{i}"),
+            unit: "s",
+            range: OuterRange::Time,
+        };
+        (1..=self.terms).map(time).collect()
+    }
+
+    fn linear(&self) -> Vec<(String, &'static str)> {
+        (0..=self.terms)
+            .map(|i| (format!("k_{i}"), "N/mm"))
+            .collect()
+    }
+
+    fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
+        let spring = Drive::power(1, 1.0);
+        let relaxing = outer.iter().map(|&tau| Relaxation::maxwell(spring, tau));
+        std::iter::once(Relaxation::spring(spring))
+            .chain(relaxing)
+            .map(|term| vec![term])
+            .collect()
+    }
+
+    fn is_non_negative(&self, coefficient: usize) -> bool {
+        coefficient > 0
+    }
+}

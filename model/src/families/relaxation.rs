@@ -1,0 +1,337 @@
+//! One relaxation time: what drives it and its exact step.
+//!
+//! Every family is a sum of terms `y + tau y' = p(x) + d/dt q(x)`, where `p` (elastic) and `q` (rate)
+//! are made of powers and exponentials of depth:
+//!
+//! * a modified Kelvin body is one term, `p` its elastic polynomial and `q = tau_sig x^2 / 2`;
+//! * a spring `s(x)` in series with a dashpot of relaxation time `tau` is `p = 0`, `q = tau s(x)`;
+//! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
+
+use super::exponential_step::chi_omega;
+use crate::viscoelastic::{Compensated, psi_first};
+
+/// Highest power of depth a drive may have.
+pub const POWER_MAX: usize = 5;
+
+/// A function of depth that is zero at zero depth.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Drive {
+    /// Coefficients of `x, x^2 .. x^5`, in N/mm^k (times s for a rate).
+    pub powers: [f64; POWER_MAX],
+    /// Amplitude `A` of `A (e^(B x) - 1)`, in N, and `B` in 1/mm.
+    pub exponential: Option<(f64, f64)>,
+    /// Coefficients of `x^j (x_max - x)`, `j = 1, 2, 3`, with `x_max` the greatest depth so far: what
+    /// is lost by having been deeper, in N/mm^(j+1).
+    pub softening: [f64; 3],
+}
+
+impl Drive {
+    /// `coefficient * x^power`, `power` 1 to 5.
+    #[must_use]
+    pub fn power(power: usize, coefficient: f64) -> Self {
+        let mut powers = [0.0; POWER_MAX];
+        powers[power - 1] = coefficient;
+        Self {
+            powers,
+            ..Self::default()
+        }
+    }
+
+    /// `amplitude * (e^(per_mm x) - 1)`.
+    #[must_use]
+    pub fn exponential(amplitude: f64, per_mm: f64) -> Self {
+        Self {
+            exponential: Some((amplitude, per_mm)),
+            ..Self::default()
+        }
+    }
+
+    /// `coefficient * x^power (x_max - x)`, `power` 1 to 3.
+    #[must_use]
+    pub fn softening(power: usize, coefficient: f64) -> Self {
+        let mut softening = [0.0; 3];
+        softening[power - 1] = coefficient;
+        Self {
+            softening,
+            ..Self::default()
+        }
+    }
+
+    /// The drive times a number.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        Self {
+            powers: self.powers.map(|value| value * by),
+            exponential: self.exponential.map(|(amplitude, b)| (amplitude * by, b)),
+            softening: self.softening.map(|value| value * by),
+        }
+    }
+
+    /// The sum of two drives, if their exponentials have the same `B`.
+    fn plus(&self, other: &Self) -> Option<Self> {
+        let exponential = match (self.exponential, other.exponential) {
+            (Some((one, b)), Some((two, c))) if b == c => Some((one + two, b)),
+            (Some(_), Some(_)) => return None,
+            (one, two) => one.or(two),
+        };
+        Some(Self {
+            powers: std::array::from_fn(|k| self.powers[k] + other.powers[k]),
+            exponential,
+            softening: std::array::from_fn(|k| self.softening[k] + other.softening[k]),
+        })
+    }
+
+    /// Its polynomial part by power, the constant first, after `x_max`; without a greatest depth
+    /// nothing has softened.
+    fn polynomial(&self, x_max: Option<f64>) -> [f64; POWER_MAX + 1] {
+        let mut all = [0.0; POWER_MAX + 1];
+        all[1..].copy_from_slice(&self.powers);
+        if let Some(x_max) = x_max {
+            for (j, lost) in self.softening.iter().enumerate() {
+                all[j + 1] += lost * x_max;
+                all[j + 2] -= lost;
+            }
+        }
+        all
+    }
+
+    /// Value at depth `x` after `x_max`.
+    #[must_use]
+    pub fn at(&self, x: f64, x_max: f64) -> f64 {
+        let polynomial = self.polynomial(Some(x_max));
+        let sum = polynomial.iter().rev().fold(0.0, |sum, c| sum * x + c);
+        match self.exponential {
+            Some((amplitude, b)) => sum + amplitude * (b * x).exp_m1(),
+            None => sum,
+        }
+    }
+
+    /// Mean over a straight move from `x0` to `x1`, both in contact, after `x_max`.
+    fn mean(&self, x0: f64, x1: f64, x_max: Option<f64>) -> f64 {
+        let polynomial = self.polynomial(x_max);
+        // The mean of x^k is the complete homogeneous polynomial of the ends over k + 1.
+        let (mut homogeneous, mut power, mut sum) = (1.0, 1.0, 0.0);
+        for (k, coefficient) in polynomial.iter().enumerate().skip(1) {
+            power *= x0;
+            homogeneous = power + x1 * homogeneous;
+            sum += coefficient * homogeneous / (k + 1) as f64;
+        }
+        if let Some((amplitude, b)) = self.exponential {
+            let turn = b * (x1 - x0);
+            let growth = if turn == 0.0 {
+                1.0
+            } else {
+                turn.exp_m1() / turn
+            };
+            sum += amplitude * ((b * x0).exp() * growth - 1.0);
+        }
+        sum
+    }
+
+    /// Whether it depends on the greatest depth so far.
+    #[must_use]
+    pub fn softens(&self) -> bool {
+        self.softening.iter().any(|lost| *lost != 0.0)
+    }
+}
+
+/// One term `y + tau y' = elastic(x) + d/dt rate(x)`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Relaxation {
+    /// Relaxation time in s; 0 for a term without memory.
+    pub tau: f64,
+    /// What it tends to when held.
+    pub elastic: Drive,
+    /// What drives it by moving, in units of elastic times s.
+    pub rate: Drive,
+}
+
+impl Relaxation {
+    /// A spring without memory.
+    #[must_use]
+    pub fn spring(elastic: Drive) -> Self {
+        Self {
+            tau: 0.0,
+            elastic,
+            rate: Drive::default(),
+        }
+    }
+
+    /// A spring in series with a dashpot that lets it relax in `tau` seconds.
+    #[must_use]
+    pub fn maxwell(spring: Drive, tau: f64) -> Self {
+        Self {
+            tau,
+            elastic: Drive::default(),
+            rate: spring.scaled(tau),
+        }
+    }
+
+    /// The term times a number.
+    #[must_use]
+    pub fn scaled(self, by: f64) -> Self {
+        Self {
+            tau: self.tau,
+            elastic: self.elastic.scaled(by),
+            rate: self.rate.scaled(by),
+        }
+    }
+
+    /// The sum of two terms of one relaxation time, `None` if it is not one term.
+    #[must_use]
+    pub fn plus(&self, other: &Self) -> Option<Self> {
+        if self.tau != other.tau {
+            return None;
+        }
+        Some(Self {
+            tau: self.tau,
+            elastic: self.elastic.plus(&other.elastic)?,
+            rate: self.rate.plus(&other.rate)?,
+        })
+    }
+}
+
+/// A straight piece of depth in contact.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Piece {
+    pub x0: f64,
+    pub d: f64,
+    /// Duration in s, above zero.
+    pub dt: f64,
+    /// Greatest depth so far; constant over the piece, or the depth itself where `primary`.
+    pub x_max: f64,
+    /// Deeper than ever before: nothing is softened.
+    pub primary: bool,
+}
+
+/// A term and its present value.
+#[derive(Clone, Debug)]
+pub(super) struct Relaxing {
+    pub term: Relaxation,
+    value: Compensated,
+    dt: f64,
+    psi: [f64; POWER_MAX + 1],
+    /// What the next [`Relaxing::settle`] adds.
+    pending: f64,
+}
+
+impl Relaxing {
+    /// A term held for ever at a depth in contact.
+    pub fn relaxed(term: Relaxation, depth: f64) -> Self {
+        Self {
+            term,
+            value: Compensated::new(term.elastic.at(depth, depth)),
+            dt: f64::NAN,
+            psi: [0.0; POWER_MAX + 1],
+            pending: 0.0,
+        }
+    }
+
+    pub fn value(&self) -> f64 {
+        self.value.value
+    }
+
+    /// Prepares a step; `false` if its drive is not a finite number.
+    #[inline]
+    pub fn prepare(&mut self, piece: &Piece) -> bool {
+        if piece.dt != self.dt {
+            self.dt = piece.dt;
+            self.psi = psi_first(piece.dt / self.term.tau);
+        }
+        let Piece { x0, d, dt, .. } = *piece;
+        let speed = d / dt;
+        let mut c = self.polynomial(piece, speed);
+        // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
+        for low in 0..POWER_MAX {
+            for k in (low..POWER_MAX).rev() {
+                c[k] += x0 * c[k + 1];
+            }
+        }
+        let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
+        for (c, psi) in c.iter().zip(&self.psi).skip(1) {
+            power *= d;
+            sum += c * power * psi;
+        }
+        if self.term.elastic.exponential.is_some() || self.term.rate.exponential.is_some() {
+            sum += self.exponential(piece, speed);
+        }
+        self.pending = sum;
+        sum.is_finite()
+    }
+
+    /// Coefficients by power of depth of the drive along the piece.
+    #[inline]
+    fn polynomial(&self, piece: &Piece, speed: f64) -> [f64; POWER_MAX + 1] {
+        let Relaxation { elastic, rate, .. } = &self.term;
+        let mut c = [0.0; POWER_MAX + 1];
+        for k in 1..=POWER_MAX {
+            c[k] += elastic.powers[k - 1];
+            c[k - 1] += k as f64 * rate.powers[k - 1] * speed;
+        }
+        if !piece.primary {
+            for (j, lost) in elastic.softening.iter().enumerate() {
+                c[j + 1] += lost * piece.x_max;
+                c[j + 2] -= lost;
+            }
+            for (j, lost) in rate.softening.iter().enumerate() {
+                c[j] += (j + 1) as f64 * lost * piece.x_max * speed;
+                c[j + 1] -= (j + 2) as f64 * lost * speed;
+            }
+        }
+        c
+    }
+
+    /// What the exponentials add over the piece.
+    fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
+        let r = piece.dt / self.term.tau;
+        let mut sum = 0.0;
+        if let Some((amplitude, b)) = self.term.elastic.exponential {
+            let (_, omega) = chi_omega(b * piece.d, r);
+            let start = b * piece.x0;
+            sum += amplitude * (start.exp_m1() * self.psi[0] + start.exp() * omega);
+        }
+        if let Some((amplitude, b)) = self.term.rate.exponential {
+            let (chi, _) = chi_omega(b * piece.d, r);
+            sum += amplitude * b * speed * (b * piece.x0).exp() * chi;
+        }
+        sum
+    }
+
+    /// Mean of the term over a step, its value having been `before`: integrating `y + tau y' = u` needs
+    /// no more than both ends.
+    pub fn mean(&self, before: f64, piece: &Piece) -> f64 {
+        let Relaxation { tau, elastic, rate } = &self.term;
+        let x_max = (!piece.primary).then_some(piece.x_max);
+        let (x0, x1) = (piece.x0, piece.x0 + piece.d);
+        let driven = rate.at(x1, piece.x_max.max(x1)) - rate.at(x0, piece.x_max.max(x0));
+        elastic.mean(x0, x1, x_max) + (driven - tau * (self.value() - before)) / piece.dt
+    }
+
+    /// Takes the prepared step.
+    #[inline]
+    pub fn settle(&mut self) {
+        self.value.relax(self.pending, self.psi[0]);
+    }
+
+    /// Prepares a move from `x0` to `x1` in no time, which the elastic memory does not feel; `false`
+    /// where it would need an infinite force.
+    pub fn prepare_jump(&mut self, [x0, x1]: [f64; 2], [m0, m1]: [f64; 2]) -> bool {
+        let Relaxation { tau, elastic, rate } = &self.term;
+        let impulse = rate.at(x1, m1) - rate.at(x0, m0);
+        self.pending = if *tau == 0.0 {
+            // Without memory it is where the elastic part is; a dashpot would need infinite force.
+            if impulse != 0.0 {
+                return false;
+            }
+            elastic.at(x1, m1) - self.value.value
+        } else {
+            impulse / tau
+        };
+        self.pending.is_finite()
+    }
+
+    /// Takes the prepared jump.
+    pub fn settle_jump(&mut self) {
+        self.value.add(self.pending);
+    }
+}

@@ -1,0 +1,50 @@
+//! The Voigt body: a spring and a dashpot side by side.
+
+use super::family::{Family, Outer};
+use super::relaxation::{Drive, Relaxation};
+
+/// `F = k x + eta x'`.
+///
+/// Fung, "Biomechanics: Mechanical Properties of Living Tissues", 2nd ed., section 2.11. It is the one
+/// family that looks at speed directly, the mean speed since the sample before: noise of the depth
+/// goes into its force undamped.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Voigt;
+
+impl Family for Voigt {
+    fn key(&self) -> String {
+        "voigt".into()
+    }
+
+    fn name(&self) -> String {
+        "Voigt".into()
+    }
+
+    fn equation(&self) -> &'static str {
+        "F = k x + eta x'"
+    }
+
+    fn cannot_represent(&self) -> &'static str {
+        "relaxation at constant depth: its force falls at once when the probe stops; a jump of depth, which would take an infinite force; stiffness that grows with depth"
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        Vec::new()
+    }
+
+    fn linear(&self) -> Vec<(String, &'static str)> {
+        vec![("k".into(), "N/mm"), ("eta".into(), "N*s/mm")]
+    }
+
+    fn columns(&self, _outer: &[f64]) -> Vec<Vec<Relaxation>> {
+        let dashpot = Relaxation {
+            tau: 0.0,
+            elastic: Drive::default(),
+            rate: Drive::power(1, 1.0),
+        };
+        vec![
+            vec![Relaxation::spring(Drive::power(1, 1.0))],
+            vec![dashpot],
+        ]
+    }
+}

@@ -1,0 +1,116 @@
+//! Every family recovers its own parameters, and its response is what its equation says.
+
+use palpate_model::families::{self, Model, PowerSeries};
+use palpate_model::fit::{FamilyOptions, FitOptions, FitSample, fit, fit_family};
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::{Depth, Newtons, Seconds};
+
+/// Depth over time: a ramp at `speed` to `depth` and a hold, `dt` apart.
+fn ramp_hold(speed: f64, depth: f64, hold: f64, dt: f64) -> Vec<(Seconds, Depth)> {
+    let count = ((depth / speed + hold) / dt).round() as u32;
+    (0..=count)
+        .map(|i| {
+            let t = f64::from(i) * dt;
+            (Seconds(t), Depth((speed * t).min(depth)))
+        })
+        .collect()
+}
+
+fn record(model: &Model, path: &[(Seconds, Depth)]) -> Vec<FitSample> {
+    let forces = model.along(path.iter().copied()).expect("a force");
+    path.iter()
+        .zip(forces)
+        .map(|(&(t, depth), force)| FitSample {
+            t,
+            depth,
+            force: Newtons(force),
+            sigma: Newtons(0.02),
+        })
+        .collect()
+}
+
+/// A body of each family whose force over 20 mm is a few newtons.
+fn bodies() -> Vec<Model> {
+    let model = |key: &str, outer: &[f64], linear: &[f64]| {
+        let family = families::by_key(key).expect("a family");
+        family.model(outer, linear).expect("a model")
+    };
+    vec![
+        model("voigt", &[], &[0.2, 0.15]),
+        model("maxwell", &[8.0], &[0.3]),
+        model("kelvin", &[1.7], &[0.15, 0.6]),
+        model("series-1", &[1.3], &[0.12, 0.05]),
+        model("series-2", &[1.3], &[0.05, 0.01, 0.05]),
+        model("series-3", &[1.023], &[0.05333, -0.0086, 0.0004345, 0.06]),
+        model("series-4", &[1.2], &[0.08, -0.012, 0.0004, 3e-5, 0.05]),
+        model("series-5", &[1.2], &[0.08, -0.02, 0.003, -2e-4, 5e-6, 0.05]),
+        model("exponential", &[1.5, 0.15], &[0.3, 0.9]),
+        model("prony-2", &[0.5, 9.0], &[0.1, 0.15, 0.1]),
+        model("prony-3", &[0.2, 2.0, 20.0], &[0.1, 0.1, 0.08, 0.06]),
+        model("fractional", &[2.0, 0.5], &[0.1, 0.3]),
+        model("fung", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
+    ]
+}
+
+#[test]
+fn families_recover_themselves() {
+    for model in bodies() {
+        let family = families::by_key(&model.family).unwrap();
+        let slow = record(&model, &ramp_hold(0.8, 20.0, 40.0, 0.02));
+        let fast = record(&model, &ramp_hold(4.0, 20.0, 40.0, 0.02));
+        let fit = fit_family(
+            &*family,
+            &[("slow", &slow), ("fast", &fast)],
+            FamilyOptions::default(),
+        )
+        .unwrap_or_else(|err| panic!("{}: {err}", model.family));
+        // Without noise what is left is rounding, times the condition of each design.
+        let found = fit.model.outer.iter().chain(&fit.model.linear);
+        let exact = model.outer.iter().chain(&model.linear);
+        for (found, exact) in found.zip(exact) {
+            let miss = (found / exact - 1.0).abs();
+            assert!(miss < 1e-10, "{}: {found} is not {exact}", model.family);
+        }
+        assert_eq!(fit.warnings, Vec::<String>::new(), "{}", model.family);
+        assert!(fit.rms < 1e-12);
+        assert_eq!(model.parameters().unwrap().len(), fit.parameters.len());
+    }
+}
+
+#[test]
+fn third_order_is_the_fit_of_the_thesis_body() {
+    let mut state = KelvinState::at_rest();
+    let samples: Vec<FitSample> = ramp_hold(0.75, 30.0, 50.0, 0.05)
+        .into_iter()
+        .enumerate()
+        .map(|(i, (t, depth))| {
+            let dt = Seconds(if i == 0 { 0.0 } else { 0.05 });
+            let error = 0.02 * f64::from((i * i * 37 % 101) as u32) / 29.0;
+            let force = state.step(&ModifiedKelvin::THESIS, depth, dt).0 + error;
+            FitSample {
+                t,
+                depth,
+                force: Newtons(force),
+                sigma: Newtons(0.02),
+            }
+        })
+        .collect();
+    let own = fit(&samples, &FitOptions::default()).unwrap();
+    let family = PowerSeries::of_order(3).unwrap();
+    let fit = fit_family(&family, &[("run", &samples)], FamilyOptions::default()).unwrap();
+    let body = own.body();
+    // Both stop within a small share of a standard error, here 1 % of tau.
+    assert!((fit.model.outer[0] / body.tau_eps - 1.0).abs() < 1e-5);
+    let exact = body.mu.into_iter().chain([body.tau_sig]);
+    for (one, other) in fit.model.linear.iter().zip(exact) {
+        assert!((one / other - 1.0).abs() < 1e-5, "{one} {other}");
+    }
+    for (one, other) in fit.parameters.iter().zip(&own.parameters) {
+        let (found, wanted) = (one.std_error.unwrap(), other.std_error.unwrap());
+        assert!(
+            (found / wanted - 1.0).abs() < 0.01,
+            "{}: {found} {wanted}",
+            one.name
+        );
+    }
+}
