@@ -114,3 +114,82 @@ fn third_order_is_the_fit_of_the_thesis_body() {
         );
     }
 }
+
+/// Corners of the path of `scripts/family_reference.py`, in s and mm.
+const PATH: [(f64, f64); 7] = [
+    (0.0, 0.0),
+    (2.5, 10.0),
+    (6.0, 10.0),
+    (8.0, 4.0),
+    (9.0, -2.0),
+    (9.5, -2.0),
+    (12.0, 8.0),
+];
+
+/// That path from corner to corner, each piece cut into `parts` steps and at `until`.
+fn corners(parts: u32, until: f64) -> Vec<(Seconds, Depth)> {
+    let mut path = vec![(Seconds(0.0), Depth(0.0))];
+    for pair in PATH.windows(2) {
+        let ((t0, x0), (t1, x1)) = (pair[0], pair[1]);
+        if t0 >= until {
+            break;
+        }
+        let end = t1.min(until);
+        for part in 1..=parts {
+            let t = t0 + (end - t0) * f64::from(part) / f64::from(parts);
+            path.push((Seconds(t), Depth(x0 + (x1 - x0) * (t - t0) / (t1 - t0))));
+        }
+    }
+    path
+}
+
+#[test]
+fn responses_agree_with_quadrature_in_many_digits() {
+    let numbers = |text: &str| -> Vec<f64> {
+        let fields = text.split(',').filter(|field| !field.is_empty());
+        fields.map(|field| field.parse().unwrap()).collect()
+    };
+    let mut seen = std::collections::BTreeSet::new();
+    for line in include_str!("data/family_reference.txt").lines() {
+        if line.starts_with('#') {
+            continue;
+        }
+        let fields: Vec<&str> = line.split('/').map(str::trim).collect();
+        let (t, exact): (f64, f64) = (fields[3].parse().unwrap(), fields[4].parse().unwrap());
+        let mut check = |key: &str, tolerance: f64| {
+            let family = families::by_key(key).unwrap();
+            let model = family
+                .model(&numbers(fields[1]), &numbers(fields[2]))
+                .unwrap();
+            for parts in [1, 100] {
+                let force = model.along(corners(parts, t)).unwrap();
+                let miss = (force[force.len() - 1] - exact).abs();
+                assert!(miss < tolerance, "{key} at {t} s in {parts}: {miss:e}");
+            }
+            seen.insert(key.to_owned());
+        };
+        match fields[0] {
+            // A few newtons, rounded some ten times.
+            exact @ ("voigt" | "maxwell" | "kelvin" | "exponential") => check(exact, 1e-14),
+            exact if exact.starts_with("series") || exact.starts_with("prony") => {
+                check(exact, 1e-14);
+            }
+            // As many digits as asked for, of what the relaxing spring of 0.3 N/mm would hold after
+            // all the 26 mm it was moved.
+            "fractional" => {
+                check("fractional-4", 8e-4);
+                check("fractional", 8e-6);
+                check("fractional-12", 8e-12);
+            }
+            // Over its 2.5 decades of relaxation times: the quadrature converges geometrically until
+            // only rounding is left.
+            "fung" => {
+                check("fung-8", 1e-4);
+                check("fung", 1e-12);
+                check("fung-36", 1e-14);
+            }
+            other => panic!("no family {other}"),
+        }
+    }
+    assert_eq!(seen.len(), 16, "{seen:?}");
+}

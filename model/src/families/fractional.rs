@@ -52,11 +52,9 @@ impl FractionalZener {
         let count = (reach / step).ceil() as i32;
         let kernel =
             |u: f64| (alpha * PI).sin() / (2.0 * PI * ((alpha * u).cosh() + (alpha * PI).cos()));
-        // What the tails hold: K integrates to atan(tan(alpha pi / 2) tanh(alpha u / 2)) / (alpha pi).
-        let within =
-            |u: f64| ((alpha * PI / 2.0).tan() * (alpha * u / 2.0).tanh()).atan() / (alpha * PI);
-        let edge = step * (f64::from(count) + 0.5);
-        let tail = 0.5 - within(edge);
+        // The whole sum is one; what the tails hold goes to the ends.
+        let half: f64 = (1..=count).map(|m| kernel(step * f64::from(m))).sum();
+        let tail = 0.5 - step * (half + 0.5 * kernel(0.0));
         (-count..=count)
             .map(|m| {
                 let u = step * f64::from(m);
