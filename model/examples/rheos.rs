@@ -9,7 +9,6 @@ use palpate_model::Seconds;
 use palpate_model::fit::{MaxwellFit, StrainSample, fit_maxwell};
 use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellState};
 use std::error::Error;
-use std::fmt::Write;
 
 /// Plot area of a panel in px: left, top, width, height.
 const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
