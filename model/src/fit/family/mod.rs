@@ -7,11 +7,13 @@
 
 mod descent;
 mod nonnegative;
+mod predict;
 mod problem;
 mod report;
 mod search;
 
-pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_family};
+pub use predict::{Predicted, predict};
+pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_body, fit_family};
 
 /// What a family's fit finds besides the body: the same for every family, or they could not be
 /// compared.
