@@ -8,7 +8,7 @@
 //! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
 
 use super::exponential_step::chi_omega;
-use crate::viscoelastic::{Compensated, psi_first};
+use crate::viscoelastic::{Compensated, psi, psi_first};
 
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
@@ -128,6 +128,16 @@ impl Drive {
         sum
     }
 
+    /// Highest power of depth, 0 for none.
+    fn degree(&self) -> usize {
+        let powers = self.powers.iter().rposition(|value| *value != 0.0);
+        // x^j (x_max - x) has one power more.
+        let softening = self.softening.iter().rposition(|value| *value != 0.0);
+        powers
+            .map_or(0, |k| k + 1)
+            .max(softening.map_or(0, |j| j + 2))
+    }
+
     /// Whether it depends on the greatest depth so far.
     #[must_use]
     pub fn softens(&self) -> bool {
@@ -189,6 +199,24 @@ impl Relaxation {
             rate: self.rate.plus(&other.rate)?,
         })
     }
+
+    /// Highest power of depth in the drive along a straight piece, where a rate's power is one less.
+    pub(crate) fn degree(&self) -> usize {
+        let rate = self.rate.degree().saturating_sub(1);
+        self.elastic.degree().max(rate)
+    }
+}
+
+/// `psi_0 ..= psi_degree`, zero above.
+#[inline]
+fn psi_through(degree: usize, r: f64) -> [f64; POWER_MAX + 1] {
+    let mut all = [0.0; POWER_MAX + 1];
+    match degree {
+        0 => all[0] = psi(0, r),
+        1 => all[..2].copy_from_slice(&psi_first::<2>(r)),
+        _ => all = psi_first(r),
+    }
+    all
 }
 
 /// A straight piece of depth in contact.
@@ -211,6 +239,8 @@ pub(super) struct Relaxing {
     value: Compensated,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
+    /// Highest power of depth in the drive along a straight piece.
+    degree: usize,
     /// What the next [`Relaxing::settle`] adds.
     pending: f64,
 }
@@ -223,6 +253,7 @@ impl Relaxing {
             value: Compensated::new(term.elastic.at(depth, depth)),
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
+            degree: term.degree(),
             pending: 0.0,
         }
     }
@@ -236,22 +267,27 @@ impl Relaxing {
     pub fn prepare(&mut self, piece: &Piece) -> bool {
         if piece.dt != self.dt {
             self.dt = piece.dt;
-            self.psi = psi_first(piece.dt / self.term.tau);
+            self.psi = psi_through(self.degree, piece.dt / self.term.tau);
         }
         let Piece { x0, d, dt, .. } = *piece;
-        let speed = d / dt;
-        let mut c = self.polynomial(piece, speed);
-        // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
-        for low in 0..POWER_MAX {
-            for k in (low..POWER_MAX).rev() {
-                c[k] += x0 * c[k + 1];
+        let (speed, degree) = (d / dt, self.degree);
+        let mut sum = if degree == 0 {
+            self.term.rate.powers[0] * speed * self.psi[0]
+        } else {
+            let mut c = self.polynomial(piece, speed);
+            // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
+            for low in 0..degree {
+                for k in (low..degree).rev() {
+                    c[k] += x0 * c[k + 1];
+                }
             }
-        }
-        let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
-        for (c, psi) in c.iter().zip(&self.psi).skip(1) {
-            power *= d;
-            sum += c * power * psi;
-        }
+            let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
+            for (c, psi) in c[1..=degree].iter().zip(&self.psi[1..]) {
+                power *= d;
+                sum += c * power * psi;
+            }
+            sum
+        };
         if self.term.elastic.exponential.is_some() || self.term.rate.exponential.is_some() {
             sum += self.exponential(piece, speed);
         }
@@ -283,6 +319,12 @@ impl Relaxing {
 
     /// What the exponentials add over the piece.
     fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
+        if piece.d == 0.0 {
+            // Held: no rate, and the elastic part stands still.
+            return self.term.elastic.exponential.map_or(0.0, |(amplitude, b)| {
+                amplitude * (b * piece.x0).exp_m1() * self.psi[0]
+            });
+        }
         let r = piece.dt / self.term.tau;
         let mut sum = 0.0;
         if let Some((amplitude, b)) = self.term.elastic.exponential {
