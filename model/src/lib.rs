@@ -10,6 +10,7 @@
 
 pub mod calibration;
 pub mod expected;
+pub mod extremes;
 pub mod families;
 pub mod fit;
 pub mod integrators;

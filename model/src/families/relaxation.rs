@@ -121,7 +121,9 @@ impl Drive {
         for coefficient in &polynomial[1..] {
             homogeneous = power + x1 * homogeneous;
             power *= x0;
-            sum += coefficient * homogeneous;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous;
+            }
         }
         sum *= x1 - x0;
         if let Some((amplitude, b)) = self.exponential {
@@ -147,7 +149,9 @@ impl Drive {
         for (k, coefficient) in polynomial.iter().enumerate().skip(1) {
             power *= x0;
             homogeneous = power + x1 * homogeneous;
-            sum += coefficient * homogeneous / (k + 1) as f64;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous / (k + 1) as f64;
+            }
         }
         if let Some((amplitude, b)) = self.exponential {
             let turn = b * (x1 - x0);
@@ -210,6 +214,17 @@ impl Relaxation {
         }
     }
 
+    /// Highest power of depth along a straight piece, the rate's one less for being a slope.
+    fn degree(&self) -> usize {
+        let top = |drive: &Drive| {
+            let powers = drive.powers.iter().rposition(|c| *c != 0.0);
+            let softening = drive.softening.iter().rposition(|c| *c != 0.0);
+            let [powers, softening] = [powers.map(|k| k + 1), softening.map(|j| j + 2)];
+            powers.max(softening).unwrap_or(0)
+        };
+        top(&self.elastic).max(top(&self.rate).saturating_sub(1))
+    }
+
     /// The sum of two terms of one relaxation time, `None` if it is not one term.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Option<Self> {
@@ -244,6 +259,8 @@ pub(super) struct Relaxing {
     value: Compensated,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
+    /// Highest power of depth in its drives.
+    degree: usize,
     /// A step so short beside the relaxation time that it is a jump.
     is_sudden: bool,
     /// What the next [`Relaxing::settle`] adds.
@@ -258,6 +275,7 @@ impl Relaxing {
             value: Compensated::new(term.elastic.at(depth, depth)),
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
+            degree: term.degree(),
             is_sudden: false,
             pending: 0.0,
         }
@@ -286,13 +304,15 @@ impl Relaxing {
         let speed = d / dt;
         let mut c = self.polynomial(piece, speed);
         // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
-        for low in 0..POWER_MAX {
-            for k in (low..POWER_MAX).rev() {
+        // Powers that no drive has must not be formed: they may be no numbers where the force is one.
+        let degree = self.degree;
+        for low in 0..degree {
+            for k in (low..degree).rev() {
                 c[k] += x0 * c[k + 1];
             }
         }
         let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
-        for (c, psi) in c.iter().zip(&self.psi).skip(1) {
+        for (c, psi) in c.iter().zip(&self.psi).take(degree + 1).skip(1) {
             power *= d;
             sum += c * power * psi;
         }

@@ -96,11 +96,11 @@ impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
             self.force.relaxed(weighted, self.table.psi_0)
         } else {
             match Pieces::of(from.to_f64(), depth.to_f64()) {
-                Pieces::Entering(outside) => {
-                    self.across([(R::ZERO, R::ZERO, outside), (R::ZERO, depth, 1.0 - outside)])
+                Pieces::Entering([outside, inside]) => {
+                    self.across([(R::ZERO, R::ZERO, outside), (R::ZERO, depth, inside)])
                 }
-                Pieces::Leaving(inside) => {
-                    self.across([(from, -from, inside), (R::ZERO, R::ZERO, 1.0 - inside)])
+                Pieces::Leaving([inside, outside]) => {
+                    self.across([(from, -from, inside), (R::ZERO, R::ZERO, outside)])
                 }
                 Pieces::Outside | Pieces::Inside => self.force.relaxed(R::ZERO, self.table.psi_0),
             }

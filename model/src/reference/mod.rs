@@ -18,6 +18,9 @@ use thiserror::Error;
 /// the closed forms, which costs the digits of the ratio of times and depths (twelve decades each).
 pub const REFERENCE_DIGITS: usize = 75;
 
+/// Exponents of e beyond this are refused: doubles end at 710.
+const EXPONENT_MAX: f64 = 1e5;
+
 /// What the reference does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
@@ -27,6 +30,9 @@ pub enum ReferenceError {
     /// Too few or too many digits.
     #[error("a reference has 20 to 1000 digits, not {0}")]
     Digits(usize),
+    /// An exponential beyond all numbers.
+    #[error("the force at rest at that depth is beyond the largest number")]
+    Overflow,
     /// A parameter that is no number, or a negative time.
     #[error(
         "a term with a relaxation time below zero or a coefficient that is not finite has no force"
@@ -75,14 +81,14 @@ impl Reference {
         if !(20..=1000).contains(&digits) {
             return Err(ReferenceError::Digits(digits));
         }
+        if !depth.is_finite() {
+            return Err(ReferenceError::Term);
+        }
         let digits = Digits::decimal(digits);
         let terms: Result<Vec<Term>, ReferenceError> = terms
             .iter()
             .map(|term| Term::new(digits, term, depth))
             .collect();
-        if !depth.is_finite() {
-            return Err(ReferenceError::Term);
-        }
         Ok(Self {
             digits,
             terms: terms?,
@@ -98,6 +104,13 @@ impl Reference {
         }
         if !(dt.0 >= 0.0 && dt.is_finite()) {
             return Err(StepError::Time(dt.0));
+        }
+        if self.terms.iter().any(|term| term.is_beyond(depth)) {
+            return Err(StepError::Overflow {
+                from: nearest(&self.depth),
+                to: depth.0,
+                dt: dt.0,
+            });
         }
         let to = self.digits.exact(depth.0);
         let from = std::mem::replace(&mut self.depth, to.clone());
@@ -185,14 +198,22 @@ impl Term {
             return Err(ReferenceError::Term);
         }
         let elastic = Function::new(digits, elastic);
+        let rate = Function::new(digits, rate);
         let start = digits.exact(depth.0.max(0.0));
+        if elastic.is_beyond(depth) || rate.is_beyond(depth) {
+            return Err(ReferenceError::Overflow);
+        }
         Ok(Self {
             tau: digits.exact(*tau),
             value: elastic.at(&start),
             elastic,
-            rate: Function::new(digits, rate),
+            rate,
             weights: None,
         })
+    }
+
+    fn is_beyond(&self, depth: Depth) -> bool {
+        self.elastic.is_beyond(depth) || self.rate.is_beyond(depth)
     }
 
     /// What a move in no time adds to `tau` times the value.
@@ -236,7 +257,9 @@ impl Term {
         }
         if let Some((amplitude, b)) = &self.elastic.exponential {
             let chi = chi(&(b * d), &weights);
-            sum += amplitude * ((b * x0).exp() * chi - &weights.psi[0]);
+            // What the probe rests on and what it adds, each without the difference of large numbers.
+            let rest = (b * x0).exp_m1() * &weights.psi[0];
+            sum += amplitude * (rest + (b * x0).exp() * (chi - &weights.psi[0]));
         }
         if let Some((amplitude, b)) = &self.rate.exponential {
             let chi = chi(&(b * d), &weights);
@@ -252,6 +275,9 @@ fn chi(b: &Big, weights: &Weights) -> Big {
     let Some(r) = &weights.r else {
         return b.exp();
     };
+    if is_zero(b) {
+        return weights.psi[0].clone();
+    }
     let sum = b + r;
     if is_zero(&sum) {
         return r * &weights.kept;
@@ -268,6 +294,13 @@ impl Function {
             exponential: exponential
                 .map(|(amplitude, b)| (digits.exact(amplitude), digits.exact(b))),
         }
+    }
+
+    /// Whether its exponential is beyond any double by so much that even many digits end.
+    fn is_beyond(&self, depth: Depth) -> bool {
+        let exponent = |b: &Big| nearest(b) * depth.0;
+        let exponential = self.exponential.as_ref();
+        exponential.is_some_and(|(_, b)| exponent(b) > EXPONENT_MAX)
     }
 
     fn at(&self, x: &Big) -> Big {
