@@ -94,13 +94,20 @@ impl<R: Real> Running<R> {
         }
     }
 
+    /// A filter left alone decays for ever. Cold, so that the check stays a branch beside the sum
+    /// instead of a choice within it.
+    #[cold]
+    fn faded() -> Self {
+        Self::new(R::ZERO)
+    }
+
     /// The value after `weighted - share * value` is added.
     #[inline]
     pub fn relaxed(self, weighted: R, share: R) -> Self {
         let increment = weighted - share * self.value + self.carry;
         let value = self.value + increment;
         if value.abs() < R::NEGLIGIBLE {
-            return Self::new(R::ZERO);
+            return Self::faded();
         }
         Self {
             value,
