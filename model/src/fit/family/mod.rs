@@ -11,7 +11,7 @@ mod problem;
 mod report;
 mod search;
 
-pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_family};
+pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_family, fit_family_at};
 
 /// What a family's fit finds besides the body: the same for every family, or they could not be
 /// compared.
