@@ -20,16 +20,18 @@ const STIFFNESS_SPREAD: f64 = 0.05;
 /// Standard deviation of the two time constants between specimens, relative.
 const TIME_SPREAD: f64 = 0.03;
 
-/// Energy, in N*mm, over which softening develops: what the thesis body stores at 20 mm, so that small
-/// indentations such as the search for contact lose little and deep ones nearly all they can lose.
-const SOFTENING_ENERGY: f64 = 5.0;
+/// Energy, in N*mm, below which hardly anything softens: what the thesis body stores at 10 mm, so that a
+/// search for contact leaves the tissue nearly as it was.
+const SOFTENING_ENERGY: f64 = 1.0;
 
 /// Pseudo-elastic softening: the elastic force `p(x)` is multiplied by
-/// `eta = 1 - share * tanh((W(x_max) - W(x)) / m)`, with `W` the energy stored at a depth and `x_max` the
-/// greatest depth so far (Ogden & Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, equation for `eta`
-/// with its error function replaced by the hyperbolic tangent, which has the same shape).
+/// `eta = 1 - share * tanh((W(x_max) - W(x)) / (m + W(x_max)))`, with `W` the energy stored at a depth and
+/// `x_max` the greatest depth so far.
 ///
-/// It never heals. What is lost relaxes with the body: `y + tau y' = (eta - 1) p(x)`.
+/// The law of Ogden & Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, with two changes that finite element
+/// codes and later authors make too: the hyperbolic tangent for their error function, which has the
+/// same shape, and an energy scale that grows with `W(x_max)`, so that small and large loops lose like
+/// shares. It never heals. What is lost relaxes with the body: `y + tau y' = (eta - 1) p(x)`.
 #[derive(Clone, Debug)]
 struct Softening {
     share: f64,
@@ -46,8 +48,9 @@ impl Softening {
     fn advance(&mut self, body: &ModifiedKelvin, depth: f64, dt: f64) -> f64 {
         let depth = depth.max(0.0);
         self.depth_max = self.depth_max.max(depth);
-        let spent = (energy(body, self.depth_max) - energy(body, depth)) / SOFTENING_ENERGY;
-        let drive = -self.share * spent.tanh() * body.elastic(Depth(depth)).0;
+        let stored = energy(body, self.depth_max);
+        let returned = (stored - energy(body, depth)) / (SOFTENING_ENERGY + stored);
+        let drive = -self.share * returned.tanh() * body.elastic(Depth(depth)).0;
         let decay = (-dt / body.tau_eps).exp();
         self.lost = decay * self.lost + (1.0 - decay) * 0.5 * (self.drive + drive);
         self.drive = drive;
@@ -214,7 +217,8 @@ mod tests {
                 let force = |x: f64| body.elastic(Depth(x)).0;
                 x / 6.0 * (force(0.0) + 4.0 * force(0.5 * x) + force(x))
             };
-            let eta = 1.0 - 0.5 * ((stored(turn) - stored(at)) / 5.0).tanh();
+            let returned = (stored(turn) - stored(at)) / (1.0 + stored(turn));
+            let eta = 1.0 - 0.5 * returned.tanh();
             let wanted = eta * body.elastic(Depth(at)).0;
             let miss = (tissue.force().0 - wanted).abs();
             assert!(miss < 1e-9, "{turn} {at}: {miss:e}");
