@@ -24,18 +24,26 @@ pub struct FittedRecord<'a> {
     pub work: [f64; 2],
 }
 
+/// Name, value and unit of every parameter.
+fn cells(parameters: &[FamilyParameter]) -> Vec<[String; 3]> {
+    let cells = parameters.iter().map(|one| {
+        let value = match one.std_error {
+            Some(error) => with_error(one.value, error),
+            None => plain(one.value),
+        };
+        [one.name.clone(), value, typeset(&one.unit)]
+    });
+    cells.collect()
+}
+
 /// The parameters, one line each.
 #[must_use]
 pub fn parameter_lines(parameters: &[FamilyParameter]) -> Vec<String> {
-    let values = parameters.iter().map(|one| match one.std_error {
-        Some(error) => with_error(one.value, error),
-        None => plain(one.value),
-    });
-    let values: Vec<String> = values.collect();
-    let width = values.iter().map(|text| text.chars().count()).max();
-    let width = width.unwrap_or(0);
-    let lines = parameters.iter().zip(&values).map(|(one, value)| {
-        let line = format!("  {:<12} {value:<width$}  {}", one.name, typeset(&one.unit));
+    let cells = cells(parameters);
+    let width = cells.iter().map(|[_, value, _]| value.chars().count());
+    let width = width.max().unwrap_or(0);
+    let lines = cells.iter().map(|[name, value, unit]| {
+        let line = format!("  {name:<12} {value:<width$}  {unit}");
         line.trim_end().to_owned()
     });
     lines.collect()
@@ -44,16 +52,11 @@ pub fn parameter_lines(parameters: &[FamilyParameter]) -> Vec<String> {
 /// How well a record is explained and what energy went in.
 #[must_use]
 pub fn quality(fit: &FamilyFit, index: usize, record: &FittedRecord<'_>) -> String {
-    let own = &fit.records[index];
     let [measured, fitted] = record.work;
     format!(
-        "R² {:.6}, rmse {:.3} mN, at worst {:.1} mN, {} samples; energy {:.3} N·mm measured, {:.3} fitted",
+        "R² {:.6}, rmse {:.3} mN; energy {measured:.3} N·mm measured, {fitted:.3} fitted",
         record.r2,
-        own.rms * 1e3,
-        own.worst * 1e3,
-        own.samples,
-        measured,
-        fitted
+        fit.records[index].rms * 1e3,
     )
 }
 
@@ -67,7 +70,12 @@ pub fn whole(family: &dyn Family, fit: &FamilyFit, records: &[FittedRecord<'_>])
         if records.len() > 1 {
             lines.push(own.name.clone());
         }
-        lines.push(quality(fit, index, record));
+        lines.push(format!(
+            "{}; {} samples, at worst {:.1} mN off",
+            quality(fit, index, record),
+            own.samples,
+            own.worst * 1e3
+        ));
     }
     lines.extend(sentences(family, fit).map(|sentence| format!("- {sentence}")));
     lines.join("\n")
@@ -118,9 +126,14 @@ pub fn picture(
         panel.line(&mut svg, fitted, LIGHT.limit, 1.4);
     }
     let mut y = 760.0;
-    let words = [family.name(), family.equation().to_owned()];
-    for text in words.iter().chain(&parameter_lines(&fit.parameters)) {
-        svg.text([LEFT, y], Ink::plain(LIGHT.text), text.trim_start());
+    for text in [&family.name(), family.equation()] {
+        svg.text([LEFT, y], Ink::plain(LIGHT.text), text);
+        y += LINE;
+    }
+    for row in cells(&fit.parameters) {
+        for (x, cell) in [LEFT, 180.0, 420.0].into_iter().zip(&row) {
+            svg.text([x, y], Ink::plain(LIGHT.text), cell);
+        }
         y += LINE;
     }
     y += LINE;
