@@ -1,6 +1,7 @@
 //! A fit as people read it: the strings that window, command line and pictures share, and the
 //! picture itself.
 
+pub mod family;
 pub mod picture;
 mod svg;
 pub mod text;
