@@ -3,7 +3,7 @@
 mod batch;
 mod intervals;
 mod joint;
-mod sources;
+pub(super) mod sources;
 
 use super::Failure;
 use super::output::Output;
