@@ -1,7 +1,7 @@
 //! Selection finds the family that made the records.
 //!
 //! Each family in turn makes three records of one body: a slow deep press and a fast shallow one, both
-//! held for 50 minutes, and a press that comes back; samples are 20 ms apart after every corner of the path
+//! held for eight hours, and a press that comes back; samples are 10 ms apart after every corner of the path
 //! and then ever further. Outer parameters lie within a fifth of the stated member's and coefficients within
 //! a twentieth; noise is white and 1 % of the peak force. `PALPATE_SELECT_SEEDS=100` draws a hundred
 //! bodies of each family instead of one, and `PALPATE_SELECT_FAMILIES=kelvin,fung` only some families.
@@ -59,8 +59,8 @@ fn members() -> Vec<Model> {
         ),
         model(
             "prony-6",
-            &[0.05, 0.5, 4.0, 30.0, 240.0, 2000.0],
-            &[0.1, 0.2, 0.2, 0.05, 0.2, 0.05, 0.2],
+            &[0.1, 1.2, 14.0, 160.0, 1600.0, 16000.0],
+            &[0.05, 0.2, 0.1, 0.2, 0.1, 0.2, 0.2],
         ),
         model("fractional", &[5.0, 0.5], &[0.1, 0.3]),
         model("fung", &[0.3, 1000.0, 0.15], &[0.15, 0.06]),
@@ -83,7 +83,7 @@ fn path(corners: &[(f64, f64)]) -> Vec<(Seconds, Depth)> {
     let mut path = vec![(Seconds(corners[0].0), Depth(corners[0].1))];
     for pair in corners.windows(2) {
         let ((t0, x0), (t1, x1)) = (pair[0], pair[1]);
-        let (mut t, mut dt) = (t0, 0.02);
+        let (mut t, mut dt) = (t0, 0.01);
         while t < t1 {
             // The last step before a corner takes what would be too short a rest.
             t = if t + 1.5 * dt > t1 { t1 } else { t + dt };
@@ -97,8 +97,8 @@ fn path(corners: &[(f64, f64)]) -> Vec<(Seconds, Depth)> {
 /// The three records of a body, without noise but with its size.
 fn records(model: &Model) -> Vec<Vec<FitSample>> {
     let paths = [
-        path(&[(0.0, 0.0), (10.0, 20.0), (3010.0, 20.0)]),
-        path(&[(0.0, 0.0), (0.5, 10.0), (3000.5, 10.0)]),
+        path(&[(0.0, 0.0), (10.0, 20.0), (30010.0, 20.0)]),
+        path(&[(0.0, 0.0), (0.2, 10.0), (30000.2, 10.0)]),
         path(&[(0.0, 0.0), (5.0, 20.0), (10.0, 0.0), (30.0, 0.0)]),
     ];
     let forces = paths
