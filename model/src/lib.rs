@@ -10,9 +10,12 @@
 
 pub mod calibration;
 pub mod expected;
+pub mod extremes;
 pub mod families;
 pub mod fit;
+pub mod integrators;
 mod linalg;
+pub mod reference;
 pub mod rig;
 pub mod select;
 pub mod signal;

@@ -102,9 +102,10 @@ impl OuterRange {
                 Err("within the range of its family")
             }
             Self::Time | Self::PerDepth(..) | Self::Ratio(..)
-                if !(value > 0.0 && value.is_finite()) =>
+                if !(value > 0.0 && value.is_normal()) =>
             {
-                Err("a finite number above zero")
+                // Subnormal numbers lack digits.
+                Err("a finite number of at least 2.3e-308")
             }
             Self::Ratio(..) if value < 1.0 => Err("at least 1"),
             _ => Ok(()),

@@ -30,7 +30,7 @@ pub use maxwell::Maxwell;
 pub(crate) use model::joined;
 pub use model::{AlongError, Body, Model, ModelError, ModelParameter};
 pub use power_series::PowerSeries;
-pub use prony::{Prony, TERMS_MAX};
+pub use prony::{Prony, TERMS_COMPARED, TERMS_MAX};
 pub use quasi_linear::{QUASI_LINEAR_NODES, QuasiLinear};
 pub use relaxation::{Drive, POWER_MAX, Relaxation};
 pub use response::{Response, StepError};
@@ -56,7 +56,7 @@ pub fn all() -> Vec<Box<dyn Family>> {
         all.extend(PowerSeries::of_order(order).map(|family| Box::new(family) as Box<dyn Family>));
     }
     all.push(Box::new(ExponentialKelvin));
-    for terms in 2..=TERMS_MAX {
+    for terms in 2..=TERMS_COMPARED {
         all.extend(Prony::of_terms(terms).map(|family| Box::new(family) as Box<dyn Family>));
     }
     all.push(Box::new(FractionalZener::default()));

@@ -119,10 +119,15 @@ impl Model {
     }
 
     /// The body, relaxed with the probe at `depth`.
-    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, ModelError> {
-        Ok(Body {
-            response: Response::new(&[self.terms()?], depth),
-        })
+    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, AlongError> {
+        if !depth.is_finite() {
+            return Err(StepError::Depth(depth.0).into());
+        }
+        let response = Response::new(&[self.terms()?], depth);
+        if !response.sum().is_finite() {
+            return Err(StepError::Rest { depth: depth.0 }.into());
+        }
+        Ok(Body { response })
     }
 
     /// The force in N along a path of `(time, depth)`, from a body relaxed at its first point.
@@ -134,6 +139,9 @@ impl Model {
         let Some((mut before, start)) = path.next() else {
             return Ok(Vec::new());
         };
+        if !before.is_finite() {
+            return Err(StepError::Time(before.0).into());
+        }
         let mut body = self.at_rest_from(start)?;
         let mut forces = vec![body.force().0];
         for (t, depth) in path {

@@ -13,6 +13,12 @@ use crate::viscoelastic::{Compensated, psi, psi_first};
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
 
+/// A force in N that is refused: below it no sum of terms exceeds the largest number, 1.8e308.
+const FORCE_MAX: f64 = 1e300;
+/// Steps below this share of the relaxation time are jumps: what relaxes within one is beyond all
+/// digits, and their psi functions are near the subnormal numbers, below 2.2e-308, which lack digits.
+const SUDDEN: f64 = 1e-290;
+
 /// A function of depth that is zero at zero depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Drive {
@@ -106,6 +112,35 @@ impl Drive {
         }
     }
 
+    /// How much more it is at `x1` than at `x0`, both in contact, after `x_max`: without the difference
+    /// of the two, which for a small move deep down would leave no digit.
+    fn rise(&self, x0: f64, x1: f64, x_max: Option<f64>) -> f64 {
+        let polynomial = self.polynomial(x_max);
+        // x1^k - x0^k is the move times the complete homogeneous polynomial of the ends.
+        let (mut homogeneous, mut power, mut sum) = (0.0, 1.0, 0.0);
+        for coefficient in &polynomial[1..] {
+            homogeneous = power + x1 * homogeneous;
+            power *= x0;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous;
+            }
+        }
+        sum *= x1 - x0;
+        if let Some((amplitude, b)) = self.exponential {
+            sum += amplitude * (b * x0).exp() * (b * (x1 - x0)).exp_m1();
+        }
+        sum
+    }
+
+    /// The rise over a straight move, the greatest depth so far being `m0`.
+    fn rise_past(&self, x0: f64, x1: f64, m0: f64) -> f64 {
+        if x1 > m0 {
+            self.rise(x0, m0, Some(m0)) + self.rise(m0, x1, None)
+        } else {
+            self.rise(x0, x1, Some(m0))
+        }
+    }
+
     /// Mean over a straight move from `x0` to `x1`, both in contact, after `x_max`.
     fn mean(&self, x0: f64, x1: f64, x_max: Option<f64>) -> f64 {
         let polynomial = self.polynomial(x_max);
@@ -114,7 +149,9 @@ impl Drive {
         for (k, coefficient) in polynomial.iter().enumerate().skip(1) {
             power *= x0;
             homogeneous = power + x1 * homogeneous;
-            sum += coefficient * homogeneous / (k + 1) as f64;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous / (k + 1) as f64;
+            }
         }
         if let Some((amplitude, b)) = self.exponential {
             let turn = b * (x1 - x0);
@@ -241,6 +278,8 @@ pub(super) struct Relaxing {
     psi: [f64; POWER_MAX + 1],
     /// Highest power of depth in the drive along a straight piece.
     degree: usize,
+    /// A step so short beside the relaxation time that it is a jump.
+    is_sudden: bool,
     /// What the next [`Relaxing::settle`] adds.
     pending: f64,
 }
@@ -254,6 +293,7 @@ impl Relaxing {
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
             degree: term.degree(),
+            is_sudden: false,
             pending: 0.0,
         }
     }
@@ -267,9 +307,18 @@ impl Relaxing {
     pub fn prepare(&mut self, piece: &Piece) -> bool {
         if piece.dt != self.dt {
             self.dt = piece.dt;
-            self.psi = psi_through(self.degree, piece.dt / self.term.tau);
+            let r = piece.dt / self.term.tau;
+            self.psi = psi_through(self.degree, r);
+            self.is_sudden = r < SUDDEN;
+        }
+        if self.is_sudden {
+            let x_max = (!piece.primary).then_some(piece.x_max);
+            let rise = self.term.rate.rise(piece.x0, piece.x0 + piece.d, x_max);
+            self.pending = rise / self.term.tau;
+            return self.is_bounded();
         }
         let Piece { x0, d, dt, .. } = *piece;
+        // Powers that no drive has must not be formed: they may be no numbers where the force is one.
         let (speed, degree) = (d / dt, self.degree);
         let mut sum = if degree == 0 {
             self.term.rate.powers[0] * speed * self.psi[0]
@@ -292,7 +341,13 @@ impl Relaxing {
             sum += self.exponential(piece, speed);
         }
         self.pending = sum;
-        sum.is_finite()
+        self.is_bounded()
+    }
+
+    /// Whether the next value, and any sum of them, is a number.
+    #[inline]
+    fn is_bounded(&self) -> bool {
+        self.pending.abs() < FORCE_MAX && self.value.value.abs() < FORCE_MAX
     }
 
     /// Coefficients by power of depth of the drive along the piece.
@@ -355,21 +410,22 @@ impl Relaxing {
         self.value.relax(self.pending, self.psi[0]);
     }
 
+    /// Whether it can move from `x0` to `x1` in no time: a dashpot alone would need an infinite force.
+    pub fn can_jump(&self, [x0, x1]: [f64; 2], [m0, _]: [f64; 2]) -> bool {
+        self.term.tau > 0.0 || self.term.rate.rise_past(x0, x1, m0) == 0.0
+    }
+
     /// Prepares a move from `x0` to `x1` in no time, which the elastic memory does not feel; `false`
-    /// where it would need an infinite force.
+    /// where the force is too large for a number.
     pub fn prepare_jump(&mut self, [x0, x1]: [f64; 2], [m0, m1]: [f64; 2]) -> bool {
         let Relaxation { tau, elastic, rate } = &self.term;
-        let impulse = rate.at(x1, m1) - rate.at(x0, m0);
         self.pending = if *tau == 0.0 {
-            // Without memory it is where the elastic part is; a dashpot would need infinite force.
-            if impulse != 0.0 {
-                return false;
-            }
+            // Without memory it is where the elastic part is.
             elastic.at(x1, m1) - self.value.value
         } else {
-            impulse / tau
+            rate.rise_past(x0, x1, m0) / tau
         };
-        self.pending.is_finite()
+        self.is_bounded()
     }
 
     /// Takes the prepared jump.

@@ -14,7 +14,7 @@ pub enum StepError {
     /// Negative, NaN or infinite duration.
     #[error("a time step of {0} s is not possible; time steps are zero or more seconds")]
     Time(f64),
-    /// A dashpot moved in no time, or slower than numbers can tell from none.
+    /// A dashpot moved in no time.
     #[error(
         "a dashpot cannot be moved by {from} -> {to} mm in no time, which takes an infinite force; give the move a duration"
     )]
@@ -23,6 +23,26 @@ pub enum StepError {
         from: f64,
         /// Depth after, in mm.
         to: f64,
+    },
+    /// Faster than numbers go.
+    #[error(
+        "a move from {from} mm to {to} mm in {dt} s is faster than the largest number; give the move a longer time, or 0 s for a jump"
+    )]
+    Speed {
+        /// Depth before, in mm.
+        from: f64,
+        /// Depth after, in mm.
+        to: f64,
+        /// Duration in s.
+        dt: f64,
+    },
+    /// The force at rest cannot be written as a number.
+    #[error(
+        "the force at rest at a depth of {depth} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body"
+    )]
+    Rest {
+        /// Depth in mm.
+        depth: f64,
     },
     /// The force cannot be written as a number.
     #[error(
@@ -117,13 +137,19 @@ impl Response {
             let ends = [x0, x1];
             let deepest = [self.depth_max, self.depth_max.max(x1)];
             for term in &mut self.terms {
-                if !term.prepare_jump(ends, deepest) {
+                if !term.can_jump(ends, deepest) {
                     return Err(StepError::Jump { from, to });
+                }
+                if !term.prepare_jump(ends, deepest) {
+                    return Err(StepError::Overflow { from, to, dt });
                 }
             }
             self.terms.iter_mut().for_each(Relaxing::settle_jump);
             self.arrive(to);
             return Ok(());
+        }
+        if !((to - from) / dt).is_finite() {
+            return Err(StepError::Speed { from, to, dt });
         }
         if Pieces::of(from, to) == Pieces::Inside && !self.is_cut_by_softening(x0, x1) {
             let piece = self.piece(x0, x1 - x0, dt);
@@ -195,20 +221,21 @@ impl Response {
         let mut parts = match Pieces::of(from, to) {
             Pieces::Inside => vec![(from, to, dt)],
             Pieces::Outside => vec![(0.0, 0.0, dt)],
-            Pieces::Entering(outside) => {
-                vec![(0.0, 0.0, dt * outside), (0.0, to, dt * (1.0 - outside))]
+            Pieces::Entering([outside, inside]) => {
+                vec![(0.0, 0.0, dt * outside), (0.0, to, dt * inside)]
             }
-            Pieces::Leaving(inside) => {
-                vec![(from, 0.0, dt * inside), (0.0, 0.0, dt * (1.0 - inside))]
+            Pieces::Leaving([inside, outside]) => {
+                vec![(from, 0.0, dt * inside), (0.0, 0.0, dt * outside)]
             }
         };
         if let Some(&(x0, x1, time)) = parts.last()
             && self.is_cut_by_softening(x0, x1)
         {
-            let share = (self.depth_max - x0) / (x1 - x0);
+            let known = (self.depth_max - x0) / (x1 - x0);
+            let new = (x1 - self.depth_max) / (x1 - x0);
             parts.pop();
-            parts.push((x0, self.depth_max, time * share));
-            parts.push((self.depth_max, x1, time * (1.0 - share)));
+            parts.push((x0, self.depth_max, time * known));
+            parts.push((self.depth_max, x1, time * new));
         }
         parts
     }

@@ -28,7 +28,8 @@ mod uncertainty;
 
 pub use bootstrap::{Bootstrap, BootstrapInterval};
 pub use family::{
-    FamilyFit, FamilyOptions, FamilyParameter, Predicted, RecordFit, fit_body, fit_family, predict,
+    FamilyFit, FamilyOptions, FamilyParameter, Predicted, RecordFit, fit_body, fit_family,
+    fit_family_at, predict,
 };
 pub use live::{LiveEstimate, LiveFit, ResidualBlocks, Verdict};
 pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};

@@ -6,12 +6,14 @@
 //! then on every sample.
 
 mod descent;
+mod given;
 mod nonnegative;
 mod predict;
 mod problem;
 mod report;
 mod search;
 
+pub use given::fit_family_at;
 pub use predict::{Predicted, predict};
 pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_body, fit_family};
 

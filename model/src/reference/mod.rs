@@ -1,0 +1,317 @@
+//! Forces in many digits: what every integrator and every family is measured against.
+//!
+//! Depth moves straight between the points given and each term's response to that is written down in
+//! closed form, like the exact step of [`crate::families`], but in as many digits as asked for and
+//! without its rearrangements: `y(+) = e^-r y + w` with the weights of [`psi`](crate::viscoelastic::psi).
+//! Inputs are doubles and count as exact; what differs from the doubles' answer is theirs.
+
+mod digits;
+mod psi;
+
+use crate::families::{Drive, POWER_MAX, Relaxation, StepError};
+use crate::units::{Depth, Newtons, Seconds};
+use digits::{Big, Digits, is_negative, is_zero, nearest};
+use psi::Weights;
+use thiserror::Error;
+
+/// Decimal digits carried unless asked otherwise: fifty that count, and a guard for the cancellation of
+/// the closed forms, which costs the digits of the ratio of times and depths (twelve decades each).
+pub const REFERENCE_DIGITS: usize = 75;
+
+/// Exponents of e beyond this are refused: doubles end at 710.
+const EXPONENT_MAX: f64 = 1e5;
+
+/// What the reference does not know.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum ReferenceError {
+    /// A term whose drive depends on the greatest depth.
+    #[error("the reference knows no terms that soften with the greatest depth")]
+    Softens,
+    /// Too few or too many digits.
+    #[error("a reference has 20 to 1000 digits, not {0}")]
+    Digits(usize),
+    /// An exponential beyond all numbers.
+    #[error("the force at rest at that depth is beyond the largest number")]
+    Overflow,
+    /// A parameter that is no number, or a negative time.
+    #[error(
+        "a term with a relaxation time below zero or a coefficient that is not finite has no force"
+    )]
+    Term,
+}
+
+/// A sum of relaxation terms moved along a path, in many digits.
+#[derive(Clone, Debug)]
+pub struct Reference {
+    digits: Digits,
+    terms: Vec<Term>,
+    depth: Big,
+}
+
+/// A term with its coefficients and its value.
+#[derive(Clone, Debug)]
+struct Term {
+    tau: Big,
+    elastic: Function,
+    rate: Function,
+    value: Big,
+    /// Duration of the last step and its weights.
+    weights: Option<(Big, Weights)>,
+}
+
+/// A drive: powers of depth from the first on, and `A (e^(B x) - 1)`.
+#[derive(Clone, Debug)]
+struct Function {
+    powers: Vec<Big>,
+    exponential: Option<(Big, Big)>,
+}
+
+impl Reference {
+    /// Terms relaxed with the probe at `depth`, in [`REFERENCE_DIGITS`].
+    pub fn new(terms: &[Relaxation], depth: Depth) -> Result<Self, ReferenceError> {
+        Self::with_digits(terms, depth, REFERENCE_DIGITS)
+    }
+
+    /// Terms relaxed with the probe at `depth`, in at least so many decimal digits, 20 to 1000.
+    pub fn with_digits(
+        terms: &[Relaxation],
+        depth: Depth,
+        digits: usize,
+    ) -> Result<Self, ReferenceError> {
+        if !(20..=1000).contains(&digits) {
+            return Err(ReferenceError::Digits(digits));
+        }
+        if !depth.is_finite() {
+            return Err(ReferenceError::Term);
+        }
+        let digits = Digits::decimal(digits);
+        let terms: Result<Vec<Term>, ReferenceError> = terms
+            .iter()
+            .map(|term| Term::new(digits, term, depth))
+            .collect();
+        Ok(Self {
+            digits,
+            terms: terms?,
+            depth: digits.exact(depth.0),
+        })
+    }
+
+    /// Moves straight to `depth` within `dt` and returns the double nearest the force there. After an
+    /// overflow it has moved, after any other error it has not.
+    pub fn step(&mut self, depth: Depth, dt: Seconds) -> Result<Newtons, StepError> {
+        if !depth.is_finite() {
+            return Err(StepError::Depth(depth.0));
+        }
+        if !(dt.0 >= 0.0 && dt.is_finite()) {
+            return Err(StepError::Time(dt.0));
+        }
+        if self.terms.iter().any(|term| term.is_beyond(depth)) {
+            return Err(StepError::Overflow {
+                from: nearest(&self.depth),
+                to: depth.0,
+                dt: dt.0,
+            });
+        }
+        let to = self.digits.exact(depth.0);
+        let from = std::mem::replace(&mut self.depth, to.clone());
+        let span = self.digits.exact(dt.0);
+        let zero = self.digits.zero();
+        if is_zero(&span) {
+            let ends = [from.clone().max(zero.clone()), to.max(zero)];
+            let driven = |term: &Term| is_zero(&term.tau) && !is_zero(&term.impulse(&ends));
+            if self.terms.iter().any(driven) {
+                let from_depth = nearest(&from);
+                self.depth = from;
+                return Err(StepError::Jump {
+                    from: from_depth,
+                    to: depth.0,
+                });
+            }
+            self.terms.iter_mut().for_each(|term| term.jump(&ends));
+            return self.finite_force(nearest(&from), dt);
+        }
+        let from_depth = nearest(&from);
+        // The path is cut where it crosses the surface; outside depth counts as zero.
+        if is_negative(&from) == is_negative(&to) {
+            self.piece(&from.max(zero.clone()), &to.max(zero), &span);
+        } else {
+            let before = &span * (&from / (&from - &to));
+            let after = &span - &before;
+            for (a, b, part) in [(&from, &zero, before), (&zero, &to, after)] {
+                if !is_zero(&part) {
+                    self.piece(
+                        &a.clone().max(zero.clone()),
+                        &b.clone().max(zero.clone()),
+                        &part,
+                    );
+                }
+            }
+        }
+        self.finite_force(from_depth, dt)
+    }
+
+    fn finite_force(&self, from: f64, dt: Seconds) -> Result<Newtons, StepError> {
+        let force = self.force();
+        let overflow = StepError::Overflow {
+            from,
+            to: nearest(&self.depth),
+            dt: dt.0,
+        };
+        force.is_finite().then_some(force).ok_or(overflow)
+    }
+
+    /// The double nearest the force.
+    #[must_use]
+    pub fn force(&self) -> Newtons {
+        Newtons(nearest(&self.sum()))
+    }
+
+    /// By how much a force in N is more than the exact one, in N, to the last digit of a double.
+    #[must_use]
+    pub fn error_of(&self, force: Newtons) -> f64 {
+        nearest(&(self.digits.exact(force.0) - self.sum()))
+    }
+
+    fn sum(&self) -> Big {
+        let zero = self.digits.zero();
+        self.terms.iter().fold(zero, |sum, term| sum + &term.value)
+    }
+
+    fn piece(&mut self, x0: &Big, x1: &Big, dt: &Big) {
+        for term in &mut self.terms {
+            term.advance(self.digits, x0, &(x1 - x0), dt);
+        }
+    }
+}
+
+impl Term {
+    fn new(digits: Digits, term: &Relaxation, depth: Depth) -> Result<Self, ReferenceError> {
+        let Relaxation { tau, elastic, rate } = term;
+        if elastic.softens() || rate.softens() {
+            return Err(ReferenceError::Softens);
+        }
+        let numbers = [elastic, rate].into_iter().flat_map(|drive| {
+            let (amplitude, b) = drive.exponential.unwrap_or_default();
+            drive.powers.into_iter().chain([amplitude, b])
+        });
+        if !(*tau >= 0.0 && tau.is_finite()) || numbers.into_iter().any(|one| !one.is_finite()) {
+            return Err(ReferenceError::Term);
+        }
+        let elastic = Function::new(digits, elastic);
+        let rate = Function::new(digits, rate);
+        let start = digits.exact(depth.0.max(0.0));
+        if elastic.is_beyond(depth) || rate.is_beyond(depth) {
+            return Err(ReferenceError::Overflow);
+        }
+        Ok(Self {
+            tau: digits.exact(*tau),
+            value: elastic.at(&start),
+            elastic,
+            rate,
+            weights: None,
+        })
+    }
+
+    fn is_beyond(&self, depth: Depth) -> bool {
+        self.elastic.is_beyond(depth) || self.rate.is_beyond(depth)
+    }
+
+    /// What a move in no time adds to `tau` times the value.
+    fn impulse(&self, [x0, x1]: &[Big; 2]) -> Big {
+        self.rate.at(x1) - self.rate.at(x0)
+    }
+
+    fn jump(&mut self, ends: &[Big; 2]) {
+        if is_zero(&self.tau) {
+            self.value = self.elastic.at(&ends[1]);
+        } else {
+            self.value = &self.value + self.impulse(ends) / &self.tau;
+        }
+    }
+
+    fn advance(&mut self, digits: Digits, x0: &Big, d: &Big, dt: &Big) {
+        let weights = match self.weights.take() {
+            Some((last, weights)) if last == *dt => weights,
+            _ => Weights::new(digits, dt, &self.tau, POWER_MAX + 1),
+        };
+        let speed = d / dt;
+        let mut sum = &self.value * &weights.kept;
+        // The drive by power of depth, then about x0 by binomials, then by powers of d.
+        let zero = digits.zero();
+        let mut c = vec![zero; POWER_MAX + 1];
+        for k in 1..=POWER_MAX {
+            c[k] = &c[k] + &self.elastic.powers[k - 1];
+            c[k - 1] = &c[k - 1] + digits.whole(k) * &self.rate.powers[k - 1] * &speed;
+        }
+        let mut d_power = digits.whole(1);
+        for (j, psi) in weights.psi.iter().enumerate() {
+            let (mut taylor, mut x_power, mut binomial) =
+                (digits.zero(), digits.whole(1), digits.whole(1));
+            for (k, c) in c.iter().enumerate().skip(j) {
+                taylor += &binomial * c * &x_power;
+                x_power *= x0;
+                binomial = binomial * digits.whole(k + 1) / digits.whole(k + 1 - j);
+            }
+            sum += taylor * &d_power * psi;
+            d_power *= d;
+        }
+        if let Some((amplitude, b)) = &self.elastic.exponential {
+            let chi = chi(&(b * d), &weights);
+            // What the probe rests on and what it adds, each without the difference of large numbers.
+            let rest = (b * x0).exp_m1() * &weights.psi[0];
+            sum += amplitude * (rest + (b * x0).exp() * (chi - &weights.psi[0]));
+        }
+        if let Some((amplitude, b)) = &self.rate.exponential {
+            let chi = chi(&(b * d), &weights);
+            sum += amplitude * b * &speed * (b * x0).exp() * chi;
+        }
+        self.value = sum;
+        self.weights = Some((dt.clone(), weights));
+    }
+}
+
+/// `r int_0^1 e^(b s) e^(-r (1-s)) ds = r (e^b - e^-r) / (b + r)`.
+fn chi(b: &Big, weights: &Weights) -> Big {
+    let Some(r) = &weights.r else {
+        return b.exp();
+    };
+    if is_zero(b) {
+        return weights.psi[0].clone();
+    }
+    let sum = b + r;
+    if is_zero(&sum) {
+        return r * &weights.kept;
+    }
+    r * (b.exp() - &weights.kept) / sum
+}
+
+impl Function {
+    fn new(digits: Digits, drive: &Drive) -> Self {
+        let powers = drive.powers.iter().map(|&value| digits.exact(value));
+        let exponential = drive.exponential;
+        Self {
+            powers: powers.collect(),
+            exponential: exponential
+                .map(|(amplitude, b)| (digits.exact(amplitude), digits.exact(b))),
+        }
+    }
+
+    /// Whether its exponential is beyond any double by so much that even many digits end.
+    fn is_beyond(&self, depth: Depth) -> bool {
+        let exponent = |b: &Big| nearest(b) * depth.0;
+        let exponential = self.exponential.as_ref();
+        exponential.is_some_and(|(_, b)| exponent(b) > EXPONENT_MAX)
+    }
+
+    fn at(&self, x: &Big) -> Big {
+        let zero = Big::ZERO;
+        let sum = self.powers.iter().rev().fold(zero, |sum, c| (sum + c) * x);
+        match &self.exponential {
+            Some((amplitude, b)) => sum + amplitude * (b * x).exp_m1(),
+            None => sum,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests;
