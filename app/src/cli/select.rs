@@ -108,9 +108,12 @@ fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
     let tolerance = args.tolerance.as_deref().map(str::parse).transpose();
     options.tolerance = tolerance.map_err(Failure::usage)?;
     if let Some(names) = &args.families {
-        let mut keys: Vec<&str> = names.split(',').map(str::trim).collect();
-        keys.sort_unstable();
-        keys.dedup();
+        let mut keys: Vec<&str> = Vec::new();
+        for key in names.split(',').map(str::trim) {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
         let families = keys.into_iter().map(by_key).collect::<Result<_, _>>();
         options.families = families.map_err(Failure::usage)?;
     }
