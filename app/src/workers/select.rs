@@ -1,11 +1,11 @@
 //! From sources on disk to a comparison of models, as the command line and the window both make it.
 
 use palpate_model::fit::FitSample;
-use palpate_model::select::{SelectOptions, Selection, select};
+use palpate_model::select::{SelectError, SelectOptions, Selection, select};
 use palpate_protocols::analysis::{self, SourceError};
+use std::fmt;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// A source read for a comparison.
 #[derive(Clone, Debug)]
@@ -28,19 +28,21 @@ pub struct Selected {
 }
 
 /// No comparison.
-#[derive(Debug, Error)]
-pub enum SelectSourceError {
-    /// A source cannot be read.
-    #[error("{path}: {reason}")]
-    Source {
-        /// Where.
-        path: String,
-        /// Why.
-        reason: Box<SourceError>,
-    },
+#[derive(Debug)]
+pub enum SelectFailure {
+    /// This source cannot be read.
+    Source(PathBuf, Box<SourceError>),
     /// The records cannot be compared.
-    #[error(transparent)]
-    Select(#[from] palpate_model::select::SelectError),
+    Select(SelectError),
+}
+
+impl fmt::Display for SelectFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source(path, reason) => write!(f, "{}: {reason}", path.display()),
+            Self::Select(reason) => reason.fmt(f),
+        }
+    }
 }
 
 /// Reads every source and compares models on all of them together.
@@ -48,7 +50,7 @@ pub fn select_sources(
     paths: &[PathBuf],
     options: &SelectOptions,
     progress: &dyn Fn(usize, usize, &str) -> ControlFlow<()>,
-) -> Result<Selected, SelectSourceError> {
+) -> Result<Selected, SelectFailure> {
     let sources = paths
         .iter()
         .map(|path| read(path))
@@ -59,7 +61,8 @@ pub fn select_sources(
         .collect();
     let selection = select(&records, options, &|news| {
         progress(news.done, news.total, &format!("fitting {}", news.family))
-    })?;
+    })
+    .map_err(SelectFailure::Select)?;
     let notes = sources.iter().flat_map(|source| {
         source
             .notes
@@ -72,11 +75,9 @@ pub fn select_sources(
     })
 }
 
-fn read(path: &Path) -> Result<SelectSource, SelectSourceError> {
-    let source = analysis::read(path).map_err(|reason| SelectSourceError::Source {
-        path: path.display().to_string(),
-        reason: Box::new(reason),
-    })?;
+fn read(path: &Path) -> Result<SelectSource, SelectFailure> {
+    let source = analysis::read(path)
+        .map_err(|reason| SelectFailure::Source(path.to_path_buf(), Box::new(reason)))?;
     let name = path.file_stem().map_or_else(
         || path.display().to_string(),
         |stem| stem.to_string_lossy().into_owned(),

@@ -98,7 +98,7 @@ impl ModelsForm {
                 let button = ui.add(button).on_hover_text(format!("leave out {name}"));
                 button.widget_info(|| {
                     eframe::egui::WidgetInfo::labeled(
-                        eframe::egui::WidgetType::Button,
+                        eframe::egui::Role::Button,
                         true,
                         format!("leave out {name}"),
                     )
