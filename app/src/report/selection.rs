@@ -7,12 +7,13 @@ use palpate_model::select::{Candidate, Outcome, Selection, Unseen};
 #[must_use]
 pub fn whole(selection: &Selection) -> String {
     let mut parts = vec![records(selection), in_columns(&table(selection))];
-    parts.extend(
-        selection
-            .refused
-            .iter()
-            .map(|one| format!("{} is left out: {}", one.family, one.reason)),
-    );
+    let refused = selection.refused.iter();
+    let refused: Vec<String> = refused
+        .map(|one| format!("{} is left out: {}", one.family, one.reason))
+        .collect();
+    if !refused.is_empty() {
+        parts.push(refused.join("\n"));
+    }
     let ladder = ladder(selection);
     if ladder.len() > 1 {
         parts.push(format!(

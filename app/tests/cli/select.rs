@@ -152,7 +152,11 @@ fn wrong_use_is_told_in_one_sentence() {
             2,
             "error: there is no model family 'zener'; there are voigt, maxwell, kelvin,",
         ),
-        (&["none.csv"], 2, "error: none.csv"),
+        (
+            &["none.csv"],
+            2,
+            "error: there is no session at none.csv; check the path\n",
+        ),
         (
             &["slow.csv", "--tolerance", "5kg"],
             2,

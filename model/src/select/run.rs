@@ -5,7 +5,7 @@ use super::criteria::criteria;
 use super::facts::RecordFacts;
 use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
 use super::ladder::{Step, steps};
-use super::verdict::{Verdict, verdict};
+use super::verdict::{Counts, Verdict, verdict};
 use crate::families::{Family, Model, all};
 use crate::fit::{FamilyFit, FamilyOptions, FitError, FitSample, fit_family};
 use crate::tolerance::Tolerance;
@@ -277,7 +277,12 @@ pub fn select(
                 .is_some_and(|error| error <= tolerance)
         });
     }
-    let verdict = verdict(&candidates, tolerance_n, is_predicted, samples, effective);
+    let counts = Counts {
+        records: records.len(),
+        samples,
+        effective,
+    };
+    let verdict = verdict(&candidates, tolerance_n, is_predicted, counts);
     Ok(Selection {
         steps: steps(&candidates),
         verdict,
