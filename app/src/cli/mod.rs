@@ -9,6 +9,7 @@ mod plan;
 mod replay;
 mod rig;
 mod run;
+mod select;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -34,6 +35,8 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Compare model families and recommend the cheapest that will do
+    Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
     Plan(plan::PlanArgs),
     /// Feed recorded sessions to the engine again and compare
@@ -112,6 +115,7 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
