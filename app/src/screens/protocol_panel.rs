@@ -7,6 +7,7 @@ use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{form_label, quantity_ui, text_ui};
 use crate::widgets::reason_button::reason_button;
+use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, RichText, TextEdit, Ui, vec2};
 
 /// What the panel must know beside the form.
@@ -76,7 +77,7 @@ fn folder_ui(
         ui.add(input).labelled_by(label.id);
         let button = Button::new("Choose...");
         if ui.add_enabled(!facts.is_dialog_open, button).clicked() {
-            commands.push(Command::ChooseFolder);
+            commands.push(Command::Choose(Ask::NewSessions));
         }
     });
     if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {

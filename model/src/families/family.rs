@@ -38,6 +38,12 @@ pub trait Family: Debug + Send + Sync {
     /// The columns for outer parameters in their units, one for each coefficient.
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>>;
 
+    /// The same parameters with a coarser and cheaper response, to search with; `None` where the
+    /// response is cheap already.
+    fn coarse(&self) -> Option<Box<dyn Family>> {
+        None
+    }
+
     /// Whether a coefficient must not be negative.
     fn is_non_negative(&self, _coefficient: usize) -> bool {
         false

@@ -8,7 +8,7 @@
 //! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
 
 use super::exponential_step::chi_omega;
-use crate::viscoelastic::{Compensated, psi_first};
+use crate::viscoelastic::{Compensated, psi, psi_first};
 
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
@@ -165,6 +165,16 @@ impl Drive {
         sum
     }
 
+    /// Highest power of depth, 0 for none.
+    fn degree(&self) -> usize {
+        let powers = self.powers.iter().rposition(|value| *value != 0.0);
+        // x^j (x_max - x) has one power more.
+        let softening = self.softening.iter().rposition(|value| *value != 0.0);
+        powers
+            .map_or(0, |k| k + 1)
+            .max(softening.map_or(0, |j| j + 2))
+    }
+
     /// Whether it depends on the greatest depth so far.
     #[must_use]
     pub fn softens(&self) -> bool {
@@ -214,17 +224,6 @@ impl Relaxation {
         }
     }
 
-    /// Highest power of depth along a straight piece, the rate's one less for being a slope.
-    fn degree(&self) -> usize {
-        let top = |drive: &Drive| {
-            let powers = drive.powers.iter().rposition(|c| *c != 0.0);
-            let softening = drive.softening.iter().rposition(|c| *c != 0.0);
-            let [powers, softening] = [powers.map(|k| k + 1), softening.map(|j| j + 2)];
-            powers.max(softening).unwrap_or(0)
-        };
-        top(&self.elastic).max(top(&self.rate).saturating_sub(1))
-    }
-
     /// The sum of two terms of one relaxation time, `None` if it is not one term.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Option<Self> {
@@ -237,6 +236,24 @@ impl Relaxation {
             rate: self.rate.plus(&other.rate)?,
         })
     }
+
+    /// Highest power of depth in the drive along a straight piece, where a rate's power is one less.
+    pub(crate) fn degree(&self) -> usize {
+        let rate = self.rate.degree().saturating_sub(1);
+        self.elastic.degree().max(rate)
+    }
+}
+
+/// `psi_0 ..= psi_degree`, zero above.
+#[inline]
+fn psi_through(degree: usize, r: f64) -> [f64; POWER_MAX + 1] {
+    let mut all = [0.0; POWER_MAX + 1];
+    match degree {
+        0 => all[0] = psi(0, r),
+        1 => all[..2].copy_from_slice(&psi_first::<2>(r)),
+        _ => all = psi_first(r),
+    }
+    all
 }
 
 /// A straight piece of depth in contact.
@@ -259,7 +276,7 @@ pub(super) struct Relaxing {
     value: Compensated,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
-    /// Highest power of depth in its drives.
+    /// Highest power of depth in the drive along a straight piece.
     degree: usize,
     /// A step so short beside the relaxation time that it is a jump.
     is_sudden: bool,
@@ -291,7 +308,7 @@ impl Relaxing {
         if piece.dt != self.dt {
             self.dt = piece.dt;
             let r = piece.dt / self.term.tau;
-            self.psi = psi_first(r);
+            self.psi = psi_through(self.degree, r);
             self.is_sudden = r < SUDDEN;
         }
         if self.is_sudden {
@@ -301,21 +318,25 @@ impl Relaxing {
             return self.is_bounded();
         }
         let Piece { x0, d, dt, .. } = *piece;
-        let speed = d / dt;
-        let mut c = self.polynomial(piece, speed);
-        // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
         // Powers that no drive has must not be formed: they may be no numbers where the force is one.
-        let degree = self.degree;
-        for low in 0..degree {
-            for k in (low..degree).rev() {
-                c[k] += x0 * c[k + 1];
+        let (speed, degree) = (d / dt, self.degree);
+        let mut sum = if degree == 0 {
+            self.term.rate.powers[0] * speed * self.psi[0]
+        } else {
+            let mut c = self.polynomial(piece, speed);
+            // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
+            for low in 0..degree {
+                for k in (low..degree).rev() {
+                    c[k] += x0 * c[k + 1];
+                }
             }
-        }
-        let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
-        for (c, psi) in c.iter().zip(&self.psi).take(degree + 1).skip(1) {
-            power *= d;
-            sum += c * power * psi;
-        }
+            let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
+            for (c, psi) in c[1..=degree].iter().zip(&self.psi[1..]) {
+                power *= d;
+                sum += c * power * psi;
+            }
+            sum
+        };
         if self.term.elastic.exponential.is_some() || self.term.rate.exponential.is_some() {
             sum += self.exponential(piece, speed);
         }
@@ -353,6 +374,12 @@ impl Relaxing {
 
     /// What the exponentials add over the piece.
     fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
+        if piece.d == 0.0 {
+            // Held: no rate, and the elastic part stands still.
+            return self.term.elastic.exponential.map_or(0.0, |(amplitude, b)| {
+                amplitude * (b * piece.x0).exp_m1() * self.psi[0]
+            });
+        }
         let r = piece.dt / self.term.tau;
         let mut sum = 0.0;
         if let Some((amplitude, b)) = self.term.elastic.exponential {

@@ -6,12 +6,16 @@
 //! then on every sample.
 
 mod descent;
+mod given;
 mod nonnegative;
+mod predict;
 mod problem;
 mod report;
 mod search;
 
-pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_family, fit_family_at};
+pub use given::fit_family_at;
+pub use predict::{Predicted, predict};
+pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_body, fit_family};
 
 /// What a family's fit finds besides the body: the same for every family, or they could not be
 /// compared.

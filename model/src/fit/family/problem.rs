@@ -15,6 +15,7 @@ use crate::units::{Depth, Seconds};
 const DIFFERENCE: f64 = 1e-5;
 
 /// One record.
+#[derive(Clone)]
 pub(super) struct Record<'a> {
     pub name: &'a str,
     pub samples: &'a [FitSample],
@@ -31,6 +32,7 @@ pub(super) enum Rows {
 }
 
 /// A family and records.
+#[derive(Clone)]
 pub(super) struct Problem<'a> {
     pub family: &'a dyn Family,
     pub records: Vec<Record<'a>>,
@@ -109,6 +111,17 @@ impl<'a> Problem<'a> {
             });
         }
         Ok(problem)
+    }
+
+    /// The same records and ranges with another member of the family.
+    pub fn with<'b>(&self, family: &'b dyn Family) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            family,
+            ..self.clone()
+        }
     }
 
     /// Samples whose force counts.
@@ -199,7 +212,7 @@ impl<'a> Problem<'a> {
             let own = columns.len() + record * self.own();
             self.walk(record, rows, &[columns], |step| {
                 row.fill(0.0);
-                row[..columns.len()].copy_from_slice(step.values[0]);
+                row[..columns.len()].copy_from_slice(&step.values[0]);
                 self.own_columns(&mut row[own..linear], step.elapsed, fading);
                 row[linear] = step.force;
                 triangle.push(&row, step.weight);
@@ -241,18 +254,25 @@ impl<'a> Problem<'a> {
         let outer = self.outer(z);
         let columns = self.family.columns(&outer);
         let fading = self.family.fading(&outer);
-        // The whole body shifted both ways along every outer parameter.
+        // The body shifted both ways along every outer parameter, without the terms that a shift
+        // leaves as they are: they cancel in the difference.
         let mut bodies = vec![columns];
         let mut fadings = vec![fading];
         for i in 0..z.len() {
-            for sign in [1.0, -1.0] {
+            let [up, down] = [1.0, -1.0].map(|sign| {
                 let mut shifted = z.to_vec();
                 shifted[i] += sign * DIFFERENCE;
                 let outer = self.outer(&shifted);
                 let coefficients = solution[..self.coefficients].iter().copied();
-                bodies.push(vec![joined(&self.family.columns(&outer), coefficients)]);
                 fadings.push(self.family.fading(&outer));
-            }
+                joined(&self.family.columns(&outer), coefficients)
+            });
+            let only = |one: &[Relaxation], other: &[Relaxation]| {
+                let kept = one.iter().filter(|term| !other.contains(term));
+                vec![kept.copied().collect::<Vec<_>>()]
+            };
+            bodies.push(only(&up, &down));
+            bodies.push(only(&down, &up));
         }
         let bodies: Vec<&[Vec<Relaxation>]> = bodies.iter().map(Vec::as_slice).collect();
         let (linear, free) = (self.linear(), self.free());
@@ -266,7 +286,7 @@ impl<'a> Problem<'a> {
             };
             self.walk(record, rows, &bodies, |step| {
                 row.fill(0.0);
-                row[..self.coefficients].copy_from_slice(step.values[0]);
+                row[..self.coefficients].copy_from_slice(&step.values[0]);
                 self.own_columns(&mut row[own..own + self.own()], step.elapsed, fading);
                 for i in 0..z.len() {
                     let [up, down] =
@@ -303,9 +323,8 @@ impl<'a> Problem<'a> {
             .collect();
         let mut values: Vec<Vec<f64>> = bodies.iter().map(|one| vec![0.0; one.len()]).collect();
         let mut visit = |elapsed: f64, force: f64, weight: f64, values: &[Vec<f64>]| {
-            let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             visit(&Step {
-                values: &values,
+                values,
                 elapsed,
                 force,
                 weight,
@@ -358,7 +377,7 @@ impl<'a> Problem<'a> {
 
 /// One row of a walk: the columns of every body there.
 struct Step<'s> {
-    values: &'s [&'s [f64]],
+    values: &'s [Vec<f64>],
     /// Since the first sample, in s.
     elapsed: f64,
     force: f64,

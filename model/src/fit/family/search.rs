@@ -1,6 +1,7 @@
-//! Where to start: the sum of squares over a grid of all outer parameters, on the thinned records.
+//! Where to start: the sum of squares over a grid of all outer parameters, on the thinned records and
+//! with a coarse member of the family where it has one.
 
-use super::descent::{Place, descend, place};
+use super::descent::{GAIN_THIN, GAIN_VALLEY, Place, descend, place};
 use super::nonnegative::grown;
 use super::problem::{Problem, Rows};
 use crate::families::OuterRange;
@@ -15,6 +16,15 @@ const OTHERS: [usize; 3] = [7, 4, 6];
 
 /// The best place on the thinned records, or `None` where the family has no finite force at all.
 pub(super) fn search(problem: &Problem<'_>) -> Option<Place> {
+    let start = match problem.family.coarse() {
+        Some(coarse) => place(problem, &valley(&problem.with(&*coarse))?.z, Rows::Thin)?,
+        None => valley(problem)?,
+    };
+    Some(descend(problem, start, Rows::Thin, GAIN_THIN))
+}
+
+/// The deepest valley, not followed to its very floor.
+fn valley(problem: &Problem<'_>) -> Option<Place> {
     let family = problem.family.outer();
     let times = family
         .iter()
@@ -23,7 +33,7 @@ pub(super) fn search(problem: &Problem<'_>) -> Option<Place> {
     // Several relaxation times would need a grid of their own each; they grow from one dense series.
     if times > 1 {
         let start = place(problem, &grown(problem, times)?, Rows::Thin)?;
-        return Some(descend(problem, start, Rows::Thin));
+        return Some(descend(problem, start, Rows::Thin, GAIN_VALLEY));
     }
     let alone = family.len() == 1;
     let axes: Vec<Vec<f64>> = family
@@ -83,6 +93,6 @@ pub(super) fn search(problem: &Problem<'_>) -> Option<Place> {
         .into_iter()
         .take(VALLEYS)
         .filter_map(|cell| places[cell].clone())
-        .map(|start| descend(problem, start, Rows::Thin))
+        .map(|start| descend(problem, start, Rows::Thin, GAIN_VALLEY))
         .min_by(|a, b| a.sum.total_cmp(&b.sum))
 }
