@@ -1,6 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
 mod export;
+mod extremes;
 mod fit;
 mod info;
 mod last_fit;
@@ -41,6 +42,8 @@ enum Command {
     Plan(plan::PlanArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
+    /// Test numerical stability at the extremes, every family, integrator and fit
+    Extremes(extremes::ExtremesArgs),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -118,6 +121,7 @@ pub fn main() -> ExitCode {
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
+        Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
     };
