@@ -1,9 +1,5 @@
 //! Unloading: what the fitted law says of tissue whose own law is another one, and of real tissue.
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "a test whose set-up fails must fail, and says why it skips"
-)]
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, SimSoftening};
