@@ -232,21 +232,27 @@ fn by_case(rows: &[&Row]) -> String {
     table
 }
 
-/// Who did what: `all right`, or `right: kelvin + fung; refused: voigt`.
+/// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
 fn verdicts(rows: &[&Row]) -> String {
-    let named: Vec<String> = VERDICTS
+    let mut named: Vec<(Verdict, Vec<&str>)> = VERDICTS
         .into_iter()
-        .filter_map(|verdict| {
+        .map(|verdict| {
             let own = rows.iter().filter(|row| row.verdict == verdict);
-            let subjects: Vec<&str> = own.map(|row| row.subject.as_str()).collect();
-            match subjects.len() {
-                0 => None,
-                all if all == rows.len() => Some(format!("all {}", verdict.word())),
-                _ => Some(format!("{}: {}", verdict.word(), subjects.join(" + "))),
-            }
+            (verdict, own.map(|row| row.subject.as_str()).collect())
         })
         .collect();
-    named.join("; ")
+    named.sort_by_key(|(_, subjects)| std::cmp::Reverse(subjects.len()));
+    let others: Vec<String> = named[1..]
+        .iter()
+        .filter(|(_, subjects)| !subjects.is_empty())
+        .map(|(verdict, subjects)| format!("{}: {}", verdict.word(), subjects.join(" + ")))
+        .collect();
+    let most = named[0].0.word();
+    if others.is_empty() {
+        format!("all {most}")
+    } else {
+        format!("{most} but for {}", others.join("; "))
+    }
 }
 
 fn header(first: &str, others: impl Iterator<Item = String>) -> String {
