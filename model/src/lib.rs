@@ -18,6 +18,7 @@ pub mod reference;
 pub mod rig;
 pub mod signal;
 pub mod time;
+pub mod tolerance;
 pub mod units;
 mod vectors;
 pub mod viscoelastic;
