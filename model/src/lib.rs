@@ -19,6 +19,7 @@ pub mod rig;
 pub mod signal;
 pub mod time;
 pub mod tolerance;
+pub mod trade;
 pub mod units;
 mod vectors;
 pub mod viscoelastic;
