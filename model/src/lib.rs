@@ -14,6 +14,7 @@ pub mod families;
 pub mod fit;
 pub mod integrators;
 mod linalg;
+pub mod random;
 pub mod reference;
 pub mod rig;
 pub mod signal;

@@ -9,6 +9,7 @@ mod plan;
 mod replay;
 mod rig;
 mod run;
+mod trade;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -36,6 +37,8 @@ enum Command {
     Fit(fit::FitArgs),
     /// Propose the shortest protocol that will tell what is wanted
     Plan(plan::PlanArgs),
+    /// Measure error against time on this machine and recommend what to use
+    Trade(trade::TradeArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
     /// Write a session's samples as a table
@@ -113,6 +116,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
+        Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),

@@ -2,6 +2,6 @@
 //! picture itself.
 
 pub mod picture;
-mod svg;
+pub(crate) mod svg;
 pub mod text;
 pub mod thin;
