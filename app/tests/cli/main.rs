@@ -3,6 +3,7 @@
 mod disk;
 mod fit;
 mod plan;
+mod trade;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
