@@ -61,7 +61,12 @@ fn models_are_compared_in_the_window() {
     for sentence in &selection.verdict.sentences {
         assert!(flow.says(sentence), "{sentence}");
     }
-    for words in ["series-3", "fast: 10.0000 mm deep", "tau_eps", "kelvin > prony-2"] {
+    for words in [
+        "series-3",
+        "fast: 10.0000 mm deep",
+        "tau_eps",
+        "kelvin > prony-2",
+    ] {
         assert!(flow.says(words), "{words}");
     }
     flow.window.check_accessibility();

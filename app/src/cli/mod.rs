@@ -11,6 +11,7 @@ mod replay;
 mod rig;
 mod run;
 mod select;
+mod trade;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -40,6 +41,8 @@ enum Command {
     Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
     Plan(plan::PlanArgs),
+    /// Measure error against time on this machine and recommend what to use
+    Trade(trade::TradeArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
     /// Test numerical stability at the extremes, every family, integrator and fit
@@ -120,6 +123,7 @@ pub fn main() -> ExitCode {
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
+        Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),

@@ -6,7 +6,7 @@ pub mod family;
 pub mod picture;
 pub mod selection;
 mod selection_plot;
-mod svg;
+pub(crate) mod svg;
 pub mod text;
 pub mod thin;
 

@@ -5,6 +5,7 @@ mod extremes;
 mod fit;
 mod plan;
 mod select;
+mod trade;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
