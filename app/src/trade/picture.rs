@@ -9,7 +9,7 @@ use palpate_model::trade::{FamilyRow, FitRow, Precision, TradeCurves};
 
 /// Size of the picture and of the space around a panel, in px.
 const WIDTH: f64 = 1080.0;
-const PANEL_HEIGHT: f64 = 320.0;
+const PANEL_HEIGHT: f64 = 440.0;
 const LEFT: f64 = 90.0;
 /// Room for the names of curves.
 const RIGHT: f64 = 250.0;
@@ -126,12 +126,21 @@ fn panel(svg: &mut Svg, place: [f64; 4], axes: [&str; 2], series: &[Series]) {
 }
 
 /// Names at the right, in the order of their curves' ends and none over another.
-fn label(svg: &mut Svg, [_, top, right, _]: [f64; 4], mut names: Vec<([f64; 2], &str)>) {
+fn label(svg: &mut Svg, [_, top, right, bottom]: [f64; 4], mut names: Vec<([f64; 2], &str)>) {
+    const HEIGHT: f64 = FONT + 2.0;
     names.sort_by(|a, b| a.0[1].total_cmp(&b.0[1]));
+    let mut places: Vec<f64> = Vec::new();
     let mut free = top;
-    for ([x, y], name) in names {
-        let at = y.max(free);
-        free = at + FONT + 2.0;
+    for ([_, y], _) in &names {
+        places.push(y.max(free));
+        free = y.max(free) + HEIGHT;
+    }
+    let mut free = bottom;
+    for place in places.iter_mut().rev() {
+        *place = place.min(free);
+        free = *place - HEIGHT;
+    }
+    for (([x, y], name), at) in names.into_iter().zip(places) {
         svg.line(&[[x, y], [right + 14.0, at]], LIGHT.line, 0.6);
         let ink = Ink::plain(LIGHT.text).anchored(Anchor::Start);
         svg.text([right + 18.0, at + 0.35 * FONT], ink, name);

@@ -5,6 +5,9 @@ use crate::tolerance::Tolerance;
 use crate::units::Newtons;
 use serde::Serialize;
 
+/// Times repeat to this share on a quiet machine.
+const REPEATABLE: f64 = 0.1;
+
 /// A setting that does.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Choice {
@@ -46,7 +49,7 @@ pub struct Recommendation {
 }
 
 impl TradeCurves {
-    /// The cheapest row of each table whose error is within the tolerance and which, `rate_hz` times a
+    /// The cheapest row of each table (of those within a tenth, the most exact) whose error is within the tolerance and which, `rate_hz` times a
     /// second, takes no more than `share` (0 to 1) of each period. An integrator may take several steps
     /// a period and never takes one longer than the period. The fit has no rate to keep up with.
     #[must_use]
@@ -139,9 +142,15 @@ fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64
             nearest = Some(choice);
         }
     }
+    // Of those that cost the same as far as times can be told apart, the most exact.
+    let least = exact
+        .iter()
+        .map(|choice| choice.cost_ns)
+        .fold(f64::INFINITY, f64::min);
     let cheapest = exact
         .into_iter()
-        .min_by(|a, b| a.cost_ns.total_cmp(&b.cost_ns));
+        .filter(|choice| choice.cost_ns <= least * (1.0 + REPEATABLE))
+        .min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
     match (cheapest, nearest, pace) {
         (None, None, Some((rate, _))) => Advice::None(format!(
             "nothing was measured at {rate} updates a second; measure without --quick, or ask for a lower rate"

@@ -150,6 +150,11 @@ fn the_cheapest_that_does_is_recommended() {
     assert_eq!(used(&loose.fit), "10 samples a second, 901 in all");
     let strict = curves.recommend(Tolerance::PercentOfPeak(0.1), 1000.0, 0.1);
     assert_eq!(used(&strict.fit), "1000 samples a second, 90001 in all");
+    // series-4 is as exact and costs more; at a like cost the more exact one would be taken.
+    let mut alike = curves.clone();
+    alike.families[3] = family("series-4", "a body", 1e-12, 52.0);
+    let alike = alike.recommend(percent(0.01), 1000.0, 0.1);
+    assert_eq!(used(&alike.families[0].1), "series-4");
     let Advice::Use(choice) = &loose.integrator else {
         panic!("{loose:?}");
     };
