@@ -9,6 +9,7 @@ use palpate_model::trade::{Recommendation, TradeCurves};
 use palpate_sessions::library_folder;
 use palpate_sessions::trade::{TradeFileError, read_trade, trade_file, trade_files, write_trade};
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate trade`.
@@ -111,13 +112,24 @@ fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
     } else {
         Extent::Full
     };
-    let bar = output.count_bar(trade::TABLES + trade::rounds(extent));
-    bar.set_message("errors");
-    let curves = trade::errors(extent, &mut || bar.inc(1)).map_err(Failure::failed)?;
-    bar.set_message("times");
-    let curves = trade::times(curves, extent, &mut || bar.inc(1)).map_err(Failure::failed)?;
+    with_bar(output, |progress| trade::measure(extent, progress))
+}
+
+/// Work with a progress bar that nobody ends early.
+fn with_bar(
+    output: &Output,
+    work: impl FnOnce(&trade::Progress<'_>) -> Result<Option<TradeCurves>, String>,
+) -> Result<TradeCurves, Failure> {
+    let bar = output.count_bar(0);
+    let curves = work(&|done, of, what| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+        ControlFlow::Continue(())
+    });
     bar.finish_and_clear();
-    Ok(curves)
+    let curves = curves.map_err(Failure::failed)?;
+    curves.ok_or_else(|| Failure::failed("the measurement ended before it was done"))
 }
 
 /// The curves of this machine, or else any there are.
@@ -143,9 +155,7 @@ fn check(curves: &TradeCurves, output: &Output) -> Result<(), Failure> {
     } else {
         Extent::Full
     };
-    let bar = output.count_bar(trade::TABLES);
-    let now = trade::errors(extent, &mut || bar.inc(1)).map_err(Failure::failed)?;
-    bar.finish_and_clear();
+    let now = with_bar(output, |progress| trade::errors(extent, progress))?;
     curves.agrees_with(&now).map_err(Failure::failed)?;
     output.note("every stored error was found again");
     Ok(())

@@ -10,7 +10,7 @@ mod live;
 mod machine;
 mod paths;
 mod picture;
-mod text;
+pub(crate) mod text;
 mod timing;
 
 pub use machine::{age_days, this_machine, version};
@@ -20,6 +20,7 @@ pub use text::text;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::trade::{Cost, TRADE_FORMAT, TradeCurves};
 use palpate_protocols::runner::wall_now;
+use std::ops::ControlFlow;
 use timing::Job;
 
 /// How much is measured.
@@ -31,8 +32,11 @@ pub enum Extent {
     Quick,
 }
 
+/// How much of the work is done, of how much, and what is under way; may end the whole.
+pub type Progress<'a> = dyn Fn(usize, usize, &str) -> ControlFlow<()> + 'a;
+
 /// Tables whose errors [`errors`] computes.
-pub const TABLES: u64 = 4;
+const TABLES: usize = 4;
 /// Seeds of the noise in the fits: the first, and how many.
 const SEEDS_FULL: [u64; 2] = [1, 8];
 const SEEDS_QUICK: [u64; 2] = [1, 2];
@@ -43,24 +47,47 @@ const UNMEASURED: Cost = Cost {
     halves: 0.0,
 };
 
-/// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares.
-/// `step` is told of each of [`TABLES`] done.
-pub fn errors(extent: Extent, step: &mut dyn FnMut()) -> Result<TradeCurves, String> {
+/// All rows, computed, timed and marked; none if `progress` ended it.
+pub fn measure(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
+    let total = TABLES + timing::rounds(extent);
+    let of_errors = |done: usize, _: usize, what: &str| progress(done, total, what);
+    let Some(curves) = errors(extent, &of_errors)? else {
+        return Ok(None);
+    };
+    let mut done = TABLES;
+    times(curves, extent, &mut || {
+        done += 1;
+        progress(done, total, "times")
+    })
+}
+
+/// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
+/// `progress` ended it.
+pub fn errors(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
     let paths = paths::Paths::new()?;
     let seeds = match extent {
         Extent::Full => SEEDS_FULL,
         Extent::Quick => SEEDS_QUICK,
     };
+    let ends = |done: usize, what: &str| progress(done, TABLES, what).is_break();
+    if ends(0, "errors of the integrators") {
+        return Ok(None);
+    }
     let integrators = integrators::rows(extent, &paths)?;
-    step();
+    if ends(1, "errors of the families") {
+        return Ok(None);
+    }
     let families = families::rows(extent, &paths)?;
-    step();
+    if ends(2, "errors of the fit") {
+        return Ok(None);
+    }
     let fit = fit::rows(extent, seeds, &paths)?;
-    step();
+    if ends(3, "errors of the live fit") {
+        return Ok(None);
+    }
     let live = live::rows(&paths)?;
-    step();
     let now: DateTime<Utc> = wall_now().into();
-    Ok(TradeCurves {
+    Ok(Some(TradeCurves {
         format: TRADE_FORMAT,
         version: version().into(),
         machine: this_machine(),
@@ -72,22 +99,24 @@ pub fn errors(extent: Extent, step: &mut dyn FnMut()) -> Result<TradeCurves, Str
         families,
         fit,
         live,
-    })
+    }))
 }
 
-/// Measures the times of all rows; `step` is told of each of [`rounds`] rounds done.
-pub fn times(
+/// Measures the times of all rows; `step` is told of each round done and may end the whole.
+fn times(
     mut curves: TradeCurves,
     extent: Extent,
-    step: &mut dyn FnMut(),
-) -> Result<TradeCurves, String> {
+    step: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<TradeCurves>, String> {
     let paths = paths::Paths::new()?;
     let mut jobs: Vec<Job> = Vec::new();
     jobs.extend(integrators::jobs());
     jobs.extend(families::jobs(&curves.families)?);
     jobs.extend(fit::jobs(&curves.fit, curves.seeds[0], &paths)?);
     jobs.extend(live::jobs(&curves.live, &paths)?);
-    let costs = timing::measure(&mut jobs, extent, step);
+    let Some(costs) = timing::measure(&mut jobs, extent, step) else {
+        return Ok(None);
+    };
     let mut costs = costs.into_iter();
     let by_scheme: Vec<Cost> = costs.by_ref().take(integrators::JOBS).collect();
     for row in &mut curves.integrators {
@@ -99,11 +128,5 @@ pub fn times(
     let rest = rest.chain(curves.live.iter_mut().map(|row| &mut row.cost));
     rest.zip(costs).for_each(|(slot, cost)| *slot = cost);
     curves.mark_fronts();
-    Ok(curves)
-}
-
-/// How many rounds of all jobs [`times`] takes.
-#[must_use]
-pub fn rounds(extent: Extent) -> u64 {
-    timing::rounds(extent) as u64
+    Ok(Some(curves))
 }

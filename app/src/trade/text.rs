@@ -29,12 +29,13 @@ pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
     out
 }
 
-fn percent(share: f64) -> String {
+/// A share in percent.
+pub(crate) fn percent(share: f64) -> String {
     format!("{} %", digits(100.0 * share))
 }
 
 /// As short as it can be written to six decimals.
-pub(super) fn plain(value: f64) -> String {
+pub(crate) fn plain(value: f64) -> String {
     format!("{}", (value * 1e6).round() / 1e6)
 }
 
@@ -50,16 +51,20 @@ fn digits(value: f64) -> String {
     }
 }
 
-fn cost(cost: &Cost) -> String {
-    let time = match cost.ns {
+/// A time in the unit that suits it.
+pub(crate) fn time(ns: f64) -> String {
+    match ns {
         ns if ns < 1e3 => format!("{ns:.1} ns"),
         ns if ns < 1e6 => format!("{:.2} us", ns * 1e-3),
         ns => format!("{:.2} ms", ns * 1e-6),
-    };
-    format!("{time:>10}  {:>7}", percent(cost.spread))
+    }
 }
 
-fn star(front: bool) -> &'static str {
+fn cost(cost: &Cost) -> String {
+    format!("{:>10}  {:>7}", time(cost.ns), percent(cost.spread))
+}
+
+pub(crate) fn star(front: bool) -> &'static str {
     if front { "*" } else { " " }
 }
 
@@ -151,9 +156,7 @@ fn fits(out: &mut String, curves: &TradeCurves) {
     }
     for row in &curves.live {
         let name = format!("live, {} relaxation times, a sample", row.nodes);
-        let error = row
-            .tau_error
-            .map_or("no answer".to_owned(), |error| percent(error));
+        let error = row.tau_error.map_or("no answer".to_owned(), percent);
         let _ = writeln!(
             out,
             "{name:34}{} {error:>10} without noise {}",
@@ -164,34 +167,44 @@ fn fits(out: &mut String, curves: &TradeCurves) {
 }
 
 fn recommended(out: &mut String, recommendation: &Recommendation) {
-    let _ = writeln!(
-        out,
-        "\nfor {} and {} updates a second, using at most {} of each period",
+    let _ = writeln!(out, "\nfor {}", terms(recommendation));
+    for (name, words) in advice(recommendation) {
+        let _ = writeln!(out, "  {name}: {words}");
+    }
+}
+
+/// What was asked for.
+pub(crate) fn terms(recommendation: &Recommendation) -> String {
+    format!(
+        "{} and {} updates a second, using at most {} of each period",
         recommendation.tolerance,
         plain(recommendation.rate_hz),
         percent(recommendation.share_allowed)
-    );
-    let mut line = |name: &str, advice: &Advice| {
-        let words = match advice {
-            Advice::Use(choice) => {
-                let share = choice.share_of_period.map_or(String::new(), |share| {
-                    format!(", {} of each period", percent(share))
-                });
-                format!(
-                    "{}: errs by {} of the peak force{share}",
-                    choice.setting,
-                    percent(choice.error_of_peak)
-                )
-            }
-            Advice::None(why) => format!("none: {why}"),
-        };
-        let _ = writeln!(out, "  {name}: {words}");
+    )
+}
+
+/// What each setting is for, and the setting or why there is none.
+pub(crate) fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
+    let words = |advice: &Advice| match advice {
+        Advice::Use(choice) => {
+            let share = choice.share_of_period.map_or(String::new(), |share| {
+                format!(", {} of each period", percent(share))
+            });
+            format!(
+                "{}: errs by {} of the peak force{share}",
+                choice.setting,
+                percent(choice.error_of_peak)
+            )
+        }
+        Advice::None(why) => format!("none: {why}"),
     };
-    line("integrator", &recommendation.integrator);
-    for (target, advice) in &recommendation.families {
-        line(&format!("family for the {target}"), advice);
-    }
-    line("recording to fit", &recommendation.fit);
+    let families = recommendation.families.iter();
+    let families =
+        families.map(|(target, advice)| (format!("family for the {target}"), words(advice)));
+    std::iter::once(("integrator".to_owned(), words(&recommendation.integrator)))
+        .chain(families)
+        .chain([("recording to fit".to_owned(), words(&recommendation.fit))])
+        .collect()
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@
 use super::Extent;
 use palpate_model::trade::Cost;
 use palpate_protocols::runner::Stopwatch;
+use std::ops::ControlFlow;
 
 /// Something to be timed.
 pub(super) struct Job<'a> {
@@ -28,8 +29,12 @@ pub(super) fn rounds(extent: Extent) -> usize {
     }
 }
 
-/// The cost of an evaluation of each job.
-pub(super) fn measure(jobs: &mut [Job], extent: Extent, step: &mut dyn FnMut()) -> Vec<Cost> {
+/// The cost of an evaluation of each job; none if a step breaks it off.
+pub(super) fn measure(
+    jobs: &mut [Job],
+    extent: Extent,
+    step: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Option<Vec<Cost>> {
     let batch = match extent {
         Extent::Full => BATCH,
         Extent::Quick => BATCH_QUICK,
@@ -57,9 +62,11 @@ pub(super) fn measure(jobs: &mut [Job], extent: Extent, step: &mut dyn FnMut()) 
             let evaluations = calls as f64 * job.per_call;
             rounds.push(timed(job, calls) / evaluations * 1e9);
         }
-        step();
+        if step().is_break() {
+            return None;
+        }
     }
-    rounds_of.iter().map(|rounds| cost(rounds)).collect()
+    Some(rounds_of.iter().map(|rounds| cost(rounds)).collect())
 }
 
 /// The cost that rounds of measured ns amount to.
@@ -106,7 +113,11 @@ mod tests {
             })
             .collect();
         let mut steps = 0;
-        let costs = measure(&mut jobs, Extent::Quick, &mut || steps += 1);
+        let mut step = || {
+            steps += 1;
+            ControlFlow::Continue(())
+        };
+        let costs = measure(&mut jobs, Extent::Quick, &mut step).unwrap();
         assert_eq!((costs.len(), steps), (2, rounds(Extent::Quick)));
         drop(jobs);
         for (cost, count) in costs.iter().zip(&counts) {
