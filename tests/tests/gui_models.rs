@@ -99,6 +99,27 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
 }
 
 #[test]
+fn the_trade_is_measured_in_the_window() {
+    let mut flow = Flow::open(TimeScale::Max);
+    screen(&mut flow, Key::Num3);
+    flow.click("few rows, rough times");
+    flow.click("Measure here");
+    flow.wait("the curves", |window| {
+        window.state().trade_curves().is_some()
+    });
+    flow.window.run_steps(3);
+    assert!(flow.says("What to use") && flow.says("of the peak force"));
+    for view in ["Families", "Fit", "Integrators"] {
+        flow.click(view);
+        flow.window.check_accessibility();
+    }
+    flow.type_into("tolerance", "0.0000001%");
+    assert!(flow.says("none: "));
+    flow.type_into("rate", "0");
+    assert!(flow.says("must be above 0"));
+}
+
+#[test]
 fn the_extremes_are_tested_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
     screen(&mut flow, Key::Num4);

@@ -46,6 +46,12 @@ impl Default for ExtremesScreen {
 }
 
 impl ExtremesScreen {
+    /// Whether work is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
+    }
+
     /// Fetches an answer that has come.
     pub fn poll(&mut self) {
         self.task.poll();
