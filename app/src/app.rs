@@ -16,7 +16,9 @@ use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
+use crate::workers::select::Selected;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use palpate_model::extremes::Row;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, Runner, Snapshot, StartError};
 use std::sync::Arc;
@@ -122,6 +124,18 @@ impl WorkbenchApp {
     #[must_use]
     pub fn refit(&self) -> Refit<'_> {
         self.refitter.of(self.snapshot.run.as_ref())
+    }
+
+    /// The last comparison of models.
+    #[must_use]
+    pub fn comparison(&self) -> Option<&Result<Selected, String>> {
+        self.models.answer()
+    }
+
+    /// What the last test of the extremes found.
+    #[must_use]
+    pub fn extremes_rows(&self) -> Option<&[Row]> {
+        self.extremes.rows()
     }
 
     /// What the window is in the middle of.

@@ -5,6 +5,16 @@ use crate::units::{Depth, Seconds};
 use crate::viscoelastic::Pieces;
 use thiserror::Error;
 
+/// A number as people write it, by powers of ten where it would be a row of zeros.
+pub(super) fn plain(value: &f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !value.is_finite() || (1e-6..1e9).contains(&size) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A step that has no answer; the state is as it was before.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum StepError {
@@ -16,7 +26,7 @@ pub enum StepError {
     Time(f64),
     /// A dashpot moved in no time.
     #[error(
-        "a dashpot cannot be moved by {from} -> {to} mm in no time, which takes an infinite force; give the move a duration"
+        "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
     Jump {
         /// Depth before, in mm.
@@ -26,7 +36,7 @@ pub enum StepError {
     },
     /// Faster than numbers go.
     #[error(
-        "a move from {from} mm to {to} mm in {dt} s is faster than the largest number; give the move a longer time, or 0 s for a jump"
+        "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
     )]
     Speed {
         /// Depth before, in mm.
@@ -38,7 +48,7 @@ pub enum StepError {
     },
     /// The force at rest cannot be written as a number.
     #[error(
-        "the force at rest at a depth of {depth} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body"
+        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body", plain(.depth)
     )]
     Rest {
         /// Depth in mm.
@@ -46,7 +56,7 @@ pub enum StepError {
     },
     /// The force cannot be written as a number.
     #[error(
-        "the force of a move from {from} mm to {to} mm in {dt} s is beyond the largest number; check the units of depth (mm) and the parameters of the body"
+        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the body", plain(.from), plain(.to), plain(.dt)
     )]
     Overflow {
         /// Depth before, in mm.

@@ -4,7 +4,7 @@ mod batch;
 mod family;
 mod intervals;
 mod joint;
-mod sources;
+pub(super) mod sources;
 
 use super::Failure;
 use super::output::Output;

@@ -1,7 +1,7 @@
 //! Records and a family as a linear problem for any given outer parameters.
 
 use super::super::record::{constant_force, depths, measured};
-use super::super::sample::{FitError, FitSample, check_samples};
+use super::super::sample::{FitError, FitSample, check_samples, check_scale};
 use super::super::scan::{log_tau_range, union};
 use super::super::thin::Thin;
 use super::super::triangle::{Factor, Triangle};
@@ -453,5 +453,5 @@ fn check(samples: &[FitSample]) -> Result<(), FitError> {
             contact: 0.0,
         });
     }
-    Ok(())
+    check_scale(samples)
 }
