@@ -3,13 +3,12 @@
 use super::Failure;
 use super::output::Output;
 use crate::report::extremes::{page, text};
+use crate::workers::extremes::survey;
 use clap::Args;
-use palpate_model::extremes::{Extent, Row, Verdict, parts};
+use palpate_model::extremes::{Extent, Row, Verdict};
 use serde::Serialize;
+use std::ops::ControlFlow;
 use std::path::PathBuf;
-
-/// Steps of the progress bar in one part.
-const FINENESS: u64 = 100;
 
 /// Arguments of `palpate extremes`.
 #[derive(Debug, Args)]
@@ -48,16 +47,16 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         (false, true) => (Extent::Soak, "soak"),
         (false, false) => (Extent::Whole, "whole"),
     };
-    let parts = parts(extent, args.family.as_deref()).map_err(Failure::usage)?;
-    let bar = output.share_bar(parts.len() as u64 * FINENESS);
-    let mut rows = Vec::new();
-    for (index, part) in (0..).zip(&parts) {
-        bar.set_message(format!("{}: {}", part.group, part.subject));
-        rows.extend(part.rows(|share| {
-            bar.set_position(index * FINENESS + (share * FINENESS as f64) as u64);
-        }));
-    }
+    let bar = output.share_bar(0);
+    let rows = survey(extent, args.family.as_deref(), &|done, of, what| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+        ControlFlow::Continue(())
+    });
     bar.finish_and_clear();
+    // Nobody ends it early here, so there is always an answer.
+    let rows = rows.map_err(Failure::usage)?.unwrap_or_default();
     let count = |verdict| rows.iter().filter(|row| row.verdict == verdict).count();
     let wrong = count(Verdict::Wrong);
     output.result(

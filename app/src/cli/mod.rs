@@ -10,6 +10,8 @@ mod plan;
 mod replay;
 mod rig;
 mod run;
+mod select;
+mod trade;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -35,8 +37,12 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Compare model families and recommend the cheapest that will do
+    Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
     Plan(plan::PlanArgs),
+    /// Measure error against time on this machine and recommend what to use
+    Trade(trade::TradeArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
     /// Test numerical stability at the extremes, every family, integrator and fit
@@ -115,7 +121,9 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
+        Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),

@@ -3,16 +3,47 @@
 use palpate_model::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
-const VERDICTS: [Verdict; 4] = [
+/// All verdicts, in the order of [`GroupSummary::counts`].
+pub const VERDICTS: [Verdict; 4] = [
     Verdict::Right,
     Verdict::Refused,
     Verdict::Flagged,
     Verdict::Wrong,
 ];
 
+/// One group of cases in numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupSummary {
+    /// The group.
+    pub group: &'static str,
+    /// Rows of each of [`VERDICTS`].
+    pub counts: [usize; 4],
+    /// The right row that used most of its tolerance, in words.
+    pub tightest: Option<String>,
+}
+
+/// Every group in numbers, in the order they were run.
+#[must_use]
+pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
+    groups(rows)
+        .into_iter()
+        .map(|(group, rows)| GroupSummary {
+            group,
+            counts: VERDICTS
+                .map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count()),
+            tightest: tightest(&rows).map(|(row, error)| {
+                format!(
+                    "{error:.1e} of {:.0e}: {}, {}",
+                    row.tolerance, row.subject, row.case
+                )
+            }),
+        })
+        .collect()
+}
+
 /// Groups in the order they were run, with their rows.
-fn groups(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
-    let mut groups: Vec<(&str, Vec<&Row>)> = Vec::new();
+fn groups(rows: &[Row]) -> Vec<(&'static str, Vec<&Row>)> {
+    let mut groups: Vec<(&'static str, Vec<&Row>)> = Vec::new();
     for row in rows {
         match groups.iter_mut().find(|(group, _)| *group == row.group) {
             Some((_, own)) => own.push(row),
@@ -20,10 +51,6 @@ fn groups(rows: &[Row]) -> Vec<(&str, Vec<&Row>)> {
         }
     }
     groups
-}
-
-fn counts(rows: &[&Row]) -> [usize; 4] {
-    VERDICTS.map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count())
 }
 
 /// The right row that used most of its tolerance.
@@ -38,16 +65,14 @@ fn tightest<'a>(rows: &[&'a Row]) -> Option<(&'a Row, f64)> {
 #[must_use]
 pub fn text(rows: &[Row]) -> String {
     let mut lines = Vec::new();
-    for (group, rows) in groups(rows) {
-        let [right, refused, flagged, wrong] = counts(&rows);
+    for one in summary(rows) {
+        let [right, refused, flagged, wrong] = one.counts;
         lines.push(format!(
-            "{group}: {right} right, {refused} refused, {flagged} flagged, {wrong} WRONG"
+            "{}: {right} right, {refused} refused, {flagged} flagged, {wrong} WRONG",
+            one.group
         ));
-        if let Some((row, error)) = tightest(&rows) {
-            lines.push(format!(
-                "  closest to its tolerance: {error:.1e} of {:.0e}, {}, {}",
-                row.tolerance, row.subject, row.case
-            ));
+        if let Some(tightest) = one.tightest {
+            lines.push(format!("  closest to its tolerance: {tightest}"));
         }
     }
     let wrong = rows.iter().filter(|row| row.verdict == Verdict::Wrong);
@@ -65,14 +90,9 @@ pub fn text(rows: &[Row]) -> String {
 pub fn page(rows: &[Row]) -> String {
     let mut page = INTRODUCTION.to_owned();
     page += "| group | right | refused | flagged | wrong | closest to its tolerance |\n|---|---|---|---|---|---|\n";
-    for (group, rows) in groups(rows) {
-        let [right, refused, flagged, wrong] = counts(&rows);
-        let tightest = tightest(&rows).map_or(String::new(), |(row, error)| {
-            format!(
-                "{error:.1e} of {:.0e}: {}, {}",
-                row.tolerance, row.subject, row.case
-            )
-        });
+    for one in summary(rows) {
+        let [right, refused, flagged, wrong] = one.counts;
+        let (group, tightest) = (one.group, one.tightest.unwrap_or_default());
         page += &format!("| {group} | {right} | {refused} | {flagged} | {wrong} | {tightest} |\n");
     }
     for (group, rows) in groups(rows) {

@@ -1,8 +1,13 @@
-//! Results as people read them: the strings of a fit that window, command line and pictures share,
-//! the picture itself, and the page of the extremes.
+//! Results as people read them: the strings of a fit and of a selection that window, command line and
+//! pictures share, the pictures themselves, and the page of the extremes.
 
 pub mod extremes;
+pub mod family;
 pub mod picture;
-mod svg;
+pub mod selection;
+mod selection_plot;
+pub(crate) mod svg;
 pub mod text;
 pub mod thin;
+
+pub use selection_plot::of_selection;

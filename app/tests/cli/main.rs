@@ -4,6 +4,8 @@ mod disk;
 mod extremes;
 mod fit;
 mod plan;
+mod select;
+mod trade;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};

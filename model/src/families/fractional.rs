@@ -18,8 +18,9 @@ pub struct FractionalZener {
     digits: u32,
 }
 
-/// Digits of the modulus unless asked otherwise.
-pub const FRACTIONAL_DIGITS: u32 = 6;
+/// Digits of the modulus unless asked otherwise: a tenth of what a good load cell resolves, for half the
+/// relaxation times that six digits take.
+pub const FRACTIONAL_DIGITS: u32 = 4;
 /// Digits that suffice to find the valley: a percent of the modulus.
 const COARSE_DIGITS: u32 = 2;
 /// Relaxation times that no recording can tell from none, or from for ever, relative to `tau`: twelve

@@ -1,8 +1,8 @@
 //! Prediction of what a fit has not seen: another speed, another depth, another specimen, or the rest
 //! of the same record.
 //!
-//! The body is fitted to the other records alone. The held-out record's own sensor offset and initial
-//! force are found on that record, because no other can tell them; the body is not.
+//! The body is fitted to the other records alone. What the held-out record has of its own, its sensor
+//! offset, is found on that record, because no other can tell it; the body is not.
 
 use super::facts::{RecordFacts, are_unlike};
 use crate::families::{Family, Model};

@@ -5,7 +5,7 @@ use super::criteria::criteria;
 use super::facts::RecordFacts;
 use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
 use super::ladder::{Step, steps};
-use super::verdict::{Verdict, verdict};
+use super::verdict::{Counts, Verdict, verdict};
 use crate::families::{Family, Model, all};
 use crate::fit::{FamilyFit, FamilyOptions, FitError, FitSample, fit_family};
 use crate::tolerance::Tolerance;
@@ -23,7 +23,8 @@ pub struct SelectOptions {
     pub tolerance: Option<Tolerance>,
     /// What is held out.
     pub hold_out: HoldOut,
-    /// What each record has of its own.
+    /// What each record has of its own; by default an offset alone. An initial force that fades is not
+    /// defined for families of several relaxation times, and would make the others look costlier.
     pub fit: FamilyOptions,
 }
 
@@ -33,7 +34,10 @@ impl Default for SelectOptions {
             families: all(),
             tolerance: None,
             hold_out: HoldOut::Auto,
-            fit: FamilyOptions::default(),
+            fit: FamilyOptions {
+                offset: true,
+                initial: false,
+            },
         }
     }
 }
@@ -78,7 +82,7 @@ pub struct Candidate {
     pub name: String,
     /// Parameters of the body.
     pub parameters: usize,
-    /// Numbers the fit found: parameters, and each record's offset and initial force.
+    /// Numbers the fit found: parameters, and what each record has of its own.
     pub free: usize,
     /// Root mean square residual in N.
     pub rms_n: f64,
@@ -273,7 +277,12 @@ pub fn select(
                 .is_some_and(|error| error <= tolerance)
         });
     }
-    let verdict = verdict(&candidates, tolerance_n, is_predicted, samples, effective);
+    let counts = Counts {
+        records: records.len(),
+        samples,
+        effective,
+    };
+    let verdict = verdict(&candidates, tolerance_n, is_predicted, counts);
     Ok(Selection {
         steps: steps(&candidates),
         verdict,

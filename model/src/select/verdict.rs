@@ -8,11 +8,11 @@ use serde::Serialize;
 const BARE_MENTION: f64 = 2.0;
 /// Costs within this share are the same cost.
 const SAME_COST: f64 = 0.05;
-/// Residuals worth fewer independent samples than this, and than [`WHITE_SHARE`] of all, wander over the
-/// record as a wrong model's do: a hundred pieces are what makes a curve, not noise.
-const PIECES: f64 = 100.0;
+/// Residuals worth fewer independent samples than this for each record, and than [`WHITE_SHARE`] of all,
+/// wander over the record as a wrong model's do: a hundred pieces are what makes a curve, not noise.
+const PIECES: usize = 100;
 /// See [`PIECES`].
-const WHITE_SHARE: f64 = 0.25;
+const WHITE_SHARE: f64 = 0.5;
 
 /// What came of it.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -41,16 +41,32 @@ pub struct Verdict {
     pub sentences: Vec<String>,
 }
 
+/// What the criteria count.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Counts {
+    pub records: usize,
+    pub samples: usize,
+    /// Independent samples.
+    pub effective: f64,
+}
+
+impl Counts {
+    /// Whether what the best fit leaves is a curve rather than noise.
+    fn is_curve(self) -> bool {
+        let pieces = (PIECES * self.records) as f64;
+        self.effective < pieces.min(WHITE_SHARE * self.samples as f64)
+    }
+}
+
 pub(super) fn verdict(
     candidates: &[Candidate],
     tolerance_n: Option<f64>,
     is_predicted: bool,
-    samples: usize,
-    effective: f64,
+    counts: Counts,
 ) -> Verdict {
     match tolerance_n {
         Some(tolerance) => within(candidates, tolerance, is_predicted),
-        None => by_criterion(candidates, samples, effective),
+        None => by_criterion(candidates, counts),
     }
 }
 
@@ -61,7 +77,7 @@ fn simplest<'a>(candidates: &[&'a Candidate]) -> Option<&'a Candidate> {
 }
 
 /// The lowest BIC, if no other family comes near it and it describes the records.
-fn by_criterion(candidates: &[Candidate], samples: usize, effective: f64) -> Verdict {
+fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
     let near: Vec<&Candidate> = candidates
         .iter()
         .filter(|one| one.bic_above < BARE_MENTION)
@@ -69,12 +85,14 @@ fn by_criterion(candidates: &[Candidate], samples: usize, effective: f64) -> Ver
     let among: Vec<String> = near.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&near);
     let (outcome, sentence) = match chosen {
-        Some(one) if effective < PIECES.min(WHITE_SHARE * samples as f64) => (
+        Some(one) if counts.is_curve() => (
             Outcome::NoneAdequate,
             format!(
-                "no winner: no family describes these records to their noise; what even {} leaves, {} rms, wanders like a curve (the {samples} residuals are worth {effective:.0} independent ones), so the lowest criterion proves nothing: give the error that does not matter as --tolerance",
+                "no winner: no family describes these records to their noise; what even {} leaves, {} rms, wanders like a curve (its {} residuals are worth {:.0} independent ones), so the lowest criterion proves nothing: state a tolerance, the error that does not matter",
                 one.family,
                 newtons(one.rms_n),
+                counts.samples,
+                counts.effective,
             ),
         ),
         Some(one) if near.len() > 1 => (
@@ -160,7 +178,7 @@ fn within(candidates: &[Candidate], tolerance: f64, is_predicted: bool) -> Verdi
     let among: Vec<String> = equals.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&equals).unwrap_or(cheapest);
     let first = format!(
-        "{} ({}) {what} within {}: {} rms, {} at worst, for {} operations an evaluation",
+        "{} ({}): it {what} within {}, {} rms and {} at worst, for {} operations an evaluation",
         chosen.family,
         chosen.name,
         newtons(tolerance),
@@ -271,5 +289,18 @@ mod tests {
     fn newtons_have_three_digits() {
         let texts = [12.34, 1.234, 0.1234, 0.012_34, 0.001_234].map(newtons);
         assert_eq!(texts, ["12.3 N", "1.23 N", "123 mN", "12.3 mN", "1.23 mN"]);
+    }
+
+    #[test]
+    fn noise_with_a_short_memory_is_no_curve() {
+        let counts = |samples, effective| Counts {
+            records: 2,
+            samples,
+            effective,
+        };
+        // A filter's memory of fifty samples in a minute at 1 kHz; a short record of white noise.
+        assert!(!counts(60_000, 1200.0).is_curve());
+        assert!(!counts(100, 90.0).is_curve());
+        assert!(counts(60_000, 150.0).is_curve() && counts(100, 30.0).is_curve());
     }
 }

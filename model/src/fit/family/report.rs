@@ -108,6 +108,8 @@ pub fn fit_family(
     }
     let problem = Problem::new(family, records, options)?;
     let start = search(&problem).ok_or(FitError::Overflow)?;
+    // What the thinned records refuse, all samples would at many times the cost.
+    model(&problem, &start)?;
     let start = place(&problem, &start.z, Rows::All).ok_or(FitError::Overflow)?;
     let end = descend(&problem, start, Rows::All, GAIN_EXACT);
     let model = model(&problem, &end)?;

@@ -30,10 +30,15 @@ fn valley(problem: &Problem<'_>) -> Option<Place> {
         .iter()
         .filter(|one| one.range == OuterRange::Time)
         .count();
-    // Several relaxation times would need a grid of their own each; they grow from one dense series.
+    // Several relaxation times would need a grid of their own each; they start from one dense series,
+    // and evenly spread.
     if times > 1 {
-        let start = place(problem, &grown(problem, times)?, Rows::Thin)?;
-        return Some(descend(problem, start, Rows::Thin, GAIN_VALLEY));
+        let &(low, high) = problem.ranges.first()?;
+        let share = |i: usize| (i as f64 + 0.5) / times as f64;
+        let even = (0..times).map(|i| low + (high - low) * share(i)).collect();
+        let starts = grown(problem, times).into_iter().chain([even]);
+        let starts = starts.filter_map(|z| place(problem, &z, Rows::Thin));
+        return deepest(problem, starts);
     }
     let alone = family.len() == 1;
     let axes: Vec<Vec<f64>> = family
@@ -89,10 +94,20 @@ fn valley(problem: &Problem<'_>) -> Option<Place> {
         })
         .collect();
     valleys.sort_by(|&a, &b| sum(a).total_cmp(&sum(b)));
-    valleys
-        .into_iter()
-        .take(VALLEYS)
-        .filter_map(|cell| places[cell].clone())
+    let starts = valleys.into_iter().take(VALLEYS);
+    deepest(problem, starts.filter_map(|cell| places[cell].clone()))
+}
+
+/// The deepest floor below these starts; one whose coefficients the family allows, if there is any.
+fn deepest(problem: &Problem<'_>, starts: impl Iterator<Item = Place>) -> Option<Place> {
+    let is_refused = |place: &Place| {
+        let mut coefficients = place.solution[..problem.coefficients].iter().enumerate();
+        coefficients.any(|(k, &value)| value < 0.0 && problem.family.is_non_negative(k))
+    };
+    starts
         .map(|start| descend(problem, start, Rows::Thin, GAIN_VALLEY))
-        .min_by(|a, b| a.sum.total_cmp(&b.sum))
+        .min_by(|a, b| {
+            let refused = is_refused(a).cmp(&is_refused(b));
+            refused.then(a.sum.total_cmp(&b.sum))
+        })
 }
