@@ -42,10 +42,12 @@ fn nothing_is_wrong_at_the_extremes() {
     assert!(parts(Extent::Quick, Some("no such family")).is_err());
 }
 
+type Forces = Result<Vec<f64>, String>;
+
 /// A family's exact step, spoilt.
 struct Spoilt {
     right: FamilyBody,
-    spoil: fn(Result<Vec<f64>, String>) -> Result<Vec<f64>, String>,
+    spoil: fn(Forces) -> Forces,
 }
 
 impl Subject for Spoilt {
@@ -84,21 +86,21 @@ fn a_broken_step_is_judged_wrong() {
     let good = poke(10.0);
     assert_eq!(verdict(|forces| forces, &good), Verdict::Right);
     // Off by little more than the tolerance, in one sample.
-    let off = |forces: Result<Vec<f64>, String>| {
+    let off = |forces: Forces| {
         forces.map(|mut all| {
             all[1] *= 1.0 + 3e-13;
             all
         })
     };
     assert_eq!(verdict(off, &good), Verdict::Wrong);
-    let nan = |forces: Result<Vec<f64>, String>| {
+    let nan = |forces: Forces| {
         forces.map(|mut all| {
             all[0] = f64::NAN;
             all
         })
     };
     assert_eq!(verdict(nan, &good), Verdict::Wrong);
-    let short = |forces: Result<Vec<f64>, String>| {
+    let short = |forces: Forces| {
         forces.map(|mut all| {
             all.pop();
             all

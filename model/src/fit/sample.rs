@@ -52,7 +52,7 @@ pub enum FitError {
     },
     /// Numbers whose powers are none.
     #[error(
-        "a {what} of {value:e} {unit} is out of scale, a fit needs numbers between 1e-50 and 1e50; check its unit"
+        "the record has a {what} of {value:e} {unit}, out of scale: a fit needs numbers between 1e-50 and 1e50; check its unit"
     )]
     Scale {
         /// Largest depth, largest force or force uncertainty.
