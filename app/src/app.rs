@@ -6,6 +6,7 @@ use crate::plots::force_time::TimeView;
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
 use crate::screens::models::ModelsScreen;
+use crate::screens::trade::TradeScreen;
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
@@ -16,7 +17,10 @@ use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
+use crate::workers::select::Selected;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use palpate_model::extremes::Row;
+use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, Runner, Snapshot, StartError};
 use std::sync::Arc;
@@ -54,6 +58,7 @@ pub struct WorkbenchApp {
     pub(crate) screen: Screen,
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
+    pub(crate) trade: TradeScreen,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
     start: Start,
@@ -78,6 +83,10 @@ impl WorkbenchApp {
         .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
         let mut ports = Ports::default();
         ports.refresh(ctx);
+        let curves_in = match &options.sessions {
+            Some(folder) => Ok(folder.clone()),
+            None => palpate_sessions::library_folder().map_err(|err| err.to_string()),
+        };
         let mut form = ProtocolForm::default();
         if let Some(folder) = options.sessions {
             form.folder = folder.display().to_string();
@@ -102,6 +111,7 @@ impl WorkbenchApp {
             screen: Screen::default(),
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
+            trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
             refusal: None,
             start: Start::None,
@@ -122,6 +132,24 @@ impl WorkbenchApp {
     #[must_use]
     pub fn refit(&self) -> Refit<'_> {
         self.refitter.of(self.snapshot.run.as_ref())
+    }
+
+    /// The last comparison of models.
+    #[must_use]
+    pub fn comparison(&self) -> Option<&Result<Selected, String>> {
+        self.models.answer()
+    }
+
+    /// The curves of error against time.
+    #[must_use]
+    pub fn trade_curves(&self) -> Option<&TradeCurves> {
+        self.trade.curves()
+    }
+
+    /// What the last test of the extremes found.
+    #[must_use]
+    pub fn extremes_rows(&self) -> Option<&[Row]> {
+        self.extremes.rows()
     }
 
     /// What the window is in the middle of.
@@ -154,6 +182,17 @@ impl WorkbenchApp {
         }
     }
 
+    /// Whether times may be measured now, or the reason why not.
+    pub(crate) fn measure_verdict(&self) -> Result<(), String> {
+        if run_in_progress(&self.snapshot).is_some() {
+            return Err("a run is in progress and would disturb the times".into());
+        }
+        if self.models.is_busy() || self.extremes.is_busy() {
+            return Err("other work is under way and would disturb the times".into());
+        }
+        Ok(())
+    }
+
     /// Does what was asked for.
     fn act(&mut self, ctx: &Context, commands: &mut Commands) {
         for command in commands.take() {
@@ -174,6 +213,12 @@ impl WorkbenchApp {
                 }
                 Command::CompareModels => self.models.start(ctx),
                 Command::CancelComparison => self.models.cancel(),
+                Command::MeasureTrade => {
+                    if self.measure_verdict().is_ok() {
+                        self.trade.start(ctx);
+                    }
+                }
+                Command::CancelTrade => self.trade.cancel(),
                 Command::TestExtremes => self.extremes.start(ctx),
                 Command::CancelExtremes => self.extremes.cancel(),
                 Command::Show(screen) => self.screen = screen,
@@ -263,6 +308,10 @@ impl eframe::App for WorkbenchApp {
         }
         self.models.poll();
         self.extremes.poll();
+        self.trade.poll();
+        if self.screen == Screen::Trade {
+            self.trade.shown(ctx);
+        }
         let rig = &self.snapshot.rig;
         self.form
             .refresh(&rig.description, &self.bench, rig.is_homed);

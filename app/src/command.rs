@@ -22,6 +22,10 @@ pub enum Command {
     CompareModels,
     /// End the comparison under way.
     CancelComparison,
+    /// Measure error against time.
+    MeasureTrade,
+    /// End the measurement under way.
+    CancelTrade,
     /// Test the extremes.
     TestExtremes,
     /// End the test under way.

@@ -12,6 +12,7 @@ pub mod report;
 pub mod screens;
 pub mod shell;
 pub mod theme;
+pub mod trade;
 pub mod widgets;
 pub mod window;
 pub mod workers;

@@ -157,8 +157,19 @@ impl WorkbenchApp {
             Screen::Run => self.run_ui(ui, commands),
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
-            Screen::Trade => {}
+            Screen::Trade => self.trade_ui(ui, commands),
         }
+    }
+
+    fn trade_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let verdict = self.measure_verdict();
+        side_ui(ui, Side::Left, |ui| {
+            self.trade.left_ui(ui, &verdict, commands);
+        });
+        side_ui(ui, Side::Right, |ui| self.trade.right_ui(ui));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.trade.middle_ui(ui));
     }
 
     fn extremes_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {

@@ -19,6 +19,7 @@ pub mod manifest;
 pub mod record;
 mod schema;
 pub mod text;
+pub mod trade;
 
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{

@@ -1,10 +1,12 @@
-//! A fit and a selection as people read them: the strings that window, command line and pictures
-//! share, and the pictures themselves.
+//! Results as people read them: the strings of a fit and of a selection that window, command line and
+//! pictures share, the pictures themselves, and the page of the extremes.
 
+pub mod extremes;
+pub mod family;
 pub mod picture;
 pub mod selection;
 mod selection_plot;
-mod svg;
+pub(crate) mod svg;
 pub mod text;
 pub mod thin;
 

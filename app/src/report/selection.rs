@@ -27,7 +27,8 @@ pub fn whole(selection: &Selection) -> String {
 }
 
 /// The records, one line each.
-fn records(selection: &Selection) -> String {
+#[must_use]
+pub fn records(selection: &Selection) -> String {
     let lines = selection.records.iter().map(|one| {
         format!(
             "{}: {:.4} mm deep at {:.3} mm/s, peak {:.3} N, {} samples",
@@ -108,7 +109,8 @@ pub fn ladder(selection: &Selection) -> Vec<Vec<String>> {
 }
 
 /// What was held out, and what the numbers count.
-fn tested(selection: &Selection) -> String {
+#[must_use]
+pub fn tested(selection: &Selection) -> String {
     let known = selection
         .candidates
         .iter()

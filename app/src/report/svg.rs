@@ -7,6 +7,10 @@ use std::fmt::Write;
 /// Font size of everything but titles, in px.
 pub const FONT: f64 = 13.0;
 
+/// Room for a number on an axis, in px.
+const HEIGHT_OF_MARK: f64 = 45.0;
+const WIDTH_OF_DECADE: f64 = 60.0;
+
 /// A picture under construction.
 pub struct Svg {
     width: f64,
@@ -105,6 +109,13 @@ impl Svg {
         ));
     }
 
+    pub fn dot(&mut self, [x, y]: [f64; 2], color: Color32, radius: f64) {
+        self.push(&format!(
+            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
+            hex(color)
+        ));
+    }
+
     fn push(&mut self, element: &str) {
         self.body.push_str(element);
         self.body.push('\n');
@@ -138,7 +149,27 @@ impl Panel {
         Self { place, x, y }
     }
 
-    fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+    /// A panel for decimal logarithms in which all of these points are seen.
+    pub fn around_logarithms(place: [f64; 4], points: &[[f64; 2]]) -> Self {
+        let range = |axis: usize| {
+            let values = points.iter().map(|point| point[axis]);
+            let low = values.clone().fold(f64::INFINITY, f64::min);
+            let high = values.fold(f64::NEG_INFINITY, f64::max);
+            if low > high {
+                return [0.0, 1.0];
+            }
+            // A little room for dots at the edge.
+            [low - 0.25, high + 0.25]
+        };
+        Self {
+            place,
+            x: range(0),
+            y: range(1),
+        }
+    }
+
+    /// Where a point lies in the picture, in px.
+    pub fn at(&self, [x, y]: [f64; 2]) -> [f64; 2] {
         let [left, top, right, bottom] = self.place;
         let share = |value: f64, [low, high]: [f64; 2]| (value - low) / (high - low);
         [
@@ -153,20 +184,45 @@ impl Panel {
     }
 
     /// Grid, numbers and names of the axes.
-    pub fn axes(&self, svg: &mut Svg, [x_name, y_name]: [&str; 2], look: Look) {
+    pub fn axes(&self, svg: &mut Svg, names: [&str; 2], look: Look) {
+        let [_, top, _, bottom] = self.place;
+        let marks = [
+            marks(self.x, 10.0),
+            marks(self.y, (bottom - top) / HEIGHT_OF_MARK),
+        ];
+        self.frame(svg, names, look, &marks);
+    }
+
+    /// The same where the numbers are decimal logarithms.
+    pub fn log_axes(&self, svg: &mut Svg, names: [&str; 2], look: Look) {
+        let [left, top, right, bottom] = self.place;
+        let marks = [
+            decades(self.x, (right - left) / WIDTH_OF_DECADE),
+            decades(self.y, (bottom - top) / HEIGHT_OF_MARK),
+        ];
+        self.frame(svg, names, look, &marks);
+    }
+
+    fn frame(
+        &self,
+        svg: &mut Svg,
+        [x_name, y_name]: [&str; 2],
+        look: Look,
+        [x_marks, y_marks]: &[Vec<(f64, String)>; 2],
+    ) {
         let [left, top, right, bottom] = self.place;
         let ink = Ink::plain(look.text);
-        for (mark, text) in marks(self.x, 10.0) {
-            let [x, _] = self.at([mark, 0.0]);
+        for (mark, text) in x_marks {
+            let [x, _] = self.at([*mark, 0.0]);
             svg.line(&[[x, top], [x, bottom]], look.grid, 0.6);
             let below = [x, bottom + FONT + 4.0];
-            svg.text(below, ink.anchored(Anchor::Middle), &text);
+            svg.text(below, ink.anchored(Anchor::Middle), text);
         }
-        for (mark, text) in marks(self.y, (bottom - top) / 45.0) {
-            let [_, y] = self.at([0.0, mark]);
+        for (mark, text) in y_marks {
+            let [_, y] = self.at([0.0, *mark]);
             svg.line(&[[left, y], [right, y]], look.grid, 0.6);
             let beside = [left - 6.0, y + 0.35 * FONT];
-            svg.text(beside, ink.anchored(Anchor::End), &text);
+            svg.text(beside, ink.anchored(Anchor::End), text);
         }
         svg.line(
             &[[left, top], [left, bottom], [right, bottom]],
@@ -201,6 +257,27 @@ fn marks([low, high]: [f64; 2], steps_max: f64) -> Vec<(f64, String)> {
         .map(|i| {
             let value = i as f64 * step;
             (value, format!("{value:.decimals$}"))
+        })
+        .collect()
+}
+
+/// Powers of ten within a range of decimal logarithms, every so many of them.
+fn decades([low, high]: [f64; 2], count_max: f64) -> Vec<(f64, String)> {
+    if !(low.is_finite() && high.is_finite() && low < high) {
+        return Vec::new();
+    }
+    let (first, last) = (low.ceil() as i64, high.floor() as i64);
+    let every = ((last - first + 1) as f64 / count_max.max(1.0))
+        .ceil()
+        .max(1.0) as i64;
+    (first..=last)
+        .filter(|power| power.rem_euclid(every) == 0)
+        .map(|power| {
+            let text = match power {
+                -2..=3 => format!("{}", 10f64.powi(power as i32)),
+                _ => format!("1e{power}"),
+            };
+            (power as f64, text)
         })
         .collect()
 }
@@ -252,6 +329,21 @@ mod tests {
             ["-0.010", "-0.005", "0.000", "0.005", "0.010"]
         );
         assert!(texts([1.0, 1.0]).is_empty());
+    }
+
+    #[test]
+    fn decades_are_named() {
+        let texts = |range, count| -> Vec<String> {
+            decades(range, count)
+                .into_iter()
+                .map(|(_, text)| text)
+                .collect()
+        };
+        assert_eq!(texts([-2.2, 1.1], 9.0), ["0.01", "0.1", "1", "10"]);
+        assert_eq!(texts([-8.5, 4.5], 5.0), ["1e-6", "1e-3", "1", "1000"]);
+        assert!(texts([f64::INFINITY, 0.0], 5.0).is_empty());
+        let panel = Panel::around_logarithms([0.0, 0.0, 100.0, 100.0], &[]);
+        assert_eq!((panel.x, panel.y), ([0.0, 1.0], [0.0, 1.0]));
     }
 
     #[test]

@@ -1,24 +1,16 @@
 //! What is right and what is refused at the ends of every range.
 
 use crate::command::{Command, Commands};
+use crate::report::extremes::{GroupSummary, VERDICTS, summary};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
-use crate::workers::extremes::{GroupFacts, VERDICTS, by_group, survey};
+use crate::workers::extremes::survey;
 use crate::workers::task::Task;
 use eframe::egui::{ComboBox, Context, Label, RichText, Ui};
 use palpate_model::extremes::{Extent, Row, Verdict};
-
-const COLUMNS: [Column; 6] = [
-    Column::words("group", 104.0),
-    Column::words("subject", 128.0),
-    Column::words("case", 268.0),
-    Column::words("verdict", 66.0),
-    Column::numbers("error", 62.0),
-    Column::numbers("tolerance", 70.0),
-];
 
 /// How much is run, in words.
 const EXTENTS: [(Extent, &str); 2] = [
@@ -29,7 +21,7 @@ const EXTENTS: [(Extent, &str); 2] = [
 /// What was found.
 pub struct Found {
     rows: Vec<Row>,
-    groups: Vec<GroupFacts>,
+    groups: Vec<GroupSummary>,
 }
 
 /// The screen's state.
@@ -54,6 +46,12 @@ impl Default for ExtremesScreen {
 }
 
 impl ExtremesScreen {
+    /// Whether work is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
+    }
+
     /// Fetches an answer that has come.
     pub fn poll(&mut self) {
         self.task.poll();
@@ -74,7 +72,7 @@ impl ExtremesScreen {
             let rows = survey(extent, None, &tell).map_err(|err| err.to_string())?;
             let rows = rows.ok_or("ended before it was done")?;
             Ok(Found {
-                groups: by_group(&rows),
+                groups: summary(&rows),
                 rows,
             })
         });
@@ -154,7 +152,15 @@ impl ExtremesScreen {
             .collect();
         let title = format!("Cases, {} of {}", rows.len(), found.rows.len());
         ui.label(RichText::new(title).heading().strong());
-        table_ui(ui, "extremes_table", &COLUMNS, &rows);
+        let columns = [
+            Column::words("group", 150.0),
+            Column::words("subject", 128.0),
+            Column::words("case", 230.0),
+            Column::words("verdict", 60.0),
+            Column::numbers("error", 62.0),
+            Column::numbers("tolerance", 66.0),
+        ];
+        table_ui(ui, "extremes_table", &columns, &rows);
     }
 
     /// Each group in numbers.
@@ -185,14 +191,8 @@ impl ExtremesScreen {
                 .map(|(count, verdict)| format!("{count} {}", verdict.word()))
                 .collect();
             ui.label(counts.join(", "));
-            if let Some(worst) = &facts.worst {
-                let text = format!(
-                    "nearest to its tolerance: {}, {}, {:.1e} of {:.0e}",
-                    worst.subject,
-                    worst.case,
-                    worst.relative_error.unwrap_or(0.0),
-                    worst.tolerance
-                );
+            if let Some(tightest) = &facts.tightest {
+                let text = format!("closest to its tolerance: {tightest}");
                 ui.add(Label::new(RichText::new(text).color(tokens.text_quiet).small()).wrap());
             }
         }

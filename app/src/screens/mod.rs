@@ -10,3 +10,4 @@ pub mod preview_view;
 pub mod protocol_panel;
 pub mod results_panel;
 pub mod rig_panel;
+pub mod trade;

@@ -53,6 +53,7 @@ fn fields_ui(
     quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
     quantity_ui(ui, "hold", "s", &mut form.hold);
     quantity_ui(ui, "end at", "% of tau known", &mut form.until);
+    quantity_ui(ui, "unload", "mm/s, recorded", &mut form.unload);
     folder_ui(ui, form, facts, commands);
 }
 

@@ -10,10 +10,10 @@ const ROW: f32 = 22.0;
 const GAP: f32 = 10.0;
 
 /// One column.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Column {
     /// Heading with its unit.
-    pub head: &'static str,
+    pub head: String,
     /// Width in points.
     pub width: f32,
     /// Whether its texts are numbers, which stand on the right.
@@ -23,9 +23,9 @@ pub struct Column {
 impl Column {
     /// A column of words.
     #[must_use]
-    pub const fn words(head: &'static str, width: f32) -> Self {
+    pub fn words(head: &str, width: f32) -> Self {
         Self {
-            head,
+            head: head.to_owned(),
             width,
             is_number: false,
         }
@@ -33,9 +33,9 @@ impl Column {
 
     /// A column of numbers.
     #[must_use]
-    pub const fn numbers(head: &'static str, width: f32) -> Self {
+    pub fn numbers(head: &str, width: f32) -> Self {
         Self {
-            head,
+            head: head.to_owned(),
             width,
             is_number: true,
         }
@@ -78,7 +78,7 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
             ui.set_min_width(width);
             ui.spacing_mut().item_spacing = Vec2::ZERO;
             row_ui(ui, columns, width, |ui, _, column| {
-                let text = RichText::new(column.head).color(tokens.text_quiet).small();
+                let text = RichText::new(&column.head).color(tokens.text_quiet).small();
                 ui.add(Label::new(text).truncate());
             });
             ui.separator();

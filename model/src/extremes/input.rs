@@ -63,7 +63,7 @@ fn rows(family: &dyn Family) -> Vec<Row> {
         for index in 0..usual().outer.len() {
             let mut model = usual();
             model.outer[index] = value;
-            let name = format!("{name} {}", family.outer()[index].name);
+            let name = format!("{name} relaxation time or other outer parameter");
             rows.push(plain(&name).put_to(&FamilyBody(model)));
         }
     }
@@ -71,7 +71,7 @@ fn rows(family: &dyn Family) -> Vec<Row> {
         for value in [0.0, -1.0] {
             let mut model = usual();
             model.outer[index] = value;
-            let name = format!("{} of {value}", family.outer()[index].name);
+            let name = format!("relaxation time or other outer parameter of {value}");
             rows.push(plain(&name).put_to(&FamilyBody(model)));
         }
     }

@@ -10,8 +10,7 @@ pub const TOLERANCE: f64 = 1e-13;
 /// Forces in N below this count as none: the exact step drops what falls below 1e-200 N, and this is
 /// that over the tolerance with room for a hundred terms.
 const FORCE_MIN: f64 = 1e-180;
-/// Forces in N beyond this may be refused; the engine's own limit is one term's share of the largest
-/// number.
+/// Forces in N beyond this may be refused, numbers though they are: a sum of terms may not be one.
 const FORCE_MAX: f64 = 1e299;
 
 /// What became of one case.
@@ -194,8 +193,11 @@ impl PathCase {
         let expected = match truth {
             // What has no truth has no answer.
             Err(_) => Expected::Refusal,
-            Ok(truth) if truth.peak > FORCE_MAX => Expected::Refusal,
-            Ok(_) if subject.may_refuse(self) || self.is_too_fast() => Expected::Either,
+            Ok(truth)
+                if truth.peak > FORCE_MAX || subject.may_refuse(self) || self.is_too_fast() =>
+            {
+                Expected::Either
+            }
             Ok(_) => Expected::Number,
         };
         let answer = match (forces, truth) {

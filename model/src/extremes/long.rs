@@ -3,20 +3,32 @@
 use super::judge::{Answer, Expected, Row, judged};
 use super::members::member;
 use super::{Extent, Part};
-use crate::families::{Model, by_key};
+use crate::families::{Relaxation, StepError, by_key};
+use crate::integrators::{Exact, Integrator, Scheme, SeriesBody, Start};
 use crate::reference::Reference;
 use crate::units::{Depth, Newtons, Seconds};
+use crate::viscoelastic::ModifiedKelvin;
 
 /// Name of the group.
 pub(super) const GROUP: &str = "long records";
 /// Depth moves by a power of two, so that no sample is rounded and the path is as straight as it says.
-const MOVE: f64 = 1.0 / 65536.0;
+const MOVE: f64 = 1.0 / 65_536.0;
 /// Samples from corner to corner: 8 mm.
-const LEG: u64 = 8 * 65536;
+const LEG: u64 = 8 * 65_536;
 /// Largest drift over any number of samples, relative to the peak force.
 const TOLERANCE: f64 = 1e-13;
-/// Terms up to which a family takes the longest records outside a soak: a nanosecond or ten each.
-const CHEAP: usize = 2;
+/// Terms from which on a family takes a shorter record outside a soak: each costs nanoseconds a sample.
+const MANY: usize = 12;
+
+/// Name, samples and step in s.
+type Case = (&'static str, u64, f64);
+const SHORTEST: Case = ("1e5 samples of 1 ms", 100_000, 1e-3);
+const SHORT: Case = ("1e6 samples of 1 ms", 1_000_000, 1e-3);
+const LONG: Case = ("1e7 samples of 1 ms", 10_000_000, 1e-3);
+const LONGEST: [Case; 2] = [
+    ("1e8 samples of 1 us", 100_000_000, 1e-6),
+    ("24 h at 1 kHz, 86.4e6 samples", 86_400_000, 1e-3),
+];
 
 pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
     let key = key.to_owned();
@@ -25,50 +37,76 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
             return Vec::new();
         };
         let model = member(&*family, 2.0, 20.0, 2.0);
-        let is_cheap = model
-            .terms()
-            .is_ok_and(|terms| terms.len() <= CHEAP && family.outer().len() <= 1);
-        let cases: &[(&str, u64, f64)] = match extent {
-            Extent::Quick => &[("1e6 samples of 1 ms", 1_000_000, 1e-3)],
-            Extent::Whole if !is_cheap => &[("1e7 samples of 1 ms", 10_000_000, 1e-3)],
-            Extent::Whole | Extent::Soak => &[
-                ("1e8 samples of 1 us", 100_000_000, 1e-6),
-                ("24 h at 1 kHz, 86.4e6 samples", 86_400_000, 1e-3),
-            ],
+        let has_many = model.terms().is_ok_and(|terms| terms.len() > MANY);
+        let cases: &[Case] = match extent {
+            Extent::Quick if has_many => &[SHORTEST],
+            Extent::Quick => &[SHORT],
+            Extent::Whole if has_many => &[SHORT],
+            Extent::Whole => &[LONG],
+            Extent::Soak => &LONGEST,
         };
-        let count = cases.len() as f64;
-        let rows = cases
-            .iter()
-            .enumerate()
-            .map(|(index, &(case, samples, dt))| {
-                let answer = drift(&model, samples, dt, |share| {
-                    progress((index as f64 + share) / count);
-                });
-                judged(
-                    GROUP,
-                    case.to_owned(),
-                    &key,
-                    Expected::Number,
-                    TOLERANCE,
-                    answer,
-                )
-            });
-        rows.collect::<Vec<Row>>()
+        rows(cases, &key, progress, |samples, dt, progress| {
+            let words = |err: &dyn std::fmt::Display| err.to_string();
+            let mut body = model.at_rest_from(Depth(0.0)).map_err(|err| words(&err))?;
+            let terms = model.terms().map_err(|err| words(&err))?;
+            let step = |depth| body.step(Depth(depth), Seconds(dt));
+            drift(&terms, samples, dt, step, progress)
+        })
     })]
 }
 
+/// The same for the exact step at a constant rate, which is made for records as long as these.
+pub(super) fn scheme_parts(extent: Extent) -> Vec<Part> {
+    let subject = format!("{}, f64", Scheme::Exact.name());
+    vec![Part::new(GROUP, subject.clone(), move |progress| {
+        let body = SeriesBody::<3>::from(ModifiedKelvin::THESIS);
+        let cases: &[Case] = match extent {
+            Extent::Quick => &[SHORT],
+            Extent::Whole | Extent::Soak => &LONGEST,
+        };
+        rows(cases, &subject, progress, |samples, dt, progress| {
+            let start = Start {
+                depth: 0.0,
+                force: None,
+            };
+            let mut exact = Exact::<f64, 3>::at_any_step(&body, dt, start);
+            let step = |depth| exact.step(depth).map(Newtons);
+            drift(&[body.term()], samples, dt, step, progress)
+        })
+    })]
+}
+
+fn rows(
+    cases: &[Case],
+    subject: &str,
+    progress: &mut dyn FnMut(f64),
+    answer: impl Fn(u64, f64, &mut dyn FnMut(f64)) -> Result<Answer, String>,
+) -> Vec<Row> {
+    let count = cases.len() as f64;
+    let mut rows = Vec::new();
+    for (index, &(case, samples, dt)) in cases.iter().enumerate() {
+        let mut within = |share| progress((index as f64 + share) / count);
+        rows.push(judged(
+            GROUP,
+            case.to_owned(),
+            subject,
+            Expected::Number,
+            TOLERANCE,
+            answer(samples, dt, &mut within).unwrap_or_else(Answer::Refused),
+        ));
+    }
+    rows
+}
+
 /// Largest error at the corners of a path that goes in, rests, comes out and rests, again and again.
-fn drift(model: &Model, samples: u64, dt: f64, mut progress: impl FnMut(f64)) -> Answer {
-    let words = |err: &dyn std::fmt::Display| Answer::Refused(err.to_string());
-    let (mut body, terms) = match (model.at_rest_from(Depth(0.0)), model.terms()) {
-        (Ok(body), Ok(terms)) => (body, terms),
-        (Err(err), _) => return words(&err),
-        (_, Err(err)) => return words(&err),
-    };
-    let mut reference = match Reference::new(&terms, Depth(0.0)) {
-        Ok(reference) => reference,
-        Err(err) => return words(&err),
-    };
+fn drift(
+    terms: &[Relaxation],
+    samples: u64,
+    dt: f64,
+    mut step: impl FnMut(f64) -> Result<Newtons, StepError>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Answer, String> {
+    let mut reference = Reference::new(terms, Depth(0.0)).map_err(|err| err.to_string())?;
     let (mut depth, mut done, mut worst, mut peak) = (0.0, 0, 0.0f64, 0.0f64);
     for direction in [1.0, 0.0, -1.0, 0.0].into_iter().cycle() {
         let leg = LEG.min(samples - done);
@@ -78,16 +116,12 @@ fn drift(model: &Model, samples: u64, dt: f64, mut progress: impl FnMut(f64)) ->
         let mut force = Newtons(0.0);
         for _ in 0..leg {
             depth += direction * MOVE;
-            force = match body.step(Depth(depth), Seconds(dt)) {
-                Ok(force) => force,
-                Err(err) => return words(&err),
-            };
+            force = step(depth).map_err(|err| err.to_string())?;
         }
         // The duration of a leg in one product is off by half a last digit, which changes no force.
-        let exact = match reference.step(Depth(depth), Seconds(leg as f64 * dt)) {
-            Ok(exact) => exact,
-            Err(err) => return words(&err),
-        };
+        let exact = reference
+            .step(Depth(depth), Seconds(leg as f64 * dt))
+            .map_err(|err| err.to_string())?;
         peak = peak.max(exact.0.abs());
         let miss = reference.error_of(force).abs();
         worst = if force.is_finite() {
@@ -98,8 +132,8 @@ fn drift(model: &Model, samples: u64, dt: f64, mut progress: impl FnMut(f64)) ->
         done += leg;
         progress(done as f64 / samples as f64);
     }
-    Answer::Number {
+    Ok(Answer::Number {
         error: worst / peak,
         warnings: Vec::new(),
-    }
+    })
 }

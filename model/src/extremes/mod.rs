@@ -91,6 +91,7 @@ pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownF
     // What is of no family is left out where one was asked for.
     if family.is_none() {
         parts.extend(integrators::parts(extent));
+        parts.extend(long::scheme_parts(extent));
         parts.extend(input::thesis_parts());
         parts.extend(records::thesis_parts(extent));
     }

@@ -4,7 +4,7 @@ use super::fits::{ThesisFit, family_fit};
 use super::judge::{Answer, Expected, Row, judge};
 use super::members::member;
 use super::{Extent, Part};
-use crate::families::{Family, Model, by_key};
+use crate::families::{Family, Model, Outer, OuterRange, by_key};
 use crate::fit::FitSample;
 use crate::units::{Depth, Newtons, Seconds};
 use crate::viscoelastic::ModifiedKelvin;
@@ -26,6 +26,8 @@ struct Plan {
     force: f64,
     offset: f64,
     tolerance: f64,
+    /// What is done to every sample, after which no body is the true one.
+    spoil: Option<fn(&mut FitSample)>,
 }
 
 impl Plan {
@@ -39,6 +41,7 @@ impl Plan {
             force: 1.0,
             offset: 0.0,
             tolerance: TOLERANCE,
+            spoil: None,
         }
     }
 
@@ -50,7 +53,8 @@ impl Plan {
             .map(|&(t, depth)| (Seconds(self.time * t), Depth(self.depth * depth)))
             .collect();
         let forces = force(&path).unwrap_or_default();
-        path.iter()
+        let mut samples: Vec<FitSample> = path
+            .iter()
             .zip(forces)
             .map(|(&(t, depth), force)| FitSample {
                 t,
@@ -58,7 +62,11 @@ impl Plan {
                 force: Newtons(force + self.offset),
                 sigma: Newtons(0.02 * self.force),
             })
-            .collect()
+            .collect();
+        if let Some(spoil) = self.spoil {
+            samples.iter_mut().for_each(spoil);
+        }
+        samples
     }
 }
 
@@ -125,12 +133,26 @@ fn plans(extent: Extent) -> Vec<Plan> {
             ..Plan::new("an offset of 1e6 times the signal", Number, full())
         },
         Plan {
-            force: 1e-308,
-            ..Plan::new("subnormal forces", Either, full())
+            spoil: Some(|one| one.depth.0 *= 1e-310),
+            ..Plan::new("subnormal depths", Refusal, full())
         },
         Plan {
-            depth: 1e-309,
-            ..Plan::new("subnormal depths", Either, full())
+            spoil: Some(|one| one.force.0 *= 1e-310),
+            ..Plan::new("subnormal forces", Refusal, full())
+        },
+        Plan {
+            spoil: Some(|one| one.sigma.0 *= 1e-310),
+            ..Plan::new("subnormal uncertainties", Refusal, full())
+        },
+        Plan {
+            spoil: Some(|one| one.t.0 *= 1e-310),
+            ..Plan::new("subnormal times", Refusal, full())
+        },
+        Plan {
+            // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
+            spoil: Some(|one| one.t.0 += 1.8e9),
+            tolerance: 1e-3,
+            ..Plan::new("times since 1970", Number, full())
         },
     ];
     if extent == Extent::Quick {
@@ -179,17 +201,41 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
         let Ok(family) = by_key(&key) else {
             return Vec::new();
         };
-        rows(extent, &subject, progress, |plan| {
+        let mut plans = plans(extent);
+        if times(&*family) > TIMES_SHOWN {
+            for plan in &mut plans {
+                if plan.expected == Expected::Number {
+                    plan.expected = Expected::Either;
+                }
+            }
+        }
+        rows(plans, &subject, progress, |plan| {
             family_answer(&*family, plan)
         })
     })]
 }
 
 fn family_answer(family: &dyn Family, plan: &Plan) -> Answer {
-    let body = member(family, plan.time, 20.0 * plan.depth, 2.0 * plan.force);
+    // Relaxation times around a second on the record's scale.
+    let first = if times(family) > 1 { 0.2 } else { 1.0 };
+    let body = member(
+        family,
+        first * plan.time,
+        20.0 * plan.depth,
+        2.0 * plan.force,
+    );
     let samples = plan.samples(|path| body.along(path.iter().copied()).ok());
     family_fit(family, &samples, Some(&body))
 }
+
+fn times(family: &dyn Family) -> usize {
+    let outer = family.outer();
+    let is_time = |one: &&Outer| one.range == OuterRange::Time;
+    outer.iter().filter(is_time).count()
+}
+
+/// More relaxation times than these, a decade apart, are beyond what a record of 25 s can show.
+const TIMES_SHOWN: usize = 2;
 
 /// The same records put to the fit of the thesis body.
 pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
@@ -197,7 +243,7 @@ pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
         GROUP,
         ThesisFit::NAME.to_owned(),
         move |progress| {
-            rows(extent, ThesisFit::NAME, progress, |plan| {
+            rows(plans(extent), ThesisFit::NAME, progress, |plan| {
                 let known = ModifiedKelvin::THESIS;
                 let scale = |power: i32| plan.force / plan.depth.powi(power);
                 let body = ModifiedKelvin {
@@ -214,12 +260,11 @@ pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
 }
 
 fn rows(
-    extent: Extent,
+    plans: Vec<Plan>,
     subject: &str,
     progress: &mut dyn FnMut(f64),
     answer: impl Fn(&Plan) -> Answer,
 ) -> Vec<Row> {
-    let plans = plans(extent);
     let count = plans.len() as f64;
     let rows = plans.iter().enumerate().map(|(index, plan)| {
         let answer = answer(plan);

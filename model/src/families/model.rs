@@ -2,7 +2,7 @@
 
 use super::family::Family;
 use super::relaxation::Relaxation;
-use super::response::{Response, StepError};
+use super::response::{Response, StepError, plain};
 use super::{UnknownFamily, by_key};
 use crate::units::{Depth, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub enum ModelError {
         names: String,
     },
     /// A number out of its range.
-    #[error("{family}: {name} cannot be {value}; it must be {must}")]
+    #[error("{family}: {name} cannot be {}; it must be {must}", plain(.value))]
     Value {
         /// The family.
         family: String,

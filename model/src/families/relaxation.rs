@@ -13,6 +13,8 @@ use crate::viscoelastic::{Compensated, psi, psi_first};
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
 
+/// Highest power of depth in a drive's softening.
+pub const SOFTENING_MAX: usize = 3;
 /// A force in N that is refused: below it no sum of terms exceeds the largest number, 1.8e308.
 const FORCE_MAX: f64 = 1e300;
 /// Steps below this share of the relaxation time are jumps: what relaxes within one is beyond all
@@ -26,9 +28,9 @@ pub struct Drive {
     pub powers: [f64; POWER_MAX],
     /// Amplitude `A` of `A (e^(B x) - 1)`, in N, and `B` in 1/mm.
     pub exponential: Option<(f64, f64)>,
-    /// Coefficients of `x^j (x_max - x)`, `j = 1, 2, 3`, with `x_max` the greatest depth so far: what
-    /// is lost by having been deeper, in N/mm^(j+1).
-    pub softening: [f64; 3],
+    /// Coefficients of `x^j (1 - x / x_max)`, `j = 1, 2, 3`, with `x_max` the greatest depth so far:
+    /// what having been deeper adds, in N/mm^j (times s for a rate). Zero on first loading.
+    pub softening: [f64; SOFTENING_MAX],
 }
 
 impl Drive {
@@ -52,10 +54,10 @@ impl Drive {
         }
     }
 
-    /// `coefficient * x^power (x_max - x)`, `power` 1 to 3.
+    /// `coefficient * x^power (1 - x / x_max)`, `power` 1 to 3.
     #[must_use]
     pub fn softening(power: usize, coefficient: f64) -> Self {
-        let mut softening = [0.0; 3];
+        let mut softening = [0.0; SOFTENING_MAX];
         softening[power - 1] = coefficient;
         Self {
             softening,
@@ -93,12 +95,22 @@ impl Drive {
         let mut all = [0.0; POWER_MAX + 1];
         all[1..].copy_from_slice(&self.powers);
         if let Some(x_max) = x_max {
-            for (j, lost) in self.softening.iter().enumerate() {
-                all[j + 1] += lost * x_max;
-                all[j + 2] -= lost;
+            for (j, (first, second)) in self.softened(x_max) {
+                all[j] += first;
+                all[j + 1] += second;
             }
         }
         all
+    }
+
+    /// What softening adds after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
+    /// divide by has softened nothing.
+    #[inline]
+    fn softened(&self, x_max: f64) -> impl Iterator<Item = (usize, (f64, f64))> {
+        let pairs = self.softening.into_iter().map(move |s| (s, -s / x_max));
+        (1..)
+            .zip(pairs)
+            .filter(|(_, (_, per_mm))| per_mm.is_finite())
     }
 
     /// Value at depth `x` after `x_max`.
@@ -168,7 +180,7 @@ impl Drive {
     /// Highest power of depth, 0 for none.
     fn degree(&self) -> usize {
         let powers = self.powers.iter().rposition(|value| *value != 0.0);
-        // x^j (x_max - x) has one power more.
+        // x^j (1 - x / x_max) has one power more.
         let softening = self.softening.iter().rposition(|value| *value != 0.0);
         powers
             .map_or(0, |k| k + 1)
@@ -178,7 +190,7 @@ impl Drive {
     /// Whether it depends on the greatest depth so far.
     #[must_use]
     pub fn softens(&self) -> bool {
-        self.softening.iter().any(|lost| *lost != 0.0)
+        self.softening.iter().any(|one| *one != 0.0)
     }
 }
 
@@ -273,6 +285,8 @@ pub(super) struct Piece {
 #[derive(Clone, Debug)]
 pub(super) struct Relaxing {
     pub term: Relaxation,
+    /// Whether its elastic part or its rate depends on the greatest depth so far.
+    pub softens: bool,
     value: Compensated,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
@@ -289,6 +303,7 @@ impl Relaxing {
     pub fn relaxed(term: Relaxation, depth: f64) -> Self {
         Self {
             term,
+            softens: term.elastic.softens() || term.rate.softens(),
             value: Compensated::new(term.elastic.at(depth, depth)),
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
@@ -359,14 +374,14 @@ impl Relaxing {
             c[k] += elastic.powers[k - 1];
             c[k - 1] += k as f64 * rate.powers[k - 1] * speed;
         }
-        if !piece.primary {
-            for (j, lost) in elastic.softening.iter().enumerate() {
-                c[j + 1] += lost * piece.x_max;
-                c[j + 2] -= lost;
+        if self.softens && !piece.primary {
+            for (j, (first, second)) in elastic.softened(piece.x_max) {
+                c[j] += first;
+                c[j + 1] += second;
             }
-            for (j, lost) in rate.softening.iter().enumerate() {
-                c[j] += (j + 1) as f64 * lost * piece.x_max * speed;
-                c[j + 1] -= (j + 2) as f64 * lost * speed;
+            for (j, (first, second)) in rate.softened(piece.x_max) {
+                c[j - 1] += j as f64 * first * speed;
+                c[j] += (j + 1) as f64 * second * speed;
             }
         }
         c

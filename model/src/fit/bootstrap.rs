@@ -12,6 +12,7 @@ use super::report::scaled_powers;
 use super::sample::{FitError, FitSample};
 use super::solve::Fitted;
 use super::uncertainty::Uncertainty;
+use crate::random::SplitMix;
 use crate::units::Newtons;
 use serde::{Deserialize, Serialize};
 
@@ -66,7 +67,7 @@ impl Fitted<'_> {
         let free: Vec<usize> = (0..=CONTACT)
             .filter(|&k| self.system.fixed(k).is_none())
             .collect();
-        let mut random = SplitMix(choice.seed);
+        let mut random = SplitMix::seeded(choice.seed);
         let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(choice.repeats); free.len()];
         for done in 0..choice.repeats {
             let shuffled: Vec<Vec<FitSample>> = sources
@@ -200,22 +201,4 @@ fn quantile(sorted: &[f64], share: f64) -> f64 {
     let below = place.floor() as usize;
     let above = (below + 1).min(sorted.len() - 1);
     sorted[below] + (place - below as f64) * (sorted[above] - sorted[below])
-}
-
-/// SplitMix64 (Steele, Lea & Flood, OOPSLA 2014).
-struct SplitMix(u64);
-
-impl SplitMix {
-    fn next(&mut self) -> u64 {
-        self.0 = self.0.wrapping_add(0x9E37_79B9_7F4A_7C15);
-        let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
-        let z = (z ^ (z >> 27)).wrapping_mul(0x94D0_49BB_1331_11EB);
-        z ^ (z >> 31)
-    }
-
-    /// Uniform below `count`, which is far below 2^53.
-    fn below(&mut self, count: usize) -> usize {
-        let share = (self.next() >> 11) as f64 / (1u64 << 53) as f64;
-        ((share * count as f64) as usize).min(count - 1)
-    }
 }

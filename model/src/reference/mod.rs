@@ -54,6 +54,8 @@ struct Term {
     tau: Big,
     elastic: Function,
     rate: Function,
+    /// Highest power of depth along a straight piece.
+    degree: usize,
     value: Big,
     /// Duration of the last step and its weights.
     weights: Option<(Big, Weights)>,
@@ -203,7 +205,10 @@ impl Term {
         if elastic.is_beyond(depth) || rate.is_beyond(depth) {
             return Err(ReferenceError::Overflow);
         }
+        // A rate counts by its slope.
+        let degree = elastic.degree().max(rate.degree().saturating_sub(1));
         Ok(Self {
+            degree,
             tau: digits.exact(*tau),
             value: elastic.at(&start),
             elastic,
@@ -232,16 +237,20 @@ impl Term {
     fn advance(&mut self, digits: Digits, x0: &Big, d: &Big, dt: &Big) {
         let weights = match self.weights.take() {
             Some((last, weights)) if last == *dt => weights,
-            _ => Weights::new(digits, dt, &self.tau, POWER_MAX + 1),
+            _ => Weights::new(digits, dt, &self.tau, self.degree + 1),
         };
         let speed = d / dt;
         let mut sum = &self.value * &weights.kept;
         // The drive by power of depth, then about x0 by binomials, then by powers of d.
         let zero = digits.zero();
-        let mut c = vec![zero; POWER_MAX + 1];
-        for k in 1..=POWER_MAX {
-            c[k] = &c[k] + &self.elastic.powers[k - 1];
-            c[k - 1] = &c[k - 1] + digits.whole(k) * &self.rate.powers[k - 1] * &speed;
+        let mut c = vec![zero; self.degree + 1];
+        for (k, c) in c.iter_mut().enumerate() {
+            if k > 0 {
+                *c += &self.elastic.powers[k - 1];
+            }
+            if k < POWER_MAX {
+                *c += digits.whole(k + 1) * &self.rate.powers[k] * &speed;
+            }
         }
         let mut d_power = digits.whole(1);
         for (j, psi) in weights.psi.iter().enumerate() {
@@ -294,6 +303,11 @@ impl Function {
             exponential: exponential
                 .map(|(amplitude, b)| (digits.exact(amplitude), digits.exact(b))),
         }
+    }
+
+    fn degree(&self) -> usize {
+        let last = self.powers.iter().rposition(|c| !is_zero(c));
+        last.map_or(0, |k| k + 1)
     }
 
     /// Whether its exponential is beyond any double by so much that even many digits end.

@@ -125,8 +125,9 @@ impl Throttle {
     }
 }
 
-/// The wall clock, for the manifest.
-pub(super) fn wall_now() -> std::time::SystemTime {
+/// The wall clock, to date what is recorded.
+#[must_use]
+pub fn wall_now() -> std::time::SystemTime {
     std::time::SystemTime::now()
 }
 

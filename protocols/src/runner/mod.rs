@@ -11,7 +11,7 @@ mod snapshot;
 mod start;
 
 pub(crate) use active_run::{LiveFeed, to_json};
-pub use clock::{Stopwatch, TimeScale};
+pub use clock::{Stopwatch, TimeScale, wall_now};
 pub use main_loop::{Request, Runner};
 pub use snapshot::{LogLine, RigView, RunView, Snapshot};
 pub use start::{AfterStop, Labels, RunRequest, StartError};

@@ -1,27 +1,26 @@
 //! A comparison of models, drawn.
 
 use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
+use crate::report::selection;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
 use crate::workers::select::Selected;
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_model::select::{Candidate, Selection, Step};
+use palpate_model::select::{Candidate, Selection};
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.46;
 
-const COLUMNS: [Column; 9] = [
-    Column::words("family", 96.0),
-    Column::numbers("numbers", 58.0),
-    Column::numbers("rms (mN)", 76.0),
-    Column::numbers("worst (mN)", 78.0),
-    Column::numbers("predicted (mN)", 96.0),
-    Column::numbers("BIC above", 76.0),
-    Column::numbers("AICc above", 78.0),
-    Column::numbers("operations", 76.0),
-    Column::words("within", 64.0),
+/// Widths of the columns of [`selection::table`] by their heads, in points.
+const WIDTHS: [(&str, f32); 4] = [
+    ("family", 100.0),
+    ("predicted mN", 110.0),
+    ("free", 40.0),
+    ("within", 50.0),
 ];
+/// Width of the others.
+const WIDTH: f32 = 72.0;
 
 /// The error that decides: of prediction where something was held out.
 fn error(selection: &Selection, one: &Candidate) -> Option<f64> {
@@ -73,17 +72,25 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
     });
     ui.add_space(4.0);
     ui.label(RichText::new("Families").heading().strong());
+    let mut table = selection::table(selection).into_iter();
+    let heads = table.next().unwrap_or_default();
+    let columns: Vec<Column> = heads.into_iter().map(column).collect();
     let mut rows: Vec<Row> = selection
         .candidates
         .iter()
-        .map(|one| row(selection, one))
+        .zip(table)
+        .map(|(one, cells)| Row {
+            cells,
+            look: look(selection, one),
+            hint: Some(hint(one)),
+        })
         .collect();
     rows.extend(selection.refused.iter().map(|one| Row {
         cells: vec![one.family.clone(), "refused".into()],
         look: RowLook::Quiet,
         hint: Some(one.reason.clone()),
     }));
-    table_ui(ui, "families_table", &COLUMNS, &rows);
+    table_ui(ui, "families_table", &columns, &rows);
 }
 
 /// Points that no other undercuts in both, by cost.
@@ -102,39 +109,29 @@ fn front(marks: &[Mark]) -> Vec<usize> {
     order
 }
 
-fn row(selection: &Selection, one: &Candidate) -> Row {
-    let mn = |value: f64| format!("{:.2}", 1e3 * value);
-    let dash = || "-".to_owned();
-    let hint: Vec<String> = std::iter::once(one.name.clone())
-        .chain(one.warnings.iter().cloned())
-        .chain(one.prediction_refused.clone())
-        .collect();
-    Row {
-        cells: vec![
-            one.family.clone(),
-            one.free.to_string(),
-            mn(one.rms_n),
-            mn(one.worst_n),
-            one.prediction
-                .as_ref()
-                .map_or_else(dash, |known| mn(known.rms_n)),
-            format!("{:.1}", one.bic_above),
-            one.aicc_above
-                .map_or_else(dash, |above| format!("{above:.1}")),
-            one.cost.operations.to_string(),
-            match one.is_within {
-                Some(true) => "yes".into(),
-                Some(false) => "no".into(),
-                None => dash(),
-            },
-        ],
-        look: match (&selection.verdict.family, one.is_within) {
-            (Some(chosen), _) if *chosen == one.family => RowLook::Marked,
-            (_, Some(false)) => RowLook::Quiet,
-            _ => RowLook::Plain,
-        },
-        hint: Some(hint.join("\n")),
+fn column(head: String) -> Column {
+    let width = WIDTHS.iter().find(|(known, _)| *known == head);
+    Column {
+        is_number: head != "family" && head != "within",
+        width: width.map_or(WIDTH, |(_, width)| *width),
+        head,
     }
+}
+
+fn look(selection: &Selection, one: &Candidate) -> RowLook {
+    match (&selection.verdict.family, one.is_within) {
+        (Some(chosen), _) if *chosen == one.family => RowLook::Marked,
+        (_, Some(false)) => RowLook::Quiet,
+        _ => RowLook::Plain,
+    }
+}
+
+/// The family in words and what to know of its fit.
+fn hint(one: &Candidate) -> String {
+    let lines = std::iter::once(&one.name)
+        .chain(&one.warnings)
+        .chain(&one.prediction_refused);
+    lines.cloned().collect::<Vec<_>>().join("\n")
 }
 
 /// Draws the choice in words, what each term buys, and the recordings.
@@ -164,49 +161,29 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
         }
     }
     section_ui(ui, "What each term buys");
-    if selection.steps.is_empty() {
+    let ladder = selection::ladder(selection);
+    let steps = ladder.get(1..).unwrap_or_default();
+    if steps.is_empty() {
         ui.label(RichText::new("no two families of one kind").color(tokens.text_quiet));
     }
-    for step in &selection.steps {
-        ui.add(Label::new(RichText::new(step_text(step)).small()).wrap());
+    for step in steps {
+        let line = |words: RichText| Label::new(words.small()).wrap();
+        ui.add(line(RichText::new(format!("{}: {}", step[0], step[1]))));
+        let numbers = ladder[0].iter().zip(step).skip(2);
+        let numbers: Vec<String> = numbers
+            .map(|(head, cell)| format!("{head} {cell}"))
+            .collect();
+        ui.add(line(
+            RichText::new(numbers.join(", ")).color(tokens.text_quiet),
+        ));
     }
     section_ui(ui, "Recordings");
-    for record in &selection.records {
-        let text = format!(
-            "{}: {} samples, {:.2} mm at {:.3} mm/s, peak {:.3} N",
-            record.record, record.samples, record.depth_mm, record.speed_mm_per_s, record.peak_n
-        );
+    for text in [selection::records(selection), selection::tested(selection)] {
         ui.add(Label::new(RichText::new(text).small()).wrap());
     }
-    let counts = format!(
-        "{} samples worth {:.0} independent ones",
-        selection.samples, selection.effective_samples
-    );
-    ui.label(RichText::new(counts).color(tokens.text_quiet).small());
     for note in &selected.notes {
         ui.add(Label::new(RichText::new(note).color(tokens.text_quiet).small()).wrap());
     }
-}
-
-/// One extra term: what is added, what it buys, what it costs.
-fn step_text(step: &Step) -> String {
-    let [before, after] = step.prediction_rms_n.unwrap_or(step.rms_n);
-    let what = if step.prediction_rms_n.is_some() {
-        "prediction"
-    } else {
-        "fit"
-    };
-    format!(
-        "{} to {}, {}: {what} {:.2} to {:.2} mN, BIC {:+.1}, {} to {} operations",
-        step.from,
-        step.to,
-        step.adds,
-        1e3 * before,
-        1e3 * after,
-        step.bic_change,
-        step.cost[0].operations,
-        step.cost[1].operations
-    )
 }
 
 #[cfg(test)]

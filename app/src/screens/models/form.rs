@@ -94,7 +94,7 @@ impl ModelsForm {
         for (index, path) in self.sources.iter().enumerate() {
             ui.horizontal(|ui| {
                 let name = short(path);
-                let button = Button::new("✕").small();
+                let button = Button::new("×").small();
                 let button = ui.add(button).on_hover_text(format!("leave out {name}"));
                 button.widget_info(|| {
                     eframe::egui::WidgetInfo::labeled(

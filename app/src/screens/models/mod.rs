@@ -22,6 +22,12 @@ pub struct ModelsScreen {
 }
 
 impl ModelsScreen {
+    /// Whether work is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
+    }
+
     /// Fetches an answer that has come.
     pub fn poll(&mut self) {
         self.task.poll();

@@ -5,6 +5,7 @@
 //! deepest valleys on the thinned records, damped Gauss-Newton steps follow them, first there and
 //! then on every sample.
 
+mod curve;
 mod descent;
 mod given;
 mod nonnegative;

@@ -1,7 +1,7 @@
 //! Records and a family as a linear problem for any given outer parameters.
 
 use super::super::record::{constant_force, depths, measured};
-use super::super::sample::{FitError, FitSample, check_samples};
+use super::super::sample::{FitError, FitSample, check_samples, check_scale};
 use super::super::scan::{log_tau_range, union};
 use super::super::thin::Thin;
 use super::super::triangle::{Factor, Triangle};
@@ -13,6 +13,10 @@ use crate::units::{Depth, Seconds};
 /// differences and that of rounding are both near 1e-10 there, and Gauss-Newton needs no more than a
 /// direction.
 const DIFFERENCE: f64 = 1e-5;
+
+/// Share of its greatest depth by which the probe must come back in some record before what having
+/// been deeper adds can be told: less than a tenth would be extrapolated over all the rest.
+const RETURN_MIN: f64 = 0.1;
 
 /// One record.
 #[derive(Clone)]
@@ -110,7 +114,31 @@ impl<'a> Problem<'a> {
                 parameters: problem.free(),
             });
         }
+        problem.check_return()?;
         Ok(problem)
+    }
+
+    /// Refuses a family that softens where no record unloads.
+    fn check_return(&self) -> Result<(), FitError> {
+        let middle: Vec<f64> = self.ranges.iter().map(|(a, b)| 0.5 * (a + b)).collect();
+        let columns = self.family.columns(&self.outer(&middle));
+        let softens = |term: &Relaxation| term.elastic.softens() || term.rate.softens();
+        if !columns.iter().flatten().any(softens) {
+            return Ok(());
+        }
+        let share = self.records.iter().map(|record| returned(record.samples));
+        let share = share.fold(0.0, f64::max);
+        if share >= RETURN_MIN {
+            return Ok(());
+        }
+        Err(FitError::Unsupported {
+            family: self.family.name(),
+            reason: format!(
+                "the probe comes back by {:.0} % of its greatest depth where {:.0} % are needed to tell unloading from loading; give a record with its unloading",
+                100.0 * share,
+                100.0 * RETURN_MIN
+            ),
+        })
     }
 
     /// The same records and ranges with another member of the family.
@@ -391,6 +419,18 @@ pub(super) struct SlopeRow<'s> {
     pub weight: f64,
 }
 
+/// Share of the greatest depth before by which the probe comes back while its force counts, at most.
+fn returned(samples: &[FitSample]) -> f64 {
+    let (mut deepest, mut share) = (0.0f64, 0.0f64);
+    for sample in samples {
+        deepest = deepest.max(sample.depth.0);
+        if sample.is_measured() && deepest > 0.0 {
+            share = share.max(1.0 - sample.depth.0.max(0.0) / deepest);
+        }
+    }
+    share
+}
+
 fn check(samples: &[FitSample]) -> Result<(), FitError> {
     let measured = measured(samples);
     if measured < 2 {
@@ -413,5 +453,5 @@ fn check(samples: &[FitSample]) -> Result<(), FitError> {
             contact: 0.0,
         });
     }
-    Ok(())
+    check_scale(samples)
 }

@@ -1,0 +1,166 @@
+//! `palpate trade`: error against time on this machine, and what to use.
+
+use super::Failure;
+use super::output::Output;
+use crate::trade::{self, Extent};
+use clap::Args;
+use palpate_model::tolerance::Tolerance;
+use palpate_model::trade::{Recommendation, TradeCurves};
+use palpate_sessions::library_folder;
+use palpate_sessions::trade::{TradeFileError, read_trade, trade_file, trade_files, write_trade};
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// Arguments of `palpate trade`.
+#[derive(Debug, Args)]
+pub struct TradeArgs {
+    /// How large an error of force may be: newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd)
+    #[arg(long, value_name = "N|%|%jnd", default_value = "1%")]
+    tolerance: String,
+    /// Updates of the force per second
+    #[arg(long, value_name = "HZ", default_value = "1000")]
+    rate: f64,
+    /// Percent of each period that the force may take
+    #[arg(long, value_name = "PERCENT", default_value = "10")]
+    share: f64,
+    /// Few rows and rough times
+    #[arg(long)]
+    quick: bool,
+    /// Print the stored curves instead of measuring
+    #[arg(long, conflicts_with = "quick")]
+    show: bool,
+    /// Compute the errors of the stored curves again and compare
+    #[arg(long, conflicts_with_all = ["quick", "show"])]
+    check: bool,
+    /// Folder for the curves; without it the library
+    #[arg(long, value_name = "FOLDER")]
+    store: Option<PathBuf>,
+    /// Also draw error against time
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct TradeReport<'a> {
+    command: &'static str,
+    file: String,
+    doubts: Vec<String>,
+    /// Largest difference between even and odd rounds, as a share.
+    halves_worst: f64,
+    recommendation: Recommendation,
+    curves: &'a TradeCurves,
+}
+
+pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
+    let tolerance: Tolerance = args.tolerance.parse().map_err(Failure::usage)?;
+    let in_range = |name: &str, value: f64, high: f64| {
+        (value > 0.0 && value <= high).then_some(()).ok_or_else(|| {
+            Failure::usage(format!(
+                "--{name} {value} is not possible; give a number above 0 and up to {high}"
+            ))
+        })
+    };
+    // A gigahertz is a period of three cycles: nobody waits for that.
+    in_range("rate", args.rate, 1e9)?;
+    in_range("share", args.share, 100.0)?;
+    let library = match &args.store {
+        Some(folder) => folder.clone(),
+        None => library_folder().map_err(Failure::usage)?,
+    };
+    let (curves, file) = if args.show || args.check {
+        stored(&library)?
+    } else {
+        let curves = measured(args.quick, output)?;
+        let file = write_trade(&library, &curves).map_err(failure)?;
+        (curves, file)
+    };
+    let doubts = curves.doubts(
+        &trade::this_machine(),
+        trade::version(),
+        trade::age_days(&curves),
+    );
+    doubts.iter().for_each(|doubt| output.note(doubt));
+    if args.check {
+        check(&curves, output)?;
+    }
+    if let Some(picture) = &args.plot {
+        std::fs::write(picture, trade::svg(&curves)).map_err(|err| {
+            let name = picture.display();
+            Failure::failed(format!("the picture cannot be written: {err}, {name}"))
+        })?;
+    }
+    let recommendation = curves.recommend(tolerance, args.rate, args.share / 100.0);
+    let report = TradeReport {
+        command: "trade",
+        file: file.display().to_string(),
+        doubts,
+        halves_worst: curves.worst_halves(),
+        recommendation,
+        curves: &curves,
+    };
+    output.result(&report, || trade::text(&curves, &report.recommendation));
+    Ok(())
+}
+
+fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
+    let extent = if is_quick {
+        Extent::Quick
+    } else {
+        Extent::Full
+    };
+    with_bar(output, |progress| trade::measure(extent, progress))
+}
+
+/// Work with a progress bar that nobody ends early.
+fn with_bar(
+    output: &Output,
+    work: impl FnOnce(&trade::Progress<'_>) -> Result<Option<TradeCurves>, String>,
+) -> Result<TradeCurves, Failure> {
+    let bar = output.count_bar(0);
+    let curves = work(&|done, of, what| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+        bar.set_message(what.to_owned());
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    let curves = curves.map_err(Failure::failed)?;
+    curves.ok_or_else(|| Failure::failed("the measurement ended before it was done"))
+}
+
+/// The curves of this machine, or else any there are.
+fn stored(library: &Path) -> Result<(TradeCurves, PathBuf), Failure> {
+    let own = trade_file(library, &trade::this_machine());
+    let file = if own.exists() {
+        own
+    } else {
+        trade_files(library).into_iter().next().ok_or_else(|| {
+            Failure::usage(format!(
+                "no curves are stored in {}; measure with 'palpate trade'",
+                library.display()
+            ))
+        })?
+    };
+    let curves = read_trade(&file).map_err(failure)?;
+    Ok((curves, file))
+}
+
+fn check(curves: &TradeCurves, output: &Output) -> Result<(), Failure> {
+    let extent = if curves.quick {
+        Extent::Quick
+    } else {
+        Extent::Full
+    };
+    let now = with_bar(output, |progress| trade::errors(extent, progress))?;
+    curves.agrees_with(&now).map_err(Failure::failed)?;
+    output.note("every stored error was found again");
+    Ok(())
+}
+
+fn failure(err: TradeFileError) -> Failure {
+    Failure::failed(err)
+}

@@ -1,0 +1,181 @@
+//! Families by terms: what a step costs, and what leaving terms out does to the force.
+
+use super::paths::{Paths, difference, peak};
+use super::timing::Job;
+use super::{Extent, UNMEASURED};
+use palpate_model::families::{Model, by_key};
+use palpate_model::fit::{FamilyOptions, FitSample, fit_family};
+use palpate_model::trade::FamilyRow;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use std::hint::black_box;
+
+/// Steps of a timed run.
+const RUN: usize = 256;
+
+/// What rows of one target stand for, and how.
+struct Target {
+    /// In words.
+    name: &'static str,
+    /// The body: family, outer parameters, coefficients.
+    body: (&'static str, &'static [f64], &'static [f64]),
+    /// Whether each family is fitted to it or is the same body with fewer terms.
+    is_fitted: bool,
+    /// Families; the first of them alone with `--quick`.
+    families: &'static [&'static str],
+    quick: usize,
+}
+
+/// Pig stomach, equation 3.5 of the thesis; a fractional body of like stiffness that relaxes over
+/// decades; a Fung spectrum of two and a half decades.
+const TARGETS: [Target; 4] = [
+    Target {
+        name: "thesis body",
+        body: ("series-3", &[1.023], &[0.05333, -0.0086, 0.000_434_5, 0.06]),
+        is_fitted: true,
+        families: &[
+            "series-1",
+            "series-2",
+            "series-3",
+            "series-4",
+            "series-5",
+            "voigt",
+            "maxwell",
+            "kelvin",
+            "exponential",
+        ],
+        quick: 3,
+    },
+    Target {
+        name: "fractional body",
+        body: ("fractional-12", &[2.0, 0.5], &[0.1, 0.3]),
+        is_fitted: true,
+        families: &[
+            "prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6",
+        ],
+        quick: 2,
+    },
+    Target {
+        name: "fractional body, digits",
+        body: ("fractional-14", &[2.0, 0.5], &[0.1, 0.3]),
+        is_fitted: false,
+        families: &[
+            "fractional-1",
+            "fractional-2",
+            "fractional-4",
+            "fractional",
+            "fractional-8",
+            "fractional-10",
+            "fractional-12",
+        ],
+        quick: 2,
+    },
+    Target {
+        name: "Fung spectrum, nodes",
+        body: ("fung-64", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
+        is_fitted: false,
+        families: &["fung-2", "fung-4", "fung-8", "fung-16", "fung", "fung-32"],
+        quick: 2,
+    },
+];
+
+fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
+    let family = by_key(key).map_err(|err| err.to_string())?;
+    family.model(outer, linear).map_err(|err| err.to_string())
+}
+
+pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, String> {
+    let mut rows = Vec::new();
+    for target in &TARGETS {
+        let path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();
+        let (key, outer, linear) = target.body;
+        let exact = along(&model(key, outer, linear)?, &path)?;
+        let count = match extent {
+            Extent::Full => target.families.len(),
+            Extent::Quick => target.quick,
+        };
+        for key in &target.families[..count] {
+            let found = if target.is_fitted {
+                fitted(key, &path, &exact)?
+            } else {
+                model(key, outer, linear)?
+            };
+            rows.push(FamilyRow {
+                family: (*key).to_owned(),
+                target: target.name.to_owned(),
+                peak_n: peak(&exact),
+                error_n: difference(&along(&found, &path)?, &exact),
+                cost: UNMEASURED,
+                front: false,
+            });
+        }
+    }
+    Ok(rows)
+}
+
+fn along(model: &Model, path: &[(Seconds, Depth)]) -> Result<Vec<f64>, String> {
+    model
+        .along(path.iter().copied())
+        .map_err(|err| err.to_string())
+}
+
+/// The member of a family nearest to forces along a path, by least squares.
+fn fitted(key: &str, path: &[(Seconds, Depth)], forces: &[f64]) -> Result<Model, String> {
+    let samples: Vec<FitSample> = path
+        .iter()
+        .zip(forces)
+        .map(|(&(t, depth), &force)| FitSample {
+            t,
+            depth,
+            force: Newtons(force),
+            // Equal weights: the same for all and of no other consequence.
+            sigma: Newtons(0.02),
+        })
+        .collect();
+    let options = FamilyOptions {
+        offset: false,
+        initial: false,
+    };
+    let family = by_key(key).map_err(|err| err.to_string())?;
+    fit_family(&*family, &[("target", &samples)], options)
+        .map(|fit| fit.model)
+        .map_err(|err| format!("{key}: {err}"))
+}
+
+/// One job a row: the steps of a body of that family at 1 kHz, its numbers of no consequence.
+pub(super) fn jobs<'a>(rows: &[FamilyRow]) -> Result<Vec<Job<'a>>, String> {
+    rows.iter().map(|row| job(&row.family)).collect()
+}
+
+fn job<'a>(key: &str) -> Result<Job<'a>, String> {
+    let family = by_key(key).map_err(|err| err.to_string())?;
+    // A decade between relaxation times, a few newtons over 30 mm.
+    let outer = family.outer();
+    let outer: Vec<f64> = outer
+        .iter()
+        .enumerate()
+        .map(|(i, one)| match one.unit {
+            "s" => 0.1 * 10f64.powi(i as i32),
+            "1/mm" => 0.15,
+            _ if one.name == "alpha" => 0.5,
+            _ => 300.0,
+        })
+        .collect();
+    let linear = vec![0.01; family.linear().len()];
+    let start = family
+        .model(&outer, &linear)
+        .map_err(|err| err.to_string())?
+        .at_rest_from(Depth(0.0))
+        .map_err(|err| err.to_string())?;
+    let depths: Vec<Depth> = (0..RUN)
+        .map(|i| Depth(30.0 * i as f64 / RUN as f64))
+        .collect();
+    let mut body = start;
+    Ok(Job {
+        per_call: RUN as f64,
+        call: Box::new(move || {
+            for &depth in black_box(&depths) {
+                black_box(body.step(depth, Seconds(1e-3)).is_ok());
+            }
+        }),
+    })
+}

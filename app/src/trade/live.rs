@@ -1,0 +1,50 @@
+//! The live fit.
+
+use super::paths::Paths;
+use super::timing::Job;
+use super::{UNMEASURED, fit};
+use palpate_model::fit::{FitSample, LiveFit};
+use palpate_model::trade::LiveRow;
+use palpate_model::units::Depth;
+use palpate_model::viscoelastic::ModifiedKelvin;
+use std::hint::black_box;
+
+/// Relaxation times in the bank.
+const NODES: [usize; 1] = [64];
+
+fn pushed(samples: &[FitSample]) -> LiveFit {
+    let mut live = LiveFit::new(Depth(30.0));
+    for sample in samples {
+        live.push(sample.t, sample.depth, sample.force, sample.sigma);
+    }
+    live
+}
+
+pub(super) fn rows(paths: &Paths) -> Result<Vec<LiveRow>, String> {
+    let recording = fit::recording(0, 0.0, paths)?;
+    let row = |&nodes: &usize| {
+        let answer = pushed(&recording).estimate();
+        let tau = answer.and_then(|answer| answer.identified("tau_eps").map(|tau| tau.value));
+        LiveRow {
+            nodes,
+            tau_error: tau.map(|tau| (tau / ModifiedKelvin::THESIS.tau_eps - 1.0).abs()),
+            cost: UNMEASURED,
+            front: false,
+        }
+    };
+    Ok(NODES.iter().map(row).collect())
+}
+
+pub(super) fn jobs<'a>(rows: &[LiveRow], paths: &Paths) -> Result<Vec<Job<'a>>, String> {
+    let recording = fit::recording(0, 0.0, paths)?;
+    let job = |_: &LiveRow| {
+        let samples = recording.clone();
+        Job {
+            per_call: samples.len() as f64,
+            call: Box::new(move || {
+                black_box(pushed(black_box(&samples)));
+            }),
+        }
+    };
+    Ok(rows.iter().map(job).collect())
+}

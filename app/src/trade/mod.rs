@@ -1,0 +1,132 @@
+//! The measured trade: error against time on this machine, one table to a file.
+//!
+//! Errors are computed, the same on every machine up to the last digits; times are measured. What
+//! follows from both is in [`palpate_model::trade`].
+
+mod families;
+mod fit;
+mod integrators;
+mod live;
+mod machine;
+mod paths;
+mod picture;
+pub(crate) mod text;
+mod timing;
+
+pub use machine::{age_days, this_machine, version};
+pub use picture::svg;
+pub use text::text;
+
+use chrono::{DateTime, SecondsFormat, Utc};
+use palpate_model::trade::{Cost, TRADE_FORMAT, TradeCurves};
+use palpate_protocols::runner::wall_now;
+use std::ops::ControlFlow;
+use timing::Job;
+
+/// How much is measured.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Extent {
+    /// Every row, long enough for times that can be repeated.
+    Full,
+    /// A few rows, briefly.
+    Quick,
+}
+
+/// How much of the work is done, of how much, and what is under way; may end the whole.
+pub type Progress<'a> = dyn Fn(usize, usize, &str) -> ControlFlow<()> + 'a;
+
+/// Tables whose errors [`errors`] computes.
+const TABLES: usize = 4;
+/// Seeds of the noise in the fits: the first, and how many.
+const SEEDS_FULL: [u64; 2] = [1, 8];
+const SEEDS_QUICK: [u64; 2] = [1, 2];
+/// What stands for a time that is not measured yet.
+const UNMEASURED: Cost = Cost {
+    ns: 0.0,
+    spread: 0.0,
+    halves: 0.0,
+};
+
+/// All rows, computed, timed and marked; none if `progress` ended it.
+pub fn measure(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
+    let total = TABLES + timing::rounds(extent);
+    let of_errors = |done: usize, _: usize, what: &str| progress(done, total, what);
+    let Some(curves) = errors(extent, &of_errors)? else {
+        return Ok(None);
+    };
+    let mut done = TABLES;
+    times(curves, extent, &mut || {
+        done += 1;
+        progress(done, total, "times")
+    })
+}
+
+/// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
+/// `progress` ended it.
+pub fn errors(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
+    let paths = paths::Paths::new()?;
+    let seeds = match extent {
+        Extent::Full => SEEDS_FULL,
+        Extent::Quick => SEEDS_QUICK,
+    };
+    let ends = |done: usize, what: &str| progress(done, TABLES, what).is_break();
+    if ends(0, "errors of the integrators") {
+        return Ok(None);
+    }
+    let integrators = integrators::rows(extent, &paths)?;
+    if ends(1, "errors of the families") {
+        return Ok(None);
+    }
+    let families = families::rows(extent, &paths)?;
+    if ends(2, "errors of the fit") {
+        return Ok(None);
+    }
+    let fit = fit::rows(extent, seeds, &paths)?;
+    if ends(3, "errors of the live fit") {
+        return Ok(None);
+    }
+    let live = live::rows(&paths)?;
+    let now: DateTime<Utc> = wall_now().into();
+    Ok(Some(TradeCurves {
+        format: TRADE_FORMAT,
+        version: version().into(),
+        machine: this_machine(),
+        measured_at: now.to_rfc3339_opts(SecondsFormat::Secs, true),
+        quick: extent == Extent::Quick,
+        peak: paths.peak(),
+        seeds,
+        integrators,
+        families,
+        fit,
+        live,
+    }))
+}
+
+/// Measures the times of all rows; `step` is told of each round done and may end the whole.
+fn times(
+    mut curves: TradeCurves,
+    extent: Extent,
+    step: &mut dyn FnMut() -> ControlFlow<()>,
+) -> Result<Option<TradeCurves>, String> {
+    let paths = paths::Paths::new()?;
+    let mut jobs: Vec<Job> = Vec::new();
+    jobs.extend(integrators::jobs());
+    jobs.extend(families::jobs(&curves.families)?);
+    jobs.extend(fit::jobs(&curves.fit, curves.seeds[0], &paths)?);
+    jobs.extend(live::jobs(&curves.live, &paths)?);
+    let Some(costs) = timing::measure(&mut jobs, extent, step) else {
+        return Ok(None);
+    };
+    let mut costs = costs.into_iter();
+    let by_scheme: Vec<Cost> = costs.by_ref().take(integrators::JOBS).collect();
+    for row in &mut curves.integrators {
+        row.cost = by_scheme[integrators::job_of(row)];
+        row.second_ns = row.cost.ns / row.step_s;
+    }
+    let rest = curves.families.iter_mut().map(|row| &mut row.cost);
+    let rest = rest.chain(curves.fit.iter_mut().map(|row| &mut row.cost));
+    let rest = rest.chain(curves.live.iter_mut().map(|row| &mut row.cost));
+    rest.zip(costs).for_each(|(slot, cost)| *slot = cost);
+    curves.mark_fronts();
+    Ok(Some(curves))
+}

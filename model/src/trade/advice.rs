@@ -1,0 +1,175 @@
+//! What to use for a tolerance and a rate.
+
+use super::{FamilyRow, TradeCurves};
+use crate::tolerance::Tolerance;
+use crate::units::Newtons;
+use serde::Serialize;
+
+/// Times repeat to this share on a quiet machine.
+const REPEATABLE: f64 = 0.1;
+
+/// A setting that does.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Choice {
+    /// What, in words.
+    pub setting: String,
+    /// Its error as a share of the largest force.
+    pub error_of_peak: f64,
+    /// The share of each period of the rate that it takes; for a fit, none.
+    pub share_of_period: Option<f64>,
+    /// Its cost in ns: of a period's worth of simulated time, of a step, or of a fit.
+    pub cost_ns: f64,
+}
+
+/// A setting, or why there is none.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Advice {
+    /// The cheapest that does.
+    Use(Choice),
+    /// Why none does, in a sentence.
+    None(String),
+}
+
+/// What to use for one tolerance and one rate.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Recommendation {
+    /// The tolerance in words.
+    pub tolerance: String,
+    /// Updates per second wanted.
+    pub rate_hz: f64,
+    /// Share of each period that may be used.
+    pub share_allowed: f64,
+    /// For the modified Kelvin body.
+    pub integrator: Advice,
+    /// For each target among the families: its name and the advice.
+    pub families: Vec<(String, Advice)>,
+    /// How far a recording may be thinned before it is fitted.
+    pub fit: Advice,
+}
+
+impl TradeCurves {
+    /// The cheapest row of each table (of those within a tenth, the most exact) whose error is within the tolerance and which, `rate_hz` times a
+    /// second, takes no more than `share` (0 to 1) of each period. An integrator may take several steps
+    /// a period and never takes one longer than the period. The fit has no rate to keep up with.
+    #[must_use]
+    pub fn recommend(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Recommendation {
+        let targets = self.families.iter().map(|row| row.target.as_str());
+        let mut names: Vec<&str> = Vec::new();
+        for target in targets {
+            if !names.contains(&target) {
+                names.push(target);
+            }
+        }
+        let families = names.into_iter().map(|target| {
+            let rows = self.families.iter().filter(|row| row.target == target);
+            let advice = family(&rows.collect::<Vec<_>>(), tolerance, rate_hz, share);
+            (target.to_owned(), advice)
+        });
+        Recommendation {
+            tolerance: tolerance.to_string(),
+            rate_hz,
+            share_allowed: share,
+            integrator: self.integrator(tolerance, rate_hz, share),
+            families: families.collect(),
+            fit: self.thinning(tolerance),
+        }
+    }
+
+    fn integrator(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
+        let period = 1.0 / rate_hz;
+        // A step of a rounded tenth of a millisecond still fits a period.
+        let fitting = self
+            .integrators
+            .iter()
+            .filter(|row| row.step_s <= period * (1.0 + 1e-9));
+        let candidates = fitting.filter_map(|row| {
+            let error = row.error?;
+            let choice = Choice {
+                setting: format!(
+                    "{} in {}, a step every {} ms",
+                    row.scheme.name(),
+                    row.precision.name(),
+                    row.step_s * 1e3
+                ),
+                error_of_peak: error.share_of(&self.peak),
+                share_of_period: Some(row.second_ns * 1e-9),
+                cost_ns: row.second_ns * period,
+            };
+            Some((choice, error.is_within(tolerance, &self.peak)))
+        });
+        best(candidates.collect(), tolerance, Some((rate_hz, share)))
+    }
+
+    fn thinning(&self, tolerance: Tolerance) -> Advice {
+        let peak = self.peak.ramp_hold_n;
+        let candidates = self.fit.iter().map(|row| {
+            let choice = Choice {
+                setting: format!("{} samples a second, {} in all", row.rate_hz, row.samples),
+                error_of_peak: row.error_n / peak,
+                share_of_period: None,
+                cost_ns: row.cost.ns,
+            };
+            (choice, row.error_n <= tolerance.in_newtons(Newtons(peak)).0)
+        });
+        best(candidates.collect(), tolerance, None)
+    }
+}
+
+fn family(rows: &[&FamilyRow], tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
+    let candidates = rows.iter().map(|row| {
+        let choice = Choice {
+            setting: row.family.clone(),
+            error_of_peak: row.error_n / row.peak_n,
+            share_of_period: Some(row.cost.ns * 1e-9 * rate_hz),
+            cost_ns: row.cost.ns,
+        };
+        let allowed = tolerance.in_newtons(Newtons(row.peak_n)).0;
+        (choice, row.error_n <= allowed)
+    });
+    best(candidates.collect(), tolerance, Some((rate_hz, share)))
+}
+
+/// The cheapest of those exact enough, if it is cheap enough.
+fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64, f64)>) -> Advice {
+    let mut exact: Vec<&Choice> = Vec::new();
+    let mut nearest: Option<&Choice> = None;
+    for (choice, is_exact) in &candidates {
+        if *is_exact {
+            exact.push(choice);
+        }
+        if nearest.is_none_or(|known| choice.error_of_peak < known.error_of_peak) {
+            nearest = Some(choice);
+        }
+    }
+    // Of those that cost the same as far as times can be told apart, the most exact.
+    let least = exact
+        .iter()
+        .map(|choice| choice.cost_ns)
+        .fold(f64::INFINITY, f64::min);
+    let cheapest = exact
+        .into_iter()
+        .filter(|choice| choice.cost_ns <= least * (1.0 + REPEATABLE))
+        .min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
+    match (cheapest, nearest, pace) {
+        (None, None, Some((rate, _))) => Advice::None(format!(
+            "nothing was measured at {rate} updates a second; measure without --quick, or ask for a lower rate"
+        )),
+        (None, None, None) => Advice::None("nothing was measured".into()),
+        (None, Some(nearest), _) => Advice::None(format!(
+            "nothing measured is within {tolerance}; the nearest is {} with {:.2e} of the peak force",
+            nearest.setting, nearest.error_of_peak
+        )),
+        (Some(choice), _, Some((rate, share)))
+            if choice.share_of_period.is_some_and(|used| used > share) =>
+        {
+            Advice::None(format!(
+                "the cheapest within {tolerance} is {}, which takes {:.3} % of each period at {rate} updates a second; allowed are {} %",
+                choice.setting,
+                100.0 * choice.share_of_period.unwrap_or_default(),
+                100.0 * share
+            ))
+        }
+        (Some(choice), _, _) => Advice::Use(choice.clone()),
+    }
+}

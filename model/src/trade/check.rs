@@ -1,0 +1,186 @@
+//! Whether curves can be what was measured.
+
+use super::{Cost, TRADE_FORMAT, TradeCurves};
+use thiserror::Error;
+
+/// Curves that are none.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum CurveError {
+    /// Another version of the stored form.
+    #[error(
+        "these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again with 'palpate trade'"
+    )]
+    Format(u32),
+    /// A number out of its range.
+    #[error(
+        "the curves say {what} = {value}, which nothing can be; measure again with 'palpate trade'"
+    )]
+    Number {
+        /// Which.
+        what: String,
+        /// Its value.
+        value: f64,
+    },
+    /// Two numbers that contradict each other.
+    #[error(
+        "the curves contradict themselves at {0}: they were changed after they were measured; measure again with 'palpate trade'"
+    )]
+    Contradiction(String),
+    /// Errors that this program does not find.
+    #[error(
+        "{what}: the curves say an error of {stored:e} and this palpate finds {found:e}; measure again with 'palpate trade'"
+    )]
+    Error {
+        /// Which row.
+        what: String,
+        /// What is stored.
+        stored: f64,
+        /// What is computed now.
+        found: f64,
+    },
+    /// Other rows.
+    #[error("the curves have no row {0}; measure again with 'palpate trade'")]
+    Missing(String),
+}
+
+/// Errors computed twice agree to this share: the same arithmetic, but exponentials of the system's own
+/// library, whose last digit may differ.
+const AGREE: f64 = 1e-6;
+/// Errors of so small a share of the force are its last digits, and come out differently elsewhere.
+const LAST_DIGITS: f64 = 1e-12;
+
+impl TradeCurves {
+    /// The curves themselves if they can have been measured: right format, possible numbers, no
+    /// contradiction.
+    pub fn checked(self) -> Result<Self, CurveError> {
+        if self.format != TRADE_FORMAT {
+            return Err(CurveError::Format(self.format));
+        }
+        let number = |what: &str, value: f64, is_possible: bool| {
+            let what = what.to_owned();
+            is_possible
+                .then_some(())
+                .ok_or(CurveError::Number { what, value })
+        };
+        let error = |what: &str, value: f64| number(what, value, value >= 0.0 && value.is_finite());
+        let positive =
+            |what: &str, value: f64| number(what, value, value > 0.0 && value.is_finite());
+        for peak in [self.peak.ramp_hold_n, self.peak.poke_n] {
+            positive("a peak force", peak)?;
+        }
+        for Cost { ns, spread, halves } in self.costs() {
+            positive("a time in ns", *ns)?;
+            error("a spread", *spread)?;
+            error("a difference of halves", *halves)?;
+        }
+        for row in &self.integrators {
+            positive("a step in s", row.step_s)?;
+            if let Some(force) = row.error {
+                error("an error in N", force.ramp_hold_n)?;
+                error("an error in N", force.poke_n)?;
+            }
+            let name = format!("{} at {} s", row.scheme.name(), row.step_s);
+            if row.error.is_some() == row.refused.is_some()
+                || (row.second_ns * row.step_s / row.cost.ns - 1.0).abs() > 1e-9
+            {
+                return Err(CurveError::Contradiction(name));
+            }
+        }
+        for row in &self.families {
+            positive("a peak force", row.peak_n)?;
+            error("an error in N", row.error_n)?;
+        }
+        for row in &self.fit {
+            error("an error in N", row.error_n)?;
+            error("an error of tau", row.tau_error)?;
+            positive("a rate in Hz", row.rate_hz)?;
+        }
+        for row in &self.live {
+            error("an error of tau", row.tau_error.unwrap_or(0.0))?;
+        }
+        let mut marked = self.clone();
+        marked.mark_fronts();
+        if marked != self {
+            return Err(CurveError::Contradiction("the rows marked as best".into()));
+        }
+        Ok(self)
+    }
+
+    /// Whether the errors are those of `now`, computed afresh for the same rows.
+    pub fn agrees_with(&self, now: &Self) -> Result<(), CurveError> {
+        let same = |what: &str, stored: f64, found: f64, size: f64| {
+            let allowed = AGREE * stored.max(found) + LAST_DIGITS * size;
+            let what = what.to_owned();
+            ((stored - found).abs() <= allowed)
+                .then_some(())
+                .ok_or(CurveError::Error {
+                    what,
+                    stored,
+                    found,
+                })
+        };
+        let peak = self.peak;
+        same(
+            "the ramp and hold",
+            peak.ramp_hold_n,
+            now.peak.ramp_hold_n,
+            1.0,
+        )?;
+        same("the poke", peak.poke_n, now.peak.poke_n, 1.0)?;
+        for row in &now.integrators {
+            let name = format!(
+                "{} at {} s in {}",
+                row.scheme.name(),
+                row.step_s,
+                row.precision.name()
+            );
+            let stored = self.integrators.iter().find(|stored| {
+                (stored.scheme, stored.precision, stored.step_s)
+                    == (row.scheme, row.precision, row.step_s)
+            });
+            match (stored.map(|stored| stored.error), row.error) {
+                (None, _) => return Err(CurveError::Missing(name)),
+                (Some(None), None) => {}
+                (Some(Some(stored)), Some(found)) => {
+                    same(
+                        &name,
+                        stored.ramp_hold_n,
+                        found.ramp_hold_n,
+                        peak.ramp_hold_n,
+                    )?;
+                    same(&name, stored.poke_n, found.poke_n, peak.poke_n)?;
+                }
+                (Some(_), _) => return Err(CurveError::Contradiction(name)),
+            }
+        }
+        for row in &now.families {
+            let stored = self
+                .families
+                .iter()
+                .find(|stored| (&stored.family, &stored.target) == (&row.family, &row.target));
+            let name = format!("{} for {}", row.family, row.target);
+            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            same(&name, stored.peak_n, row.peak_n, 1.0)?;
+            same(&name, stored.error_n, row.error_n, row.peak_n)?;
+        }
+        for row in &now.fit {
+            let name = format!("the fit at {} Hz", row.rate_hz);
+            let stored = self.fit.iter().find(|stored| stored.rate_hz == row.rate_hz);
+            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            same(&name, stored.tau_error, row.tau_error, 1.0)?;
+            same(&name, stored.error_n, row.error_n, peak.ramp_hold_n)?;
+        }
+        for row in &now.live {
+            let name = format!("the live fit with {} relaxation times", row.nodes);
+            let stored = self.live.iter().find(|stored| stored.nodes == row.nodes);
+            let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
+            match (stored.tau_error, row.tau_error) {
+                // Sums of products lose half the digits.
+                (Some(stored), Some(found)) => same(&name, stored, found, 1e4)?,
+                (None, None) => {}
+                _ => return Err(CurveError::Contradiction(name)),
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,237 @@
+//! Error against time, as measured on one machine: what to use, and how far to trust it.
+//!
+//! Pure: errors and times are measured by whoever has a clock. The haptic loop and the scene plan from
+//! [`TradeCurves::recommend`]; where it may come from another machine or another time,
+//! [`TradeCurves::doubts`] says so.
+
+mod advice;
+mod check;
+mod machine;
+mod pareto;
+
+pub use advice::{Advice, Choice, Recommendation};
+pub use check::CurveError;
+pub use machine::{Machine, STALE_DAYS};
+pub use pareto::pareto;
+
+use crate::integrators::Scheme;
+use crate::units::Newtons;
+use serde::{Deserialize, Serialize};
+
+/// Version of the stored form; another one is not read.
+pub const TRADE_FORMAT: u32 = 1;
+
+/// Width of the numbers an integrator computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 53 binary digits.
+    F64,
+    /// 24 binary digits.
+    F32,
+}
+
+impl Precision {
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F64 => "f64",
+            Self::F32 => "f32",
+        }
+    }
+}
+
+/// What something cost, and how sure that is.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Time of one in ns: the least over all rounds, since other work on the machine only adds.
+    pub ns: f64,
+    /// By how much the middle round was above the least, as a share of it.
+    pub spread: f64,
+    /// By how much the least of the even rounds and that of the odd ones differ, as a share.
+    pub halves: f64,
+}
+
+/// Largest error of force on the paths measured.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ForceError {
+    /// On the ramp and hold, in N.
+    pub ramp_hold_n: f64,
+    /// On the poke, in N.
+    pub poke_n: f64,
+}
+
+/// One integrator at one step in one precision.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct IntegratorRow {
+    /// Which.
+    pub scheme: Scheme,
+    /// In which numbers.
+    pub precision: Precision,
+    /// Step in s.
+    pub step_s: f64,
+    /// Its error; null where it has none.
+    pub error: Option<ForceError>,
+    /// Why it has none.
+    pub refused: Option<String>,
+    /// Cost of a step.
+    pub cost: Cost,
+    /// Cost of a second of simulated time, in ns.
+    pub second_ns: f64,
+    /// Whether nothing is both cheaper and more exact.
+    pub front: bool,
+}
+
+/// One model family.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FamilyRow {
+    /// Its key.
+    pub family: String,
+    /// What it stands for: rows of one target compete.
+    pub target: String,
+    /// Largest force of the target, in N.
+    pub peak_n: f64,
+    /// Largest error of force in N.
+    pub error_n: f64,
+    /// Cost of a step at any rate.
+    pub cost: Cost,
+    /// Whether nothing for this target is both cheaper and more exact.
+    pub front: bool,
+}
+
+/// The fit of a recording, thinned.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitRow {
+    /// Samples per second that are left.
+    pub rate_hz: f64,
+    /// Samples fitted.
+    pub samples: usize,
+    /// Root mean square error of the relaxation time over the seeds, as a share of it.
+    pub tau_error: f64,
+    /// Root mean square over the seeds of the largest error of the fitted force, in N.
+    pub error_n: f64,
+    /// Cost of a fit.
+    pub cost: Cost,
+    /// Whether nothing is both cheaper and more exact.
+    pub front: bool,
+}
+
+/// The live fit with so many relaxation times in its bank.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LiveRow {
+    /// How many.
+    pub nodes: usize,
+    /// How far its last answer is from the fit of record on a noiseless recording, as a share of the
+    /// relaxation time; null where it has no answer.
+    pub tau_error: Option<f64>,
+    /// Cost of a sample.
+    pub cost: Cost,
+    /// Whether nothing is both cheaper and more exact.
+    pub front: bool,
+}
+
+/// Everything measured in one go on one machine.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct TradeCurves {
+    /// [`TRADE_FORMAT`].
+    pub format: u32,
+    /// Version of palpate that measured.
+    pub version: String,
+    /// Where.
+    pub machine: Machine,
+    /// When, RFC 3339 in UTC.
+    pub measured_at: String,
+    /// Whether only a few rows were measured, briefly.
+    pub quick: bool,
+    /// Largest forces of the two paths, in N.
+    pub peak: ForceError,
+    /// First seed of the noise in the fits, and how many followed.
+    pub seeds: [u64; 2],
+    /// Integrators by step and precision.
+    pub integrators: Vec<IntegratorRow>,
+    /// Families by terms.
+    pub families: Vec<FamilyRow>,
+    /// The fit by sampling rate.
+    pub fit: Vec<FitRow>,
+    /// The live fit by size of its bank.
+    pub live: Vec<LiveRow>,
+}
+
+impl ForceError {
+    /// The larger of the two beside the peaks of their paths.
+    #[must_use]
+    pub fn share_of(&self, peak: &Self) -> f64 {
+        (self.ramp_hold_n / peak.ramp_hold_n).max(self.poke_n / peak.poke_n)
+    }
+
+    /// Whether both are within a tolerance.
+    #[must_use]
+    pub fn is_within(&self, tolerance: crate::tolerance::Tolerance, peak: &Self) -> bool {
+        let within = |error: f64, peak: f64| error <= tolerance.in_newtons(Newtons(peak)).0;
+        within(self.ramp_hold_n, peak.ramp_hold_n) && within(self.poke_n, peak.poke_n)
+    }
+}
+
+impl TradeCurves {
+    /// Marks in every table the rows than which nothing is both cheaper and more exact.
+    pub fn mark_fronts(&mut self) {
+        let peak = self.peak;
+        let points = self.integrators.iter().map(|row| {
+            let error = row.error.map(|error| error.share_of(&peak));
+            (error, row.second_ns)
+        });
+        let front = pareto(&points.collect::<Vec<_>>());
+        self.integrators
+            .iter_mut()
+            .zip(front)
+            .for_each(|(row, front)| row.front = front);
+        for index in 0..self.families.len() {
+            let target = &self.families[index].target;
+            let rivals = self.families.iter().filter(|row| row.target == *target);
+            let row = &self.families[index];
+            self.families[index].front = !rivals.into_iter().any(|rival| {
+                pareto::beats((rival.error_n, rival.cost.ns), (row.error_n, row.cost.ns))
+            });
+        }
+        let points: Vec<_> = self
+            .fit
+            .iter()
+            .map(|row| (Some(row.tau_error), row.cost.ns))
+            .collect();
+        self.fit
+            .iter_mut()
+            .zip(pareto(&points))
+            .for_each(|(row, front)| row.front = front);
+        let points: Vec<_> = self
+            .live
+            .iter()
+            .map(|row| (row.tau_error, row.cost.ns))
+            .collect();
+        self.live
+            .iter_mut()
+            .zip(pareto(&points))
+            .for_each(|(row, front)| row.front = front);
+    }
+
+    /// All costs measured.
+    pub fn costs(&self) -> impl Iterator<Item = &Cost> {
+        let integrators = self.integrators.iter().map(|row| &row.cost);
+        let families = self.families.iter().map(|row| &row.cost);
+        let fits = self.fit.iter().map(|row| &row.cost);
+        integrators
+            .chain(families)
+            .chain(fits)
+            .chain(self.live.iter().map(|row| &row.cost))
+    }
+
+    /// Largest difference between two halves of the measurement, as a share: how far the times would
+    /// be reproduced.
+    #[must_use]
+    pub fn worst_halves(&self) -> f64 {
+        self.costs().map(|cost| cost.halves).fold(0.0, f64::max)
+    }
+}
+
+#[cfg(test)]
+mod tests;

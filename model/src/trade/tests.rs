@@ -1,0 +1,278 @@
+use super::*;
+use crate::tolerance::Tolerance;
+
+fn cost(ns: f64) -> Cost {
+    Cost {
+        ns,
+        spread: 0.02,
+        halves: 0.01,
+    }
+}
+
+fn integrator(scheme: Scheme, step_s: f64, error: f64, ns: f64) -> IntegratorRow {
+    IntegratorRow {
+        scheme,
+        precision: Precision::F64,
+        step_s,
+        error: Some(ForceError {
+            ramp_hold_n: 6.0 * error,
+            poke_n: 3.0 * error,
+        }),
+        refused: None,
+        cost: cost(ns),
+        second_ns: ns / step_s,
+        front: false,
+    }
+}
+
+fn family(family: &str, target: &str, error_n: f64, ns: f64) -> FamilyRow {
+    FamilyRow {
+        family: family.into(),
+        target: target.into(),
+        peak_n: 5.0,
+        error_n,
+        cost: cost(ns),
+        front: false,
+    }
+}
+
+fn here() -> Machine {
+    Machine {
+        cpu: "Example(R) CPU @ 3 GHz".into(),
+        os: "linux".into(),
+        cores: 8,
+        profile: "release".into(),
+    }
+}
+
+fn curves() -> TradeCurves {
+    let unstable = IntegratorRow {
+        error: None,
+        refused: Some("unstable".into()),
+        ..integrator(Scheme::RungeKutta, 5.0, 0.0, 8.0)
+    };
+    let fit = |rate_hz: f64, error_n: f64, ns: f64| FitRow {
+        rate_hz,
+        samples: (90.0 * rate_hz) as usize + 1,
+        tau_error: error_n / 5.0,
+        error_n,
+        cost: cost(ns),
+        front: false,
+    };
+    let mut curves = TradeCurves {
+        format: TRADE_FORMAT,
+        version: "1.2.3".into(),
+        machine: here(),
+        measured_at: "2026-11-21T00:00:00Z".into(),
+        quick: false,
+        peak: ForceError {
+            ramp_hold_n: 6.0,
+            poke_n: 3.0,
+        },
+        seeds: [1, 8],
+        integrators: vec![
+            integrator(Scheme::ExplicitEuler, 1e-3, 1e-3, 4.0),
+            integrator(Scheme::Trapezoid, 1e-3, 1e-6, 5.0),
+            integrator(Scheme::Trapezoid, 1e-2, 1e-4, 5.0),
+            integrator(Scheme::Exact, 1e-2, 1e-15, 6.0),
+            integrator(Scheme::Exact, 1e-3, 1e-14, 6.0),
+            unstable,
+        ],
+        families: vec![
+            family("series-1", "a body", 1.0, 40.0),
+            family("series-2", "a body", 0.4, 45.0),
+            family("series-3", "a body", 1e-9, 50.0),
+            family("series-4", "a body", 1e-9, 60.0),
+            family("fung-4", "a spectrum", 0.03, 300.0),
+        ],
+        fit: vec![fit(1000.0, 1e-3, 2e7), fit(10.0, 9e-3, 4e5)],
+        live: vec![LiveRow {
+            nodes: 64,
+            tau_error: Some(1e-9),
+            cost: cost(300.0),
+            front: false,
+        }],
+    };
+    curves.mark_fronts();
+    curves
+}
+
+#[test]
+fn the_front_is_what_nothing_beats() {
+    let points = [
+        (Some(1.0), 1.0),
+        (Some(0.5), 2.0),
+        (Some(0.5), 3.0),
+        (Some(0.1), 2.5),
+        (None, 0.1),
+        (Some(1.0), 1.0),
+    ];
+    assert_eq!(pareto(&points), [true, true, false, true, false, true]);
+    let curves = curves();
+    let fronts: Vec<bool> = curves.integrators.iter().map(|row| row.front).collect();
+    // A second of the exact step at 10 ms costs 600 ns and errs by nothing; only the trapezoid there
+    // is cheaper.
+    assert_eq!(fronts, [false, false, true, true, false, false]);
+    let fronts: Vec<bool> = curves.families.iter().map(|row| row.front).collect();
+    assert_eq!(fronts, [true, true, true, false, true], "by target");
+}
+
+fn used(advice: &Advice) -> &str {
+    match advice {
+        Advice::Use(choice) => &choice.setting,
+        Advice::None(why) => why,
+    }
+}
+
+#[test]
+fn the_cheapest_that_does_is_recommended() {
+    let curves = curves();
+    let percent = |percent: f64| Tolerance::PercentOfPeak(percent);
+    let at_1_khz = curves.recommend(percent(0.01), 1000.0, 0.1);
+    // At 1 kHz a step is at most 1 ms.
+    assert_eq!(
+        used(&at_1_khz.integrator),
+        "trapezoid in f64, a step every 1 ms"
+    );
+    assert_eq!(used(&at_1_khz.families[0].1), "series-3");
+    assert!(used(&at_1_khz.families[1].1).contains("nearest is fung-4"));
+    let at_100_hz = curves.recommend(percent(0.02), 100.0, 0.1);
+    assert_eq!(
+        used(&at_100_hz.integrator),
+        "trapezoid in f64, a step every 10 ms"
+    );
+    let loose = curves.recommend(percent(10.0), 1000.0, 0.1);
+    assert_eq!(
+        used(&loose.integrator),
+        "explicit Euler in f64, a step every 1 ms"
+    );
+    assert_eq!(used(&loose.families[0].1), "series-2");
+    assert_eq!(used(&loose.fit), "10 samples a second, 901 in all");
+    let strict = curves.recommend(Tolerance::PercentOfPeak(0.1), 1000.0, 0.1);
+    assert_eq!(used(&strict.fit), "1000 samples a second, 90001 in all");
+    // series-4 is as exact and costs more; at a like cost the more exact one would be taken.
+    let mut alike = curves.clone();
+    alike.families[3] = family("series-4", "a body", 1e-12, 52.0);
+    let alike = alike.recommend(percent(0.01), 1000.0, 0.1);
+    assert_eq!(used(&alike.families[0].1), "series-4");
+    let Advice::Use(choice) = &loose.integrator else {
+        panic!("{loose:?}");
+    };
+    assert!((choice.share_of_period.unwrap() - 4e-6).abs() < 1e-18);
+    assert!((choice.cost_ns - 4.0).abs() < 1e-12);
+}
+
+#[test]
+fn none_is_said_with_its_reason() {
+    let curves = curves();
+    let one = Tolerance::PercentOfPeak(1.0);
+    let fast = curves.recommend(one, 1e6, 0.1);
+    assert!(used(&fast.integrator).contains("nothing was measured at 1000000"));
+    assert!(used(&fast.families[1].1).contains("takes 30.000 % of each period"));
+    let exact = Tolerance::Newtons(crate::units::Newtons(1e-20));
+    let exact = curves.recommend(exact, 1000.0, 0.1);
+    assert!(used(&exact.integrator).contains("the nearest is exact, depth straight"));
+    assert!(used(&exact.fit).contains("the nearest is 1000 samples"));
+}
+
+#[test]
+fn stale_and_foreign_curves_are_noticed() {
+    let curves = curves();
+    assert_eq!(curves.doubts(&here(), "1.2.3", 10.0), Vec::<String>::new());
+    let doubt = |machine: &Machine, version: &str, age: f64| {
+        let doubts = curves.doubts(machine, version, age);
+        assert_eq!(doubts.len(), 1, "{doubts:?}");
+        doubts.concat()
+    };
+    assert!(doubt(&here(), "1.2.3", 91.0).contains("stale: measured 91 days ago"));
+    assert!(doubt(&here(), "1.3.0", 1.0).contains("stale: measured by palpate 1.2.3"));
+    assert!(doubt(&here(), "1.2.3", -2.0).contains("future"));
+    let other = Machine { cores: 4, ..here() };
+    assert!(doubt(&other, "1.2.3", 1.0).contains("foreign"));
+    let debug = Machine {
+        profile: "debug".into(),
+        ..here()
+    };
+    assert!(doubt(&debug, "1.2.3", 1.0).contains("a release build and this is a debug build"));
+    assert_eq!(
+        here().file_stem(),
+        "example-r-cpu-3-ghz-8-logical-cores-linux-release-build"
+    );
+}
+
+#[test]
+fn curves_that_were_changed_are_noticed() {
+    let good = curves();
+    assert_eq!(good.clone().checked(), Ok(good.clone()));
+    type Change = fn(&mut TradeCurves);
+    let changes: [(Change, &str); 9] = [
+        (|curves| curves.format = 2, "format 2"),
+        (
+            |curves| curves.integrators[0].cost.ns = -1.0,
+            "a time in ns = -1",
+        ),
+        (
+            |curves| curves.integrators[0].cost.ns *= 1.001,
+            "contradict",
+        ),
+        (
+            |curves| curves.integrators[0].second_ns *= 1.001,
+            "contradict",
+        ),
+        (|curves| curves.integrators[5].refused = None, "contradict"),
+        (
+            |curves| curves.integrators[1].front = true,
+            "marked as best",
+        ),
+        (
+            |curves| curves.families[0].error_n = f64::NAN,
+            "an error in N = NaN",
+        ),
+        (
+            |curves| curves.fit[0].tau_error = f64::INFINITY,
+            "an error of tau = inf",
+        ),
+        (|curves| curves.peak.poke_n = 0.0, "a peak force = 0"),
+    ];
+    for (change, words) in changes {
+        let mut changed = good.clone();
+        change(&mut changed);
+        let refusal = changed.checked().unwrap_err().to_string();
+        assert!(refusal.contains(words), "{refusal}");
+    }
+    let changes: [(Change, &str); 6] = [
+        (
+            |curves| {
+                curves.integrators[1]
+                    .error
+                    .iter_mut()
+                    .for_each(|e| e.poke_n *= 1.00001)
+            },
+            "trapezoid at 0.001 s in f64",
+        ),
+        (
+            |curves| curves.families[1].error_n *= 0.99999,
+            "series-2 for a body",
+        ),
+        (
+            |curves| curves.fit[1].tau_error *= 1.00001,
+            "the fit at 10 Hz",
+        ),
+        (
+            |curves| curves.peak.ramp_hold_n *= 1.00001,
+            "the ramp and hold",
+        ),
+        (|curves| curves.live.clear(), "no row the live fit"),
+        (
+            |curves| curves.integrators.truncate(3),
+            "no row exact, depth straight",
+        ),
+    ];
+    assert_eq!(good.agrees_with(&good), Ok(()));
+    for (change, words) in changes {
+        let mut changed = good.clone();
+        change(&mut changed);
+        let refusal = changed.agrees_with(&good).unwrap_err().to_string();
+        assert!(refusal.contains(words), "{refusal}");
+    }
+}

@@ -1,0 +1,149 @@
+//! Stored curves of the measured trade: one file for each machine and kind of build, in the library.
+//!
+//! A file is `{"checksum": CRC-32 of the compact JSON of the curves, "curves": ...}`.
+
+use palpate_model::trade::{CurveError, Machine, TRADE_FORMAT, TradeCurves};
+use serde::{Deserialize, Serialize};
+use std::fs;
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Curves could not be stored or read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum TradeFileError {
+    /// The disk refused.
+    #[error("the curves cannot be {what}: {source}, {}", path.display())]
+    Io {
+        /// `stored` or `read`.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Something else than curves.
+    #[error("this file holds no curves ({reason}); measure again with 'palpate trade', {}", path.display())]
+    NotCurves {
+        /// The file.
+        path: PathBuf,
+        /// What is missing or wrong.
+        reason: String,
+    },
+    /// Other content than was written.
+    #[error("these curves were changed after they were measured; measure again with 'palpate trade', {}", path.display())]
+    Checksum {
+        /// The file.
+        path: PathBuf,
+    },
+    /// Curves that cannot have been measured.
+    #[error("{source}, {}", path.display())]
+    Curves {
+        /// The file.
+        path: PathBuf,
+        /// Why.
+        source: CurveError,
+    },
+}
+
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    checksum: u32,
+    curves: TradeCurves,
+}
+
+/// What every version of the form has.
+#[derive(Deserialize)]
+struct AnyStored {
+    curves: AnyCurves,
+}
+
+#[derive(Deserialize)]
+struct AnyCurves {
+    format: u32,
+}
+
+fn checksum(curves: &TradeCurves) -> io::Result<u32> {
+    Ok(crc32fast::hash(&serde_json::to_vec(curves)?))
+}
+
+fn folder(library: &Path) -> PathBuf {
+    library.join("trade")
+}
+
+/// The file of a machine's curves.
+#[must_use]
+pub fn trade_file(library: &Path, machine: &Machine) -> PathBuf {
+    folder(library).join(format!("{}.json", machine.file_stem()))
+}
+
+/// All files of curves in a library, by name; none where there is no such folder.
+#[must_use]
+pub fn trade_files(library: &Path) -> Vec<PathBuf> {
+    let Ok(entries) = fs::read_dir(folder(library)) else {
+        return Vec::new();
+    };
+    let paths = entries.flatten().map(|entry| entry.path());
+    let is_whole = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.ends_with(".json") && !name.starts_with('.')
+    };
+    let mut files: Vec<PathBuf> = paths.filter(is_whole).collect();
+    files.sort();
+    files
+}
+
+/// Stores curves in place of those the machine had. The file is whole whenever it is there.
+pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, TradeFileError> {
+    let path = trade_file(library, &curves.machine);
+    let failed = |source| TradeFileError::Io {
+        what: "stored",
+        path: path.clone(),
+        source,
+    };
+    fs::create_dir_all(folder(library)).map_err(failed)?;
+    let stored = Stored {
+        checksum: checksum(curves).map_err(failed)?,
+        curves: curves.clone(),
+    };
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    let hidden = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
+    let text = serde_json::to_vec_pretty(&stored).map_err(|err| failed(err.into()))?;
+    let result = fs::File::create(&hidden)
+        .and_then(|mut file| file.write_all(&text).and_then(|()| file.sync_all()))
+        .and_then(|()| fs::rename(&hidden, &path));
+    if result.is_err() {
+        // What is left of it helps nobody; the error already says what happened.
+        let _ = fs::remove_file(&hidden);
+    }
+    result.map_err(failed)?;
+    Ok(path)
+}
+
+/// Reads curves and checks that they are what was written and can have been measured.
+pub fn read_trade(path: &Path) -> Result<TradeCurves, TradeFileError> {
+    let failed = |source| TradeFileError::Io {
+        what: "read",
+        path: path.into(),
+        source,
+    };
+    let none = |err: serde_json::Error| TradeFileError::NotCurves {
+        path: path.into(),
+        reason: err.to_string(),
+    };
+    let impossible = |source| TradeFileError::Curves {
+        path: path.into(),
+        source,
+    };
+    let text = fs::read_to_string(path).map_err(failed)?;
+    let any: AnyStored = serde_json::from_str(&text).map_err(none)?;
+    if any.curves.format != TRADE_FORMAT {
+        return Err(impossible(CurveError::Format(any.curves.format)));
+    }
+    let stored: Stored = serde_json::from_str(&text).map_err(none)?;
+    if checksum(&stored.curves).map_err(failed)? != stored.checksum {
+        return Err(TradeFileError::Checksum { path: path.into() });
+    }
+    stored.curves.checked().map_err(impossible)
+}
