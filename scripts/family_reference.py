@@ -11,9 +11,11 @@ from mpmath import mp, mpf, quad, exp, log, e1, gamma
 
 mp.dps = 40
 
-# Corners of the path: a ramp, a hold, part of the way back, out of contact, a second ramp.
-PATH = [(0, 0), (2.5, 10), (6, 10), (8, 4), (9, -2), (9.5, -2), (12, 8)]
+# Corners of the path: a ramp, a hold, part of the way back, out of contact, a second ramp; then deeper
+# than ever before and back, for families that depend on the greatest depth so far.
+PATH = [(0, 0), (2.5, 10), (6, 10), (8, 4), (9, -2), (9.5, -2), (12, 8), (13, 13), (14, 6)]
 TIMES = [1, 2.5, 3, 6, 7, 8, 8.5, 9.25, 11, 12]
+LATER = [12.3, 12.7, 13, 13.5, 14]
 
 
 def pieces(until):
@@ -54,6 +56,32 @@ def differential(t, tau, u):
     return integral(t, lambda s, x, v: exp(-(t - s) / tau) * u(x, v) / tau)
 
 
+def unloading(t, o, l):
+    """The series with three softening terms; the path as function of time and its maximum so far."""
+    tau, (*mu, viscous, s1, s2, s3) = o[0], l
+    total = mpf(0)
+    deepest = mpf(0)
+    for a, b, x, v in pieces(t):
+        # Cut where the greatest depth so far is reached.
+        cuts = [a, b]
+        if x < deepest < x + v * (b - a):
+            cuts = [a, a + (deepest - x) / v, b]
+        for c, d in zip(cuts, cuts[1:]):
+            y = x + v * (c - a)
+            # Halfway, for the cut is rounded.
+            is_new = v > 0 and y + v * (d - c) / 2 > deepest
+            before = deepest
+            def u(s):
+                z = y + v * (s - c)
+                first = sum(m * z ** (k + 1) for k, m in enumerate(mu)) + viscous * z * v
+                greatest = z if is_new else before
+                lost = (s1 * z + s2 * z ** 2 + s3 * z ** 3) * (1 - z / greatest) if greatest > 0 else 0
+                return exp(-(t - s) / tau) * (first + lost) / tau
+            total += quad(u, [c + (d - c) * k / 8 for k in range(9)])
+            deepest = max(deepest, y + v * (d - c))
+    return total
+
+
 def hereditary(t, modulus, slope):
     """F = int G(t - s) dT/dx v ds."""
     return integral(t, lambda s, x, v: modulus(t - s) * slope(x) * v if v != 0 else mpf(0))
@@ -90,6 +118,8 @@ FAMILIES = {
     "series-3": ([1.023], [0.05333, -0.0086, 0.0004345, 0.06], None),
     "series-4": ([1.2], [0.08, -0.012, 0.0004, 3e-5, 0.05], None),
     "series-5": ([1.2], [0.08, -0.02, 0.003, -2e-4, 5e-6, 0.05], None),
+    "unloading-2": ([1.3], [0.05, 0.01, 0.05, -0.02, -0.004, -1e-4], unloading),
+    "unloading-3": ([1.023], [0.05333, -0.0086, 0.0004345, 0.06, -0.02, 0.003, -2e-4], unloading),
     "exponential": ([1.5, 0.15], [0.3, 0.9], lambda t, o, l: differential(
         t, o[0], lambda x, v: l[0] * (exp(o[1] * x) - 1) + l[1] * o[1] * v * exp(o[1] * x))),
     "prony-3": ([0.2, 2, 20], [0.1, 0.1, 0.08, 0.06], lambda t, o, l: hereditary(
@@ -110,7 +140,7 @@ print("# family / outer parameters / coefficients / time in s / force")
 for name, (outer, linear, force) in FAMILIES.items():
     # The numbers as the code under test holds them.
     o, l = [mpf(float(v)) for v in outer], [mpf(float(v)) for v in linear]
-    for t in TIMES:
+    for t in TIMES + LATER * name.startswith("unloading"):
         value = (force or series)(mpf(t), o, l)
         words = [name, ",".join(map(repr, map(float, outer))), ",".join(map(repr, map(float, linear)))]
         print(" / ".join(words + [repr(float(t)), mp.nstr(value, 25)]))

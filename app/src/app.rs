@@ -3,17 +3,22 @@
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::force_time::TimeView;
+use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
+use crate::screens::models::ModelsScreen;
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
+use crate::shell::rail::Screen;
 use crate::theme;
 use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
-use crate::workers::folder_dialog::FolderDialog;
+use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
+use crate::workers::select::Selected;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use palpate_model::extremes::Row;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, Runner, Snapshot, StartError};
 use std::sync::Arc;
@@ -44,10 +49,13 @@ pub struct WorkbenchApp {
     pub(crate) form: ProtocolForm,
     pub(crate) library: Result<String, String>,
     pub(crate) ports: Ports,
-    pub(crate) dialog: FolderDialog,
+    pub(crate) dialog: PathDialog,
     pub(crate) plots: PlotCache,
     pub(crate) refitter: Refitter,
     pub(crate) time_view: TimeView,
+    pub(crate) screen: Screen,
+    pub(crate) models: ModelsScreen,
+    pub(crate) extremes: ExtremesScreen,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
     start: Start,
@@ -89,10 +97,13 @@ impl WorkbenchApp {
                 .map(|path| path.display().to_string())
                 .map_err(|err| err.to_string()),
             ports,
-            dialog: FolderDialog::default(),
+            dialog: PathDialog::default(),
             plots: PlotCache::default(),
             refitter: Refitter::default(),
             time_view: TimeView::default(),
+            screen: Screen::default(),
+            models: ModelsScreen::default(),
+            extremes: ExtremesScreen::default(),
             events: EventLog::default(),
             refusal: None,
             start: Start::None,
@@ -113,6 +124,18 @@ impl WorkbenchApp {
     #[must_use]
     pub fn refit(&self) -> Refit<'_> {
         self.refitter.of(self.snapshot.run.as_ref())
+    }
+
+    /// The last comparison of models.
+    #[must_use]
+    pub fn comparison(&self) -> Option<&Result<Selected, String>> {
+        self.models.answer()
+    }
+
+    /// What the last test of the extremes found.
+    #[must_use]
+    pub fn extremes_rows(&self) -> Option<&[Row]> {
+        self.extremes.rows()
     }
 
     /// What the window is in the middle of.
@@ -158,11 +181,16 @@ impl WorkbenchApp {
                 }
                 Command::CloseSession => self.operator(Operator::Close),
                 Command::ListPorts => self.ports.refresh(ctx),
-                Command::ChooseFolder => {
-                    if let Err(err) = self.dialog.open(ctx) {
-                        self.refusal = Some(format!("the folder dialog cannot be opened: {err}"));
+                Command::Choose(ask) => {
+                    if let Err(err) = self.dialog.open(ask, ctx) {
+                        self.refusal = Some(format!("the dialog cannot be opened: {err}"));
                     }
                 }
+                Command::CompareModels => self.models.start(ctx),
+                Command::CancelComparison => self.models.cancel(),
+                Command::TestExtremes => self.extremes.start(ctx),
+                Command::CancelExtremes => self.extremes.cancel(),
+                Command::Show(screen) => self.screen = screen,
                 Command::SwitchTheme => ctx.set_theme(match ctx.theme() {
                     Theme::Dark => Theme::Light,
                     Theme::Light => Theme::Dark,
@@ -242,9 +270,13 @@ impl eframe::App for WorkbenchApp {
         self.snapshot = self.runner.snapshot();
         self.poll_start();
         self.ports.poll();
-        if let Some(folder) = self.dialog.poll() {
-            self.form.folder = folder.display().to_string();
+        match self.dialog.poll() {
+            Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
+            Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),
+            None => {}
         }
+        self.models.poll();
+        self.extremes.poll();
         let rig = &self.snapshot.rig;
         self.form
             .refresh(&rig.description, &self.bench, rig.is_homed);

@@ -1,5 +1,8 @@
 //! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
 
+use crate::shell::rail::Screen;
+use crate::workers::path_dialog::Ask;
+
 /// One thing the user asked for.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Command {
@@ -13,10 +16,20 @@ pub enum Command {
     CloseSession,
     /// List the serial ports again.
     ListPorts,
-    /// Choose the folder for new sessions in a dialog of its own.
-    ChooseFolder,
+    /// Choose a folder or a file in a dialog of its own.
+    Choose(Ask),
+    /// Compare the models of the form.
+    CompareModels,
+    /// End the comparison under way.
+    CancelComparison,
+    /// Test the extremes.
+    TestExtremes,
+    /// End the test under way.
+    CancelExtremes,
     /// Change between the light and the dark theme.
     SwitchTheme,
+    /// Show a screen. What goes on goes on, and the stop control stays.
+    Show(Screen),
 }
 
 /// What was asked for since the app last acted.

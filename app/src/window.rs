@@ -9,6 +9,7 @@ use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, sta
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
 use crate::shell::activity::{Activity, Intent, run_in_progress};
+use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use crate::workers::fit::Refit;
@@ -67,8 +68,8 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("palpate")
-            .with_inner_size(vec2(1280.0, 800.0))
-            .with_min_inner_size(vec2(1100.0, 640.0)),
+            .with_inner_size(vec2(1360.0, 820.0))
+            .with_min_inner_size(vec2(1180.0, 640.0)),
         ..eframe::NativeOptions::default()
     };
     eframe::run_native(
@@ -104,6 +105,33 @@ fn frame(ui: &Ui, is_canvas: bool) -> Frame {
         .stroke(Stroke::NONE)
 }
 
+/// Where a panel stands beside the middle.
+#[derive(Clone, Copy)]
+enum Side {
+    /// What is asked for.
+    Left,
+    /// What is known.
+    Right,
+}
+
+/// A panel beside the middle that scrolls.
+fn side_ui(ui: &mut Ui, side: Side, content: impl FnOnce(&mut Ui)) {
+    let (panel, width) = match side {
+        Side::Left => (Panel::left("left"), LEFT_WIDTH),
+        Side::Right => (Panel::right("right"), RIGHT_WIDTH),
+    };
+    panel
+        .exact_size(width)
+        .resizable(false)
+        .frame(frame(ui, false))
+        .show(ui, |ui| {
+            ScrollArea::vertical()
+                .id_salt("side")
+                .auto_shrink(false)
+                .show(ui, content);
+        });
+}
+
 impl WorkbenchApp {
     /// Draws every panel. Changes nothing but what is typed and pressed.
     pub(crate) fn draw(&mut self, ui: &mut Ui, activity: &Activity, commands: &mut Commands) {
@@ -115,16 +143,52 @@ impl WorkbenchApp {
                 let specimen = &self.form.labels.specimen;
                 top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
             });
-        Panel::left("rig_and_protocol")
-            .exact_size(LEFT_WIDTH)
+        Panel::left("rail")
+            .exact_size(rail::WIDTH)
             .resizable(false)
             .frame(frame(ui, false))
-            .show(ui, |ui| self.left_ui(ui, commands));
+            .show(ui, |ui| rail_ui(ui, self.screen, commands));
         Panel::bottom("log")
             .exact_size(LOG_HEIGHT)
             .resizable(false)
             .frame(frame(ui, true))
             .show(ui, |ui| self.events.ui(ui, &self.snapshot, commands));
+        match self.screen {
+            Screen::Run => self.run_ui(ui, commands),
+            Screen::Models => self.models_ui(ui, commands),
+            Screen::Extremes => self.extremes_ui(ui, commands),
+            Screen::Trade => {}
+        }
+    }
+
+    fn extremes_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        side_ui(ui, Side::Left, |ui| self.extremes.left_ui(ui, commands));
+        side_ui(ui, Side::Right, |ui| self.extremes.right_ui(ui));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.extremes.middle_ui(ui));
+    }
+
+    fn models_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let run = self.snapshot.run.as_ref();
+        let last_run = run
+            .filter(|run| run.outcome.is_some())
+            .map(|run| run.folder.as_path());
+        side_ui(ui, Side::Left, |ui| {
+            self.models.left_ui(ui, last_run, commands);
+        });
+        side_ui(ui, Side::Right, |ui| self.models.right_ui(ui));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.models.middle_ui(ui));
+    }
+
+    fn run_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        Panel::left("rig_and_protocol")
+            .exact_size(LEFT_WIDTH)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| self.left_ui(ui, commands));
         Panel::right("results")
             .exact_size(RIGHT_WIDTH)
             .resizable(false)

@@ -2,18 +2,17 @@
 //!
 //! `cargo run -p palpate-model --example rheos -- example1_data.csv docs/pictures/rheos.svg`
 
+mod drawing;
+
+use drawing::{Axes, BLUE, RED};
 use palpate_model::Seconds;
 use palpate_model::fit::{MaxwellFit, StrainSample, fit_maxwell};
 use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellState};
 use std::error::Error;
-use std::fmt::Write;
 
 /// Plot area of a panel in px: left, top, width, height.
 const LEFT_PANEL: [f64; 4] = [70.0, 60.0, 360.0, 260.0];
 const RIGHT_PANEL: [f64; 4] = [530.0, 60.0, 360.0, 260.0];
-/// Okabe-Ito blue and vermilion.
-const BLUE: &str = "#0072B2";
-const RED: &str = "#D55E00";
 const DASHED: &str = "stroke-dasharray=\"4 5\"";
 
 fn main() -> Result<(), Box<dyn Error>> {
@@ -175,104 +174,4 @@ fn curve(samples: &[StrainSample], body: Maxwell, integrator: Integrator) -> Vec
             (sample.t.0, stress)
         })
         .collect()
-}
-
-struct Axes {
-    panel: [f64; 4],
-    x: (f64, f64),
-    y: (f64, f64),
-}
-
-impl Axes {
-    fn at(&self, (x, y): (f64, f64)) -> (f64, f64) {
-        let [left, top, width, height] = self.panel;
-        let share = |value: f64, (low, high): (f64, f64)| (value - low) / (high - low);
-        (
-            left + width * share(x, self.x),
-            top + height * (1.0 - share(y, self.y)),
-        )
-    }
-
-    fn draw(
-        &self,
-        svg: &mut String,
-        [title, x_title, y_title]: [&str; 3],
-        [x_ticks, y_ticks]: [&[f64]; 2],
-    ) -> std::fmt::Result {
-        let [left, top, width, height] = self.panel;
-        let (right, bottom, middle) = (left + width, top + height, left + 0.5 * width);
-        let (above, below) = (top - 28.0, bottom + 42.0);
-        writeln!(
-            svg,
-            "<text x=\"{left}\" y=\"{above}\" font-weight=\"bold\">{title}</text>"
-        )?;
-        writeln!(
-            svg,
-            "<text x=\"{middle}\" y=\"{below}\" text-anchor=\"middle\">{x_title}</text>"
-        )?;
-        writeln!(
-            svg,
-            "<text x=\"{}\" y=\"{}\">{y_title}</text>",
-            left - 40.0,
-            top - 8.0
-        )?;
-        for &tick in y_ticks {
-            let (x, y) = (left - 8.0, self.at((0.0, tick)).1);
-            writeln!(
-                svg,
-                "<path d=\"M{left} {y:.1}H{right}\" stroke=\"#dddddd\"/>"
-            )?;
-            let y = y + 4.0;
-            writeln!(
-                svg,
-                "<text x=\"{x}\" y=\"{y:.1}\" text-anchor=\"end\">{tick}</text>"
-            )?;
-        }
-        for &tick in x_ticks {
-            let (x, y) = (self.at((tick, 0.0)).0, bottom + 20.0);
-            writeln!(svg, "<path d=\"M{x:.1} {bottom}v5\" stroke=\"black\"/>")?;
-            writeln!(
-                svg,
-                "<text x=\"{x:.1}\" y=\"{y}\" text-anchor=\"middle\">{tick}</text>"
-            )?;
-        }
-        writeln!(
-            svg,
-            "<path d=\"M{left} {top}V{bottom}H{right}\" fill=\"none\" stroke=\"black\"/>"
-        )
-    }
-
-    fn line(
-        &self,
-        svg: &mut String,
-        points: &[(f64, f64)],
-        colour: &str,
-        style: &str,
-    ) -> std::fmt::Result {
-        svg.push_str("<polyline points=\"");
-        for &point in points {
-            let (x, y) = self.at(point);
-            write!(svg, "{x:.1},{y:.1} ")?;
-        }
-        writeln!(
-            svg,
-            "\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"2\" {style}/>"
-        )
-    }
-
-    fn dot(&self, svg: &mut String, at: (f64, f64), colour: &str, radius: f64) -> std::fmt::Result {
-        let (x, y) = self.at(at);
-        writeln!(
-            svg,
-            "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{colour}\"/>"
-        )
-    }
-
-    fn text(&self, svg: &mut String, at: (f64, f64), colour: &str, text: &str) -> std::fmt::Result {
-        let (x, y) = self.at(at);
-        writeln!(
-            svg,
-            "<text x=\"{x:.0}\" y=\"{y:.0}\" fill=\"{colour}\">{text}</text>"
-        )
-    }
 }

@@ -10,6 +10,7 @@
 
 pub mod calibration;
 pub mod expected;
+pub mod extremes;
 pub mod families;
 pub mod fit;
 pub mod integrators;
@@ -17,6 +18,7 @@ mod linalg;
 pub mod random;
 pub mod reference;
 pub mod rig;
+pub mod select;
 pub mod signal;
 pub mod time;
 pub mod tolerance;

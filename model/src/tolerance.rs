@@ -46,6 +46,9 @@ impl Tolerance {
     }
 }
 
+/// How a text ends and what its number is.
+type Kind = (&'static str, fn(f64) -> Tolerance);
+
 impl FromStr for Tolerance {
     type Err = BadTolerance;
 
@@ -54,7 +57,7 @@ impl FromStr for Tolerance {
             text: text.to_owned(),
         };
         let compact: String = text.split_whitespace().collect();
-        let kinds: [(&str, fn(f64) -> Self); 3] = [
+        let kinds: [Kind; 3] = [
             ("%jnd", Self::PercentOfThreshold),
             ("%", Self::PercentOfPeak),
             ("N", |newtons| Self::Newtons(Newtons(newtons))),

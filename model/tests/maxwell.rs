@@ -8,9 +8,12 @@
 
 mod support;
 
-use palpate_model::Seconds;
-use palpate_model::fit::{FitError, StrainSample, fit_maxwell};
+use palpate_model::families;
+use palpate_model::fit::{
+    FamilyOptions, FitError, FitSample, StrainSample, fit_family, fit_maxwell,
+};
 use palpate_model::viscoelastic::{Integrator, Maxwell};
+use palpate_model::{Depth, Newtons, Seconds};
 use std::path::Path;
 use support::Noise;
 
@@ -90,6 +93,24 @@ fn rheos_example_gives_the_published_and_the_exact_values() {
     // Equal factors because strain turns at samples only; bisection leaves 1e-14.
     check(exact.body.eta / published.body.eta, factor, 1e-10);
     check(exact.body.k / published.body.k, factor, 1e-10);
+    // So does the family, whose search knows nothing of this body: the sum of squares is flat to
+    // rounding within 1e-8 of its floor.
+    let rows: Vec<FitSample> = samples
+        .iter()
+        .map(|sample| FitSample {
+            t: sample.t,
+            depth: Depth(sample.strain),
+            force: Newtons(sample.stress),
+            sigma: Newtons(1.0),
+        })
+        .collect();
+    let options = FamilyOptions {
+        offset: false,
+        initial: false,
+    };
+    let family = fit_family(&families::Maxwell, &[("example 1", &rows)], options).unwrap();
+    check(family.model.linear[0], exact.body.k, 1e-7);
+    check(family.model.outer[0], exact.body.tau().0, 1e-7);
 }
 
 #[test]

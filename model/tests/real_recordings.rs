@@ -8,7 +8,9 @@
 )]
 
 use palpate_model::fit::{FitOptions, FitSample, fit};
+use palpate_model::select::{Outcome, SelectOptions, select};
 use palpate_model::{Depth, Newtons, Seconds};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Samples of a CSV file with columns t_s, F_N, x_mm.
@@ -60,4 +62,33 @@ fn perineal_indentation_is_explained() {
     let report = fit(&samples, &FitOptions::default()).unwrap();
     println!("{report:#?}");
     assert!(report.rmse_n <= 3.45e-3, "{report:#?}");
+}
+
+#[test]
+fn no_family_wins_on_tissue_and_a_tolerance_decides() {
+    let Some(samples) = recording("perineal_P002_laser9.csv") else {
+        return;
+    };
+    let records = [("press", samples.as_slice())];
+    let tolerated = |tolerance: Option<&str>| {
+        let options = SelectOptions {
+            tolerance: tolerance.map(|text| text.parse().unwrap()),
+            ..SelectOptions::default()
+        };
+        select(&records, &options, &|_| ControlFlow::Continue(())).unwrap()
+    };
+    let plain = tolerated(None);
+    // What the best family leaves wanders over the record: a criterion proves nothing.
+    assert_eq!(
+        plain.verdict.outcome,
+        Outcome::NoneAdequate,
+        "{:?}",
+        plain.verdict
+    );
+    assert_eq!(plain.verdict.family, None);
+    // Tighter than any family predicts the hold, and as wide as a press shallower than a hand feels.
+    let tight = tolerated(Some("0.5%")).verdict;
+    assert_eq!(tight.outcome, Outcome::NoneWithin, "{tight:?}");
+    let wide = tolerated(Some("10%")).verdict;
+    assert!(wide.family.is_some(), "{wide:?}");
 }

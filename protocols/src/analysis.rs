@@ -23,6 +23,21 @@ pub struct FitSource {
     pub notes: Vec<String>,
 }
 
+/// What of an indentation is read.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Stretch {
+    /// Ramp and hold: what the fit of the modified Kelvin body takes, which knows no unloading.
+    #[default]
+    RampHold,
+    /// The recorded way back as well, where there is one.
+    WithUnload,
+}
+
+/// The probe has left the tissue once a force on the way back is below so many standard deviations: from
+/// there on the cell feels nothing, however the tissue goes on recovering. Of white noise about a force
+/// twice as large, one sample in 700 is that low.
+const LIFT_OFF: f64 = 3.0;
+
 /// Nothing to fit could be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
@@ -60,6 +75,15 @@ pub fn read(path: &Path) -> Result<FitSource, SourceError> {
 
 /// As [`read`]; `columns` names the columns of a table that has no header.
 pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSource, SourceError> {
+    read_stretch(path, columns, Stretch::RampHold)
+}
+
+/// As [`read_named`], of the stretch that is asked for. A table without phases is taken whole.
+pub fn read_stretch(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+    stretch: Stretch,
+) -> Result<FitSource, SourceError> {
     let is_session = path.is_dir()
         || path
             .extension()
@@ -67,19 +91,19 @@ pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSourc
     if !is_session && path.exists() {
         let table = read_table(path, columns)?;
         return Ok(FitSource {
-            samples: samples_of_table(&table),
+            samples: samples_of_table(&table, stretch),
             start: Seconds(0.0),
             notes: table.notes,
         });
     }
     let session = Session::open(path)?;
-    let samples = samples_of(&session)?;
+    let samples = samples_of(&session, stretch)?;
     let start = start_of(&session);
     let mut notes = session.notes;
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
     if censored > 0 {
         notes.push(format!(
-            "{censored} samples count with their depth only: the converter was at the end of its range, or an interlock had tripped"
+            "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, or the probe had left the tissue"
         ));
     }
     Ok(FitSource {
@@ -89,10 +113,11 @@ pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSourc
     })
 }
 
-/// The ramp and hold of a session, each force weighted by what the signal's noise and the
+/// What a fit takes of a session, each force weighted by what the signal's noise and the
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
-/// one at an end of the converter's range, and every one after an interlock.
-pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
+/// one at an end of the converter's range, every one after an interlock, and every one after the probe
+/// has left the tissue on the way back.
+pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
     let bad = |detail: String| SourceError::Calibration { detail };
     let calibration: Calibration = serde_json::from_value(session.manifest.calibration.clone())
         .map_err(|err| bad(err.to_string()))?;
@@ -103,14 +128,16 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     let trusted = trusted_samples(&decisions);
     let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
-    let mut first_tick = None;
+    let (mut first_tick, mut is_lifted_off) = (None, false);
     let samples: Vec<FitSample> = rows
-        .filter(|(_, row)| is_fitted(row))
+        .filter(|(_, row)| is_fitted(row, stretch))
         .filter_map(|(index, row)| {
             let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
             let first_tick = *first_tick.get_or_insert(row.tick);
-            let sigma = if is_known(index, row) {
-                curve.force_sigma(force, noise)
+            let sigma = curve.force_sigma(force, noise);
+            is_lifted_off |= row.phase == Phase::Unload && force.0 < LIFT_OFF * sigma.0;
+            let sigma = if is_known(index, row) && !is_lifted_off {
+                sigma
             } else {
                 Newtons(f64::INFINITY)
             };
@@ -129,8 +156,13 @@ pub fn samples_of(session: &Session) -> Result<Vec<FitSample>, SourceError> {
     }
 }
 
-fn is_fitted(row: &Row) -> bool {
-    matches!(row.phase, Phase::Ramp | Phase::Hold) && row.force.is_some() && row.depth.is_some()
+fn is_fitted(row: &Row, stretch: Stretch) -> bool {
+    let is_asked = match row.phase {
+        Phase::Ramp | Phase::Hold => true,
+        Phase::Unload => stretch == Stretch::WithUnload,
+        _ => false,
+    };
+    is_asked && row.force.is_some() && row.depth.is_some()
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
@@ -166,7 +198,10 @@ fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
 
 /// Session time of the first sample that a fit takes.
 fn start_of(session: &Session) -> Seconds {
-    let first = session.rows.iter().find(|row| is_fitted(row));
+    let first = session
+        .rows
+        .iter()
+        .find(|row| is_fitted(row, Stretch::RampHold));
     first.map_or(Seconds(0.0), |row| row.host.seconds())
 }
 
@@ -179,8 +214,9 @@ fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
 }
 
 /// A table knows nothing of its noise: every sample counts alike.
-fn samples_of_table(table: &palpate_sessions::import::Table) -> Vec<FitSample> {
+fn samples_of_table(table: &palpate_sessions::import::Table, stretch: Stretch) -> Vec<FitSample> {
     (0..table.t.len())
+        .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])
         .map(|i| FitSample {
             t: Seconds(table.t[i]),
             depth: Depth(table.depth[i]),
@@ -205,7 +241,7 @@ mod tests {
     fn a_saturated_converter_does_not_bend_the_fit() {
         let mut session = recorded("ramp-hold-lab");
         let options = FitOptions::default();
-        let whole = fit(&samples_of(&session).unwrap(), &options).unwrap();
+        let whole = fit(&samples_of(&session, Stretch::RampHold).unwrap(), &options).unwrap();
         assert_eq!(whole.censored, 0);
         let adc = session.manifest.rig.adc.unwrap();
         let hold = session
@@ -224,7 +260,7 @@ mod tests {
             row.force = Some(if is_low { -9.0 } else { 90.0 });
             expected += 1;
         }
-        let samples = samples_of(&session).unwrap();
+        let samples = samples_of(&session, Stretch::RampHold).unwrap();
         let report = fit(&samples, &options).unwrap();
         assert!(expected > 0 && report.censored == expected);
         for (one, other) in whole.parameters.iter().zip(&report.parameters) {
@@ -238,8 +274,12 @@ mod tests {
     #[test]
     fn forces_after_an_interlock_do_not_count() {
         let mut session = recorded("ramp-hold-lab");
-        let samples = samples_of(&session).unwrap();
-        let first = session.rows.iter().position(is_fitted).unwrap();
+        let samples = samples_of(&session, Stretch::RampHold).unwrap();
+        let first = session
+            .rows
+            .iter()
+            .position(|row| is_fitted(row, Stretch::RampHold))
+            .unwrap();
         let tripped = Effect::Record(Record::InterlockTripped {
             interlock: crate::engine::Interlock::Signal,
             reason: "on purpose".into(),
@@ -251,7 +291,7 @@ mod tests {
             now: palpate_model::Nanos::ZERO,
             body: serde_json::to_value(&tripped).unwrap(),
         });
-        let censored = samples_of(&session).unwrap();
+        let censored = samples_of(&session, Stretch::RampHold).unwrap();
         assert_eq!(censored.len(), samples.len());
         let measured = censored.iter().take_while(|one| one.is_measured()).count();
         assert_eq!(measured, 100);

@@ -169,7 +169,11 @@ impl Walk<'_> {
                 let secs = self.move_secs(distance, speed);
                 (secs, secs)
             }
-            Step::Retract {
+            Step::Unload {
+                speed,
+                clearance_mm,
+            }
+            | Step::Retract {
                 speed,
                 clearance_mm,
             } => {

@@ -1,5 +1,6 @@
 //! Fixtures shared by the tests that cross crates.
 
+pub mod flow;
 pub mod simulated;
 
 use std::path::{Path, PathBuf};

@@ -19,7 +19,7 @@ fn request(rig: &SimRig, out: &Path) -> RunRequest {
         speed: MmPerS(3.0),
         depth: Depth(12.0),
         hold: Seconds(2.0),
-        until: None,
+        ..RampHold::default()
     };
     RunRequest {
         plan: params.plan(),

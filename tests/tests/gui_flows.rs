@@ -1,183 +1,20 @@
 //! Flows through the window by accessible name: no display, no graphics card, no pixels.
-//!
-//! Every wait is bounded by a count of frames, so a flow that hangs fails instead.
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;
-use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_app::app::WorkbenchApp;
-use palpate_app::report::text::{self, ParameterText};
+use egui_kittest::kittest::Queryable;
+use palpate_app::report::text;
 use palpate_app::screens::exact_fit::exact_ui;
 use palpate_app::shell::activity::{is_motion_possible, run_in_progress};
 use palpate_app::shell::frame_meter::thread_cpu_s;
-use palpate_app::window::WindowOptions;
-use palpate_app::workers::fit::{Refit, fit_source};
-use palpate_drivers::sim::SimSettings;
-use palpate_model::fit::{FitOptions, FitReport, Parameter};
+use palpate_app::workers::fit::Refit;
+use palpate_model::fit::{FitReport, Parameter};
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
-use palpate_protocols::runner::{LogLine, RunView, TimeScale};
+use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
-use std::path::PathBuf;
-use std::time::Duration;
-use tempfile::TempDir;
-
-type Window = Harness<'static, WorkbenchApp>;
-
-/// Sleep between two frames of a wait.
-const FRAME: Duration = Duration::from_millis(5);
-
-/// Most frames of a wait: over a minute, ten times what the slowest flow took on two slow cores.
-const FRAMES_MAX: usize = 12_000;
-
-struct Flow {
-    window: Window,
-    folder: TempDir,
-}
-
-impl Flow {
-    fn open(scale: TimeScale) -> Self {
-        let folder = tempfile::tempdir().unwrap();
-        let settings = SimSettings {
-            seed: 7,
-            ..SimSettings::default()
-        };
-        let mut options = WindowOptions::open("sim", &settings, scale).unwrap();
-        options.sessions = Some(folder.path().to_path_buf());
-        let window = Harness::builder()
-            .with_size((1280.0, 800.0))
-            .build_eframe(|cc| WorkbenchApp::new(options, &cc.egui_ctx).unwrap());
-        let mut flow = Self { window, folder };
-        flow.wait("the first sample", |window| {
-            window.state().snapshot().rig.reading.is_some()
-        });
-        flow
-    }
-
-    /// Draws frames until `is_done`.
-    fn wait(&mut self, what: &str, is_done: impl Fn(&Window) -> bool) {
-        for _ in 0..FRAMES_MAX {
-            self.window.step();
-            if is_done(&self.window) {
-                return;
-            }
-            std::thread::sleep(FRAME);
-        }
-        panic!("{what} did not come; {}", self.story());
-    }
-
-    /// What happened so far, for a failure's message.
-    fn story(&self) -> String {
-        let lines = self.run().map_or(Vec::new(), |run| {
-            let text = |line: &LogLine| format!("{} {}", line.at, line.text);
-            run.events.iter().map(text).collect()
-        });
-        format!("the events were:\n{}", lines.join("\n"))
-    }
-
-    fn wait_for_phase(&mut self, phase: Phase) {
-        let is_there = |run: &RunView| run.phase == phase;
-        let is_stopped = |run: &RunView| run.holding.is_some() || run.outcome.is_some();
-        self.wait(phase.name(), |window| {
-            let run = window.state().snapshot().run.as_ref();
-            run.is_some_and(|run| is_there(run) || is_stopped(run))
-        });
-        assert!(
-            self.run().is_some_and(|run| is_there(&run)),
-            "{}",
-            self.story()
-        );
-    }
-
-    fn run(&self) -> Option<RunView> {
-        self.window.state().snapshot().run.clone()
-    }
-
-    fn type_into(&mut self, name: &str, text: &str) {
-        self.window.get_by_label(name).focus();
-        self.window.step();
-        self.window
-            .get_by_label(name)
-            .set_text_value_accesskit(text);
-        self.window.run_steps(2);
-    }
-
-    fn click(&mut self, name: &str) {
-        // By name and not by place: a control may be scrolled out of sight.
-        self.window.get_by_label(name).click_accesskit();
-        self.window.run_steps(2);
-    }
-
-    fn is_enabled(&self, name: &str) -> bool {
-        !self
-            .window
-            .get_by_label(name)
-            .accesskit_node()
-            .is_disabled()
-    }
-
-    fn says(&self, words: &str) -> bool {
-        self.window
-            .query_all_by_label_contains(words)
-            .next()
-            .is_some()
-    }
-
-    fn sessions(&self) -> Vec<PathBuf> {
-        std::fs::read_dir(self.folder.path())
-            .unwrap()
-            .map(|item| item.unwrap().path())
-            .collect()
-    }
-
-    /// Waits for the exact fit of the last session; the window must then say of it what
-    /// `palpate fit` prints, be it a report or a refusal. Returns the report.
-    fn same_words_as_the_command_line(&mut self) -> Option<FitReport> {
-        self.wait("the exact fit", |window| {
-            matches!(window.state().refit(), Refit::Done(_) | Refit::Refused(_))
-        });
-        self.window.run_steps(2);
-        let session = self.sessions().pop().unwrap();
-        let fitted = fit_source(&session, None, &FitOptions::default());
-        let result = match fitted {
-            Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
-            Err(err) => Err(err.to_string()),
-        };
-        match result {
-            Ok(report) => {
-                self.says_all_of(&report);
-                Some(report)
-            }
-            Err(reason) => {
-                assert!(self.says(&format!("No exact fit: {reason}")), "{reason}");
-                None
-            }
-        }
-    }
-
-    fn says_all_of(&self, report: &FitReport) {
-        let printed = text::whole(report);
-        let mut words: Vec<String> = report.sentences().map(String::from).collect();
-        words.push(text::quality(report));
-        for parameter in &report.parameters {
-            let text = ParameterText::of(parameter);
-            words.extend([text.name, text.value, text.unit, text.interval]);
-        }
-        for word in words {
-            assert!(self.says(&word), "the window does not say '{word}'");
-            assert!(printed.contains(&word), "'{word}' is not in:\n{printed}");
-        }
-    }
-
-    fn wait_for_end(&mut self) -> RunView {
-        self.wait("the end of the run", |window| {
-            let run = window.state().snapshot().run.as_ref();
-            run.is_some_and(|run| run.outcome.is_some())
-        });
-        self.run().unwrap()
-    }
-}
+use palpate_tests::flow::{FRAME, Flow, Window};
 
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {

@@ -24,6 +24,7 @@ fn run_until(relative: f64) -> Session {
         depth: Depth(12.0),
         hold: Seconds(20.0),
         until: Some(HoldUntil::new(BodyParameter::TauEps, relative)),
+        ..RampHold::default()
     };
     let request = RunRequest {
         plan: params.plan(),
@@ -146,7 +147,7 @@ fn the_last_live_answer_is_the_fit_of_a_run_on_the_lab_rig() {
         speed: MmPerS(3.0),
         depth: Depth(12.0),
         hold: Seconds(2.0),
-        until: None,
+        ..RampHold::default()
     };
     let settings = SimSettings {
         seed: 11,

@@ -12,7 +12,7 @@ fn short() -> RampHold {
         speed: MmPerS(3.0),
         depth: Depth(12.0),
         hold: Seconds(2.0),
-        until: None,
+        ..RampHold::default()
     }
 }
 
@@ -25,6 +25,7 @@ fn ramp_and_hold_finishes_on_every_kind_of_simulated_rig() {
                     profile,
                     seed,
                     clock,
+                    ..SimSettings::default()
                 };
                 let run = run(settings, short());
                 let outcome = run
@@ -55,6 +56,7 @@ fn contact_is_found_where_the_tissue_is_and_hardly_pressed() {
                     profile,
                     seed,
                     clock: SimClock::Nominal,
+                    ..SimSettings::default()
                 },
                 short(),
             );

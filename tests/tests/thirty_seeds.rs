@@ -42,6 +42,7 @@ fn fits(profile: SimProfile, is_contact_known: bool) -> Vec<(FitReport, [f64; 5]
                 profile,
                 seed,
                 clock: SimClock::Nominal,
+                ..SimSettings::default()
             };
             let run = run(settings, RampHold::default());
             let found = run.state.contact().expect("contact");

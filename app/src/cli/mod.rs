@@ -1,6 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
 mod export;
+mod extremes;
 mod fit;
 mod info;
 mod last_fit;
@@ -9,6 +10,7 @@ mod plan;
 mod replay;
 mod rig;
 mod run;
+mod select;
 mod trade;
 
 use clap::error::ErrorKind;
@@ -35,12 +37,16 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Compare model families and recommend the cheapest that will do
+    Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
     Plan(plan::PlanArgs),
     /// Measure error against time on this machine and recommend what to use
     Trade(trade::TradeArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
+    /// Test numerical stability at the extremes, every family, integrator and fit
+    Extremes(extremes::ExtremesArgs),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -115,9 +121,11 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
+        Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
     };

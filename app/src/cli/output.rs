@@ -64,6 +64,11 @@ impl Output {
         self.bar_like(length, "{bar:30} {pos} of {len}  {eta} left  {msg}")
     }
 
+    /// A progress bar over one long piece of work that tells the time left.
+    pub fn share_bar(&self, length: u64) -> ProgressBar {
+        self.bar_like(length, "{bar:30} {percent:>3} %  {eta} left  {msg}")
+    }
+
     fn bar_like(&self, length: u64, template: &str) -> ProgressBar {
         let bar = ProgressBar::new(length);
         if self.is_json {

@@ -4,7 +4,7 @@ use super::Failure;
 use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
-use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
+use palpate_drivers::sim::{SimClock, SimProfile, SimSettings, SimSoftening};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
@@ -25,6 +25,9 @@ pub struct RigArgs {
     /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
     #[arg(long, default_value = "nominal")]
     pub clock: SimClock,
+    /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
+    #[arg(long, default_value = "0", value_name = "PERCENT")]
+    pub softening: SimSoftening,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -37,6 +40,7 @@ impl Default for RigArgs {
             profile: SimProfile::Lab,
             seed: 1,
             clock: SimClock::Nominal,
+            softening: SimSoftening::default(),
             time_scale: TimeScale::Factor(1.0),
         }
     }
@@ -50,6 +54,7 @@ impl RigArgs {
             profile: self.profile,
             seed: self.seed,
             clock: self.clock,
+            softening: self.softening,
         }
     }
 }

@@ -40,6 +40,9 @@ pub struct RampHoldArgs {
     /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
     #[arg(long, value_name = "PARAMETER=SHARE", value_parser = HoldUntil::parse)]
     hold_until: Option<HoldUntil>,
+    /// After the hold come back to the surface at this speed in mm/s, recorded for a fit of unloading
+    #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
+    unload: Option<f64>,
     #[command(flatten)]
     rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
@@ -94,6 +97,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         depth: Depth(args.depth),
         hold: Seconds(args.hold),
         until: args.hold_until,
+        unload: args.unload.map(MmPerS),
     };
     let bench = super::rig::open(&args.rig)?;
     let request = RunRequest {

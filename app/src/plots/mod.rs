@@ -2,6 +2,7 @@
 
 pub mod force_depth;
 pub mod force_time;
+pub mod log_scatter;
 mod points;
 pub mod residual;
 pub(crate) mod style;

@@ -1,7 +1,13 @@
-//! A fit as people read it: the strings that window, command line and pictures share, and the
-//! picture itself.
+//! Results as people read them: the strings of a fit and of a selection that window, command line and
+//! pictures share, the pictures themselves, and the page of the extremes.
 
+pub mod extremes;
+pub mod family;
 pub mod picture;
+pub mod selection;
+mod selection_plot;
 pub(crate) mod svg;
 pub mod text;
 pub mod thin;
+
+pub use selection_plot::of_selection;

@@ -8,12 +8,12 @@ use crate::theme::tokens::LIGHT;
 use palpate_model::fit::{FitReport, FitSample};
 
 /// Width of a picture in px.
-const WIDTH: f64 = 960.0;
+pub(super) const WIDTH: f64 = 960.0;
 /// Left and right edge of what is drawn.
-const LEFT: f64 = 76.0;
-const RIGHT: f64 = 936.0;
+pub(super) const LEFT: f64 = 76.0;
+pub(super) const RIGHT: f64 = 936.0;
 /// Height of a line of text.
-const LINE: f64 = 20.0;
+pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
 const LETTERS: usize = 120;
 
@@ -76,21 +76,21 @@ pub fn of_refusal(source: &str, samples: &[FitSample], sentence: &str) -> String
 }
 
 /// From the first sample to the last, in s. A refused record may have times out of order.
-fn span(samples: &[FitSample]) -> [f64; 2] {
+pub(super) fn span(samples: &[FitSample]) -> [f64; 2] {
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
     let passed = samples.iter().map(|sample| sample.t.0 - start);
     let last = passed.filter(|t| t.is_finite()).fold(0.0, f64::max);
     [0.0, if last > 0.0 { last } else { 1.0 }]
 }
 
-fn look() -> Look {
+pub(super) fn look() -> Look {
     Look {
         text: LIGHT.text_quiet,
         grid: LIGHT.line,
     }
 }
 
-fn title(svg: &mut Svg, source: &str, line: &str) {
+pub(super) fn title(svg: &mut Svg, source: &str, line: &str) {
     let ink = Ink {
         size: 18.0,
         ..Ink::plain(LIGHT.text)
@@ -99,7 +99,7 @@ fn title(svg: &mut Svg, source: &str, line: &str) {
     svg.text([LEFT, 50.0], Ink::plain(LIGHT.text_quiet), line);
 }
 
-fn legend(svg: &mut Svg) {
+pub(super) fn legend(svg: &mut Svg) {
     for (i, (name, color)) in [("measured", LIGHT.series), ("fitted", LIGHT.limit)]
         .into_iter()
         .enumerate()
@@ -136,7 +136,7 @@ fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
 }
 
 /// A sentence from `y` on, wrapped; returns where the next one may begin.
-fn sentence_lines(svg: &mut Svg, mut y: f64, ink: Ink, sentence: &str) -> f64 {
+pub(super) fn sentence_lines(svg: &mut Svg, mut y: f64, ink: Ink, sentence: &str) -> f64 {
     for line in wrap(sentence, LETTERS) {
         svg.text([LEFT, y], ink.anchored(Anchor::Start), &line);
         y += FONT + 5.0;

@@ -39,6 +39,8 @@ pub struct ProtocolForm {
     pub hold: QuantityField,
     /// End the hold when tau is known to so many percent; empty for the whole hold.
     pub until: QuantityField,
+    /// Speed in mm/s of a recorded way back; empty for none.
+    pub unload: QuantityField,
     /// Folder for new sessions; empty for the library.
     pub folder: String,
     acknowledged: Vec<String>,
@@ -46,7 +48,7 @@ pub struct ProtocolForm {
 }
 
 /// What a preview depends on: the texts and whether the axis is homed.
-type CheckKey = ([String; 4], bool);
+type CheckKey = ([String; 5], bool);
 
 /// A plan whose fields are all valid numbers, with its preview.
 #[derive(Clone, Debug)]
@@ -69,7 +71,8 @@ impl Default for ProtocolForm {
             speed: QuantityField::new(params.speed.0),
             depth: QuantityField::new(params.depth.0),
             hold: QuantityField::new(params.hold.0),
-            until: no_rule(),
+            until: empty(),
+            unload: empty(),
             folder: String::new(),
             acknowledged: Vec::new(),
             checked: None,
@@ -80,8 +83,14 @@ impl Default for ProtocolForm {
 impl ProtocolForm {
     /// Checks the fields and previews the plan again, if anything it depends on changed.
     pub fn refresh(&mut self, rig: &RigDescription, bench: &Bench, is_homed: bool) {
-        let texts =
-            [&self.speed, &self.depth, &self.hold, &self.until].map(|field| field.text.clone());
+        let fields = [
+            &self.speed,
+            &self.depth,
+            &self.hold,
+            &self.until,
+            &self.unload,
+        ];
+        let texts = fields.map(|field| field.text.clone());
         let key = (texts, is_homed);
         if self.checked.as_ref().is_some_and(|(old, _)| *old == key) {
             return;
@@ -90,11 +99,8 @@ impl ProtocolForm {
         self.depth
             .check(|depth| check_depth(depth, rig, &bench.limits));
         self.hold.check(check_hold);
-        if self.until.text.trim().is_empty() {
-            self.until = no_rule();
-        } else {
-            self.until.check(|percent| rule(percent).check());
-        }
+        check_optional(&mut self.until, |percent| rule(percent).check());
+        check_optional(&mut self.unload, |speed| rig.check_speed(MmPerS(speed)));
         let checked = self.params().map(|params| Checked {
             preview: preview(&params.plan(), rig, &bench.limits, &bench.curve, is_homed),
             params,
@@ -108,10 +114,8 @@ impl ProtocolForm {
             speed: MmPerS(value(&self.speed)?),
             depth: Depth(value(&self.depth)?),
             hold: Seconds(value(&self.hold)?),
-            until: match value(&self.until)? {
-                percent if self.until.text.is_empty() && percent == 0.0 => None,
-                percent => Some(rule(percent)),
-            },
+            until: optional(&self.until)?.map(rule),
+            unload: optional(&self.unload)?.map(MmPerS),
         })
     }
 
@@ -147,6 +151,7 @@ impl ProtocolForm {
             ("depth", &self.depth),
             ("hold", &self.hold),
             ("end of the hold", &self.until),
+            ("unload speed", &self.unload),
         ] {
             if field.value.is_err() {
                 return Err(format!("correct the {name} first"));
@@ -195,12 +200,27 @@ impl ProtocolForm {
     }
 }
 
-/// The empty field: the hold takes its whole time.
-fn no_rule() -> QuantityField {
+/// A field that asks for nothing.
+fn empty() -> QuantityField {
     QuantityField {
         text: String::new(),
         value: Ok(0.0),
     }
+}
+
+/// Checks a field that may be empty.
+fn check_optional(field: &mut QuantityField, check: impl FnOnce(f64) -> Result<(), String>) {
+    if field.text.trim().is_empty() {
+        *field = empty();
+    } else {
+        field.check(check);
+    }
+}
+
+/// The value of a field that may be empty; the outer `None` where it is wrong.
+fn optional(field: &QuantityField) -> Option<Option<f64>> {
+    let value = field.value.as_ref().ok().copied()?;
+    Some((!field.text.is_empty()).then_some(value))
 }
 
 fn rule(percent: f64) -> HoldUntil {
@@ -312,6 +332,21 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn an_unload_speed_adds_a_recorded_way_back() {
+        let (rig, bench) = bench();
+        let mut form = ProtocolForm::default();
+        form.unload.text = "0.6".into();
+        form.refresh(&rig, &bench, false);
+        let unload = form.checked().unwrap().params.unload;
+        assert_eq!(unload, Some(MmPerS(0.6)));
+        let plan = form.request(&bench).unwrap().plan;
+        assert_eq!(plan.steps.len(), RampHold::default().plan().steps.len() + 1);
+        form.unload.text = "0.601".into();
+        form.refresh(&rig, &bench, false);
+        assert!(form.verdict().unwrap_err().contains("unload speed"));
     }
 
     #[test]

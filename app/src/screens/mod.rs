@@ -2,7 +2,9 @@
 
 pub mod after_stop;
 pub mod exact_fit;
+pub mod extremes;
 pub mod form;
+pub mod models;
 pub mod parameters;
 pub mod preview_view;
 pub mod protocol_panel;

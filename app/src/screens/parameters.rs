@@ -145,7 +145,7 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
         | Phase::Rest => "the probe has not indented",
         Phase::Ramp => "more of the ramp is needed",
         Phase::Hold => "more of the hold is needed",
-        Phase::Retract | Phase::Stopped | Phase::Ended | Phase::Jog => {
+        Phase::Unload | Phase::Retract | Phase::Stopped | Phase::Ended | Phase::Jog => {
             "the ramp and hold were too short"
         }
     };

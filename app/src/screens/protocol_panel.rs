@@ -7,6 +7,7 @@ use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{form_label, quantity_ui, text_ui};
 use crate::widgets::reason_button::reason_button;
+use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, RichText, TextEdit, Ui, vec2};
 
 /// What the panel must know beside the form.
@@ -52,6 +53,7 @@ fn fields_ui(
     quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
     quantity_ui(ui, "hold", "s", &mut form.hold);
     quantity_ui(ui, "end at", "% of tau known", &mut form.until);
+    quantity_ui(ui, "unload", "mm/s, recorded", &mut form.unload);
     folder_ui(ui, form, facts, commands);
 }
 
@@ -76,7 +78,7 @@ fn folder_ui(
         ui.add(input).labelled_by(label.id);
         let button = Button::new("Choose...");
         if ui.add_enabled(!facts.is_dialog_open, button).clicked() {
-            commands.push(Command::ChooseFolder);
+            commands.push(Command::Choose(Ask::NewSessions));
         }
     });
     if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {

@@ -1,5 +1,6 @@
 //! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
 
+use super::rail::Screen;
 use crate::command::{Command, Commands};
 use eframe::egui::{Context, InputState, Key};
 
@@ -30,6 +31,11 @@ impl Keys {
             for (key, command) in KEYS {
                 if is_pressed(input, key) {
                     commands.push(command);
+                }
+            }
+            for screen in Screen::ALL {
+                if input.modifiers.command && is_pressed(input, screen.key()) {
+                    commands.push(Command::Show(screen));
                 }
             }
         });

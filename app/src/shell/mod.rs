@@ -4,4 +4,5 @@ pub mod activity;
 pub mod event_log;
 pub mod frame_meter;
 pub mod keys;
+pub mod rail;
 pub mod top_bar;

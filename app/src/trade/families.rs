@@ -163,7 +163,8 @@ fn job<'a>(key: &str) -> Result<Job<'a>, String> {
     let linear = vec![0.01; family.linear().len()];
     let start = family
         .model(&outer, &linear)
-        .and_then(|model| model.at_rest_from(Depth(0.0)))
+        .map_err(|err| err.to_string())?
+        .at_rest_from(Depth(0.0))
         .map_err(|err| err.to_string())?;
     let depths: Vec<Depth> = (0..RUN)
         .map(|i| Depth(30.0 * i as f64 / RUN as f64))

@@ -5,4 +5,6 @@ pub mod quantity_input;
 pub mod reason_button;
 pub mod state_badge;
 pub mod step_mark;
+pub mod table;
+pub mod task_bar;
 pub mod uncertain;

@@ -1,9 +1,12 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
+pub mod extremes;
 pub mod fit;
-pub mod folder_dialog;
+pub mod path_dialog;
 pub mod pool;
 pub mod ports;
+pub mod select;
+pub mod task;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 

@@ -307,3 +307,86 @@ fn more_intervals_come_on_request_and_repeat_with_their_seed() {
     assert!(text.contains("95 % from the profile likelihood"), "{text}");
     assert!(text.contains("95 % from the bootstrap, seed 4"), "{text}");
 }
+
+#[test]
+fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = "run ramp-hold --speed 3 --depth 20 --hold 5 --unload 0.3 --softening 40 --profile ideal \
+               --time-scale max --out loop";
+    succeeded(&palpate(at, &run.split_whitespace().collect::<Vec<_>>()));
+    let picture = ["--picture", "loop.svg", "--json"];
+    let args = ["fit", "loop", "--family", "unloading-3", "--unload"];
+    let output = palpate(at, &[&args[..], &picture].concat());
+    succeeded(&output);
+    let found = json(&output);
+    assert_eq!(found["family"], "unloading-3");
+    let names: Vec<&str> = found["parameters"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| {
+            assert!(one["value"].is_f64() && one["unit"].is_string());
+            one["name"].as_str().unwrap()
+        })
+        .collect();
+    assert_eq!(
+        names,
+        ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "s1", "s2", "s3"]
+    );
+    let record = &found["records"][0];
+    let number = |name: &str| record[name].as_f64().unwrap();
+    assert!(number("r2") > 0.9 && number("rmse_n") < 0.03, "{record}");
+    // Energy is lost over the loop, and the fit knows how much to a hundredth.
+    let (measured, fitted) = (number("work_measured_n_mm"), number("work_fitted_n_mm"));
+    assert!(
+        measured > 0.5 && (fitted / measured - 1.0).abs() < 0.01,
+        "{record}"
+    );
+    let drawn = std::fs::read_to_string(at.join("loop.svg")).unwrap();
+    assert!(drawn.contains("depth (mm)") && drawn.contains("softer after greater depth"));
+    assert!(!drawn.contains("NaN"));
+    // Text says the same; two sources are two records of one body.
+    let output = palpate(at, &["fit", "loop", "loop", "--family", "maxwell"]);
+    succeeded(&output);
+    let text = stdout(&output);
+    assert!(
+        text.starts_with("Maxwell") && text.matches("rmse").count() == 2,
+        "{text}"
+    );
+
+    for (args, code, words) in [
+        (
+            &["--family", "unloading-3"][..],
+            1,
+            "give a record with its unloading",
+        ),
+        (
+            &["--family", "spring"],
+            2,
+            "there is no model family 'spring'",
+        ),
+        (&["--unload"], 2, "--family"),
+        (
+            &["--family", "voigt", "--profile"],
+            2,
+            "cannot be used with",
+        ),
+        (
+            &["--family", "voigt", "--picture", "loop.svg"],
+            2,
+            "exists already",
+        ),
+    ] {
+        let output = palpate(at, &[&["fit", "loop"][..], args].concat());
+        assert_eq!(output.status.code(), Some(code), "{args:?}");
+        assert!(
+            stderr(&output).contains(words),
+            "{args:?}: {}",
+            stderr(&output)
+        );
+    }
+    let output = palpate(at, &["run", "ramp-hold", "--softening", "95"]);
+    assert_eq!(output.status.code(), Some(2));
+    assert!(stderr(&output).contains("0 to 90"), "{}", stderr(&output));
+}

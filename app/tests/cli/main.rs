@@ -1,8 +1,10 @@
 //! The command line as a user meets it: whole commands, their exit codes and their sentences.
 
 mod disk;
+mod extremes;
 mod fit;
 mod plan;
+mod select;
 mod trade;
 
 use serde_json::Value;

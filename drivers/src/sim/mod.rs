@@ -16,7 +16,7 @@ mod tissue;
 pub use load_cell::calibration;
 pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
 pub(crate) use random::{Cause, Random};
-pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
+pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
@@ -112,7 +112,8 @@ impl SimRig {
         let tick = description.tick();
         let mut machine = Random::new(settings.seed, Cause::Machine);
         let slider = Slider::new(&description, &mut machine);
-        let tissue = Tissue::new(&mut Random::new(settings.seed, Cause::Tissue));
+        let mut specimen = Random::new(settings.seed, Cause::Tissue);
+        let tissue = Tissue::new(&mut specimen, settings.softening);
         // The controller was switched on up to a minute and a half before the host looked.
         let tick_count = machine.between(1.0, 1e5) as u64;
         let truth = Truth {

@@ -36,6 +36,28 @@ impl SimClock {
     }
 }
 
+/// How much softer the simulated tissue is where it has been deeper: the largest share of its elastic force
+/// that is lost, in whole percent, 0 to 90.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct SimSoftening(u8);
+
+/// Largest percentage: tissue that loses more would not come back by itself.
+const SOFTENING_MAX: u8 = 90;
+
+impl SimSoftening {
+    /// So many percent; `None` above 90.
+    #[must_use]
+    pub fn percent(percent: u8) -> Option<Self> {
+        (percent <= SOFTENING_MAX).then_some(Self(percent))
+    }
+
+    /// The share, 0 to 0.9.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        f64::from(self.0) / 100.0
+    }
+}
+
 /// Everything that determines a simulated rig.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct SimSettings {
@@ -45,6 +67,8 @@ pub struct SimSettings {
     pub seed: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
+    /// What the tissue loses by having been deeper.
+    pub softening: SimSoftening,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -70,17 +94,22 @@ impl SimSettingError {
 }
 
 impl SimSettings {
-    /// The settings as a rig's description carries them: `profile`, `seed`, `clock`.
+    /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where the
+    /// tissue softens, `softening` in percent.
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
-        BTreeMap::from([
+        let mut map = BTreeMap::from([
             ("profile".to_owned(), self.profile.to_string()),
             ("seed".to_owned(), self.seed.to_string()),
             ("clock".to_owned(), self.clock.to_string()),
-        ])
+        ]);
+        if self.softening != SimSoftening::default() {
+            map.insert("softening".to_owned(), self.softening.to_string());
+        }
+        map
     }
 
-    /// The inverse of [`SimSettings::to_map`]; all three values must be there, others are ignored.
+    /// The inverse of [`SimSettings::to_map`]; other values are ignored.
     pub fn from_map(map: &BTreeMap<String, String>) -> Result<Self, SimSettingError> {
         let text = |name: &str| map.get(name).map_or("", String::as_str);
         let seed = text("seed");
@@ -90,6 +119,10 @@ impl SimSettings {
                 .parse()
                 .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
             clock: text("clock").parse()?,
+            softening: match map.get("softening") {
+                Some(text) => text.parse()?,
+                None => SimSoftening::default(),
+            },
         })
     }
 }
@@ -111,6 +144,20 @@ impl FromStr for SimProfile {
             "ideal" => Ok(Self::Ideal),
             _ => Err(SimSettingError::new("profile", text, "'lab' or 'ideal'")),
         }
+    }
+}
+
+impl fmt::Display for SimSoftening {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.0.fmt(f)
+    }
+}
+
+impl FromStr for SimSoftening {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let percent = text.parse().ok().and_then(Self::percent);
+        percent.ok_or_else(|| SimSettingError::new("softening", text, "0 to 90 (whole percent)"))
     }
 }
 
@@ -142,12 +189,18 @@ mod tests {
     fn settings_survive_their_map() {
         for profile in [SimProfile::Lab, SimProfile::Ideal] {
             for clock in [SimClock::Nominal, SimClock::Galil] {
-                let settings = SimSettings {
-                    profile,
-                    seed: u64::MAX - 3,
-                    clock,
-                };
-                assert_eq!(SimSettings::from_map(&settings.to_map()), Ok(settings));
+                for percent in [0, 40] {
+                    let settings = SimSettings {
+                        profile,
+                        seed: u64::MAX - 3,
+                        clock,
+                        softening: SimSoftening::percent(percent).unwrap(),
+                    };
+                    let map = settings.to_map();
+                    assert_eq!(SimSettings::from_map(&map), Ok(settings));
+                    // Rigs whose tissue does not soften are described as they always were.
+                    assert_eq!(map.contains_key("softening"), percent > 0);
+                }
             }
         }
     }
@@ -159,6 +212,8 @@ mod tests {
             err.to_string(),
             "the simulated rig's profile cannot be 'Lab'; give 'lab' or 'ideal'"
         );
+        let err = "91".parse::<SimSoftening>().unwrap_err();
+        assert!(err.to_string().contains("give 0 to 90"));
         let mut map = SimSettings::default().to_map();
         map.insert("seed".to_owned(), "-1".to_owned());
         assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");

@@ -1,10 +1,13 @@
 //! The tissue the probe meets: a surface somewhere, and behind it the thesis's viscoelastic body.
 //!
+//! Where it has been deeper the tissue may be softer; the law is [`Softening`]'s, not a fitted family's.
+//!
 //! Depth is taken as straight between two ticks, for which the body's step is exact, also in the
 //! tick of first contact. Tissue pushes and cannot pull: where the body's force would be negative
 //! the probe has lifted off and the cell feels nothing, while the body goes on relaxing.
 
 use super::random::Random;
+use super::settings::SimSoftening;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Position, Seconds};
 
@@ -17,18 +20,63 @@ const STIFFNESS_SPREAD: f64 = 0.05;
 /// Standard deviation of the two time constants between specimens, relative.
 const TIME_SPREAD: f64 = 0.03;
 
+/// Energy, in N*mm, below which hardly anything softens: what the thesis body stores at 10 mm, so that a
+/// search for contact leaves the tissue nearly as it was.
+const SOFTENING_ENERGY: f64 = 1.0;
+
+/// Pseudo-elastic softening: the elastic force `p(x)` is multiplied by
+/// `eta = 1 - share * tanh((W(x_max) - W(x)) / (m + W(x_max)))`, with `W` the energy stored at a depth and
+/// `x_max` the greatest depth so far.
+///
+/// The law of Ogden & Roxburgh, Proc. R. Soc. Lond. A 455 (1999) 2861, with two changes that finite element
+/// codes and later authors make too: the hyperbolic tangent for their error function, which has the
+/// same shape, and an energy scale that grows with `W(x_max)`, so that small and large loops lose like
+/// shares. It never heals. What is lost relaxes with the body: `y + tau y' = (eta - 1) p(x)`.
+#[derive(Clone, Debug)]
+struct Softening {
+    share: f64,
+    depth_max: f64,
+    /// `(eta - 1) p(x)` at the newest tick, in N.
+    drive: f64,
+    /// `y` at the newest tick, in N.
+    lost: f64,
+}
+
+impl Softening {
+    /// The probe has moved to a depth; returns what the force loses there. Between two ticks, a thousandth of
+    /// a relaxation time, the drive counts with its mean.
+    fn advance(&mut self, body: &ModifiedKelvin, depth: f64, dt: f64) -> f64 {
+        let depth = depth.max(0.0);
+        self.depth_max = self.depth_max.max(depth);
+        let stored = energy(body, self.depth_max);
+        let returned = (stored - energy(body, depth)) / (SOFTENING_ENERGY + stored);
+        let drive = -self.share * returned.tanh() * body.elastic(Depth(depth)).0;
+        let decay = (-dt / body.tau_eps).exp();
+        self.lost = decay * self.lost + (1.0 - decay) * 0.5 * (self.drive + drive);
+        self.drive = drive;
+        self.lost
+    }
+}
+
+/// Energy in N*mm that the elastic part stores at a depth in contact.
+fn energy(body: &ModifiedKelvin, x: f64) -> f64 {
+    let [mu1, mu2, mu3] = body.mu;
+    x * x * (mu1 / 2.0 + x * (mu2 / 3.0 + x * mu3 / 4.0))
+}
+
 /// One specimen.
 #[derive(Clone, Debug)]
 pub struct Tissue {
     surface: Position,
     body: ModifiedKelvin,
     state: KelvinState,
+    softening: Option<Softening>,
     force: Newtons,
 }
 
 impl Tissue {
     /// A specimen drawn around the thesis's identified body (its equation 3.5).
-    pub fn new(random: &mut Random) -> Self {
+    pub fn new(random: &mut Random, softening: SimSoftening) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
         let stiffness = random.around_one(STIFFNESS_SPREAD);
         let (relaxation, viscosity) = (
@@ -46,6 +94,12 @@ impl Tissue {
             },
             // The probe powers up far outside; the first step places it.
             state: KelvinState::at_rest_from(Depth(-SURFACE_MM)),
+            softening: (softening != SimSoftening::default()).then(|| Softening {
+                share: softening.share(),
+                depth_max: 0.0,
+                drive: 0.0,
+                lost: 0.0,
+            }),
             force: Newtons(0.0),
         }
     }
@@ -67,10 +121,12 @@ impl Tissue {
 
     /// The probe has moved straight to a true position in a time step; returns the force there.
     pub fn advance(&mut self, probe: Position, dt: Seconds) -> Newtons {
-        let force = self
-            .state
-            .step(&self.body, probe.depth_from(self.surface), dt);
-        self.force = Newtons(force.0.max(0.0));
+        let depth = probe.depth_from(self.surface);
+        let mut force = self.state.step(&self.body, depth, dt).0;
+        if let Some(softening) = &mut self.softening {
+            force += softening.advance(&self.body, depth.0, dt.0);
+        }
+        self.force = Newtons(force.max(0.0));
         self.force
     }
 }
@@ -80,12 +136,101 @@ mod tests {
     use super::super::random::Cause;
     use super::*;
 
+    fn specimen(seed: u64, percent: u8) -> Tissue {
+        let softening = SimSoftening::percent(percent).unwrap();
+        Tissue::new(&mut Random::new(seed, Cause::Tissue), softening)
+    }
+
+    /// Force at every millisecond on the way through depths in mm, at `speed` in mm/s.
+    fn forces(tissue: &mut Tissue, depths: &[f64], speed: f64) -> Vec<(f64, f64)> {
+        let (surface, mut x) = (tissue.surface(), depths[0]);
+        let mut all = Vec::new();
+        for pair in depths.windows(2) {
+            let step = 1e-3 * speed * (pair[1] - pair[0]).signum();
+            let count = ((pair[1] - pair[0]) / step).round() as u32;
+            for i in 1..=count {
+                x = pair[0] + f64::from(i) * step;
+                let force = tissue.advance(surface.moved_by(x), Seconds(1e-3));
+                all.push((x, force.0));
+            }
+        }
+        assert!((x - depths[depths.len() - 1]).abs() < 1e-9);
+        all
+    }
+
+    /// Energy in N*mm put into the tissue along forces over depth.
+    fn work(forces: &[(f64, f64)]) -> f64 {
+        let pairs = forces.windows(2);
+        pairs
+            .map(|pair| 0.5 * (pair[0].1 + pair[1].1) * (pair[1].0 - pair[0].0))
+            .sum()
+    }
+
+    #[test]
+    fn going_deeper_than_ever_before_nothing_is_lost() {
+        // In at 0.2 mm/s, which leaves a force on the way back: the way in does not know of softening.
+        let (mut hard, mut soft) = (specimen(3, 0), specimen(3, 60));
+        let path = [0.0, 12.0, 25.0, 20.0, 0.0];
+        let (one, other) = (forces(&mut hard, &path, 0.2), forces(&mut soft, &path, 0.2));
+        let turn = 125_000;
+        assert_eq!(one[..turn], other[..turn]);
+        // After it the softened tissue is nowhere stiffer.
+        assert!(
+            one[turn..]
+                .iter()
+                .zip(&other[turn..])
+                .all(|(a, b)| b.1 <= a.1)
+        );
+        assert!(other[turn + 25_000].1 < 0.8 * one[turn + 25_000].1);
+    }
+
+    #[test]
+    fn no_closed_loop_gives_energy_back() {
+        for speed in [0.5, 5.0, 20.0] {
+            for path in [[0.0, 20.0, 0.0, 20.0, 0.0], [0.0, 30.0, 10.0, 25.0, 0.0]] {
+                let [hard, soft] =
+                    [0, 80].map(|percent| work(&forces(&mut specimen(2, percent), &path, speed)));
+                assert!(hard > 0.0 && soft > 0.0, "{path:?} {speed}: {hard} {soft}");
+            }
+        }
+        // So slow that viscosity takes little, what is lost is mostly the softening's: of 34 N*mm stored
+        // at 30 mm.
+        let slow = [0.0, 30.0, 0.0];
+        let [hard, soft] =
+            [0, 80].map(|percent| work(&forces(&mut specimen(2, percent), &slow, 0.05)));
+        assert!(soft > hard + 10.0, "{hard} {soft}");
+    }
+
+    #[test]
+    fn softening_is_the_share_of_the_law() {
+        // Held for a hundred relaxation times on the way back, the force is eta times the elastic one.
+        for (turn, at) in [(30.0, 20.0), (20.0, 12.0), (12.0, 11.0)] {
+            let mut tissue = specimen(5, 50);
+            let body = tissue.body();
+            forces(&mut tissue, &[0.0, turn, at], 10.0);
+            let held = tissue.surface().moved_by(at);
+            for _ in 0..100_000 {
+                tissue.advance(held, Seconds(1e-3));
+            }
+            let stored = |x: f64| {
+                // Simpson's rule is exact for the cubic force.
+                let force = |x: f64| body.elastic(Depth(x)).0;
+                x / 6.0 * (force(0.0) + 4.0 * force(0.5 * x) + force(x))
+            };
+            let returned = (stored(turn) - stored(at)) / (1.0 + stored(turn));
+            let eta = 1.0 - 0.5 * returned.tanh();
+            let wanted = eta * body.elastic(Depth(at)).0;
+            let miss = (tissue.force().0 - wanted).abs();
+            assert!(miss < 1e-9, "{turn} {at}: {miss:e}");
+        }
+    }
+
     #[test]
     fn specimens_differ_within_their_spread() {
         let mut surfaces = Vec::new();
         let mut stiffness = Vec::new();
         for seed in 0..400 {
-            let tissue = Tissue::new(&mut Random::new(seed, Cause::Tissue));
+            let tissue = specimen(seed, 0);
             assert!((39.0..=43.0).contains(&tissue.surface().0));
             surfaces.push(tissue.surface().0);
             stiffness.push(tissue.body().mu[0] / ModifiedKelvin::THESIS.mu[0] - 1.0);
@@ -101,7 +246,7 @@ mod tests {
 
     #[test]
     fn a_fast_retreat_lifts_off_and_never_pulls() {
-        let mut tissue = Tissue::new(&mut Random::new(1, Cause::Tissue));
+        let mut tissue = specimen(1, 0);
         let surface = tissue.surface();
         let dt = Seconds(0.001);
         let mut deepest: f64 = 0.0;

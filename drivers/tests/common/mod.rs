@@ -16,6 +16,7 @@ pub fn settings(profile: SimProfile, seed: u64, clock: SimClock) -> SimSettings 
         profile,
         seed,
         clock,
+        ..SimSettings::default()
     }
 }
 

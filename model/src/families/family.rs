@@ -38,6 +38,12 @@ pub trait Family: Debug + Send + Sync {
     /// The columns for outer parameters in their units, one for each coefficient.
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>>;
 
+    /// The same parameters with a coarser and cheaper response, to search with; `None` where the
+    /// response is cheap already.
+    fn coarse(&self) -> Option<Box<dyn Family>> {
+        None
+    }
+
     /// Whether a coefficient must not be negative.
     fn is_non_negative(&self, _coefficient: usize) -> bool {
         false
@@ -96,9 +102,10 @@ impl OuterRange {
                 Err("within the range of its family")
             }
             Self::Time | Self::PerDepth(..) | Self::Ratio(..)
-                if !(value > 0.0 && value.is_finite()) =>
+                if !(value > 0.0 && value.is_normal()) =>
             {
-                Err("a finite number above zero")
+                // Subnormal numbers lack digits.
+                Err("a finite number of at least 2.3e-308")
             }
             Self::Ratio(..) if value < 1.0 => Err("at least 1"),
             _ => Ok(()),

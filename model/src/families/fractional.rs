@@ -18,8 +18,11 @@ pub struct FractionalZener {
     digits: u32,
 }
 
-/// Digits of the modulus unless asked otherwise.
-pub const FRACTIONAL_DIGITS: u32 = 6;
+/// Digits of the modulus unless asked otherwise: a tenth of what a good load cell resolves, for half the
+/// relaxation times that six digits take.
+pub const FRACTIONAL_DIGITS: u32 = 4;
+/// Digits that suffice to find the valley: a percent of the modulus.
+const COARSE_DIGITS: u32 = 2;
 /// Relaxation times that no recording can tell from none, or from for ever, relative to `tau`: twelve
 /// decades either way; what lies beyond is lumped into a dashpot and a spring.
 const DECADES: f64 = 12.0;
@@ -112,6 +115,14 @@ impl Family for FractionalZener {
             .into_iter()
             .map(|(u, weight)| Relaxation::maxwell(spring, tau * (-u).exp()).scaled(weight));
         vec![vec![Relaxation::spring(spring)], relaxing.collect()]
+    }
+
+    fn coarse(&self) -> Option<Box<dyn Family>> {
+        (self.digits > COARSE_DIGITS).then(|| {
+            Box::new(Self {
+                digits: COARSE_DIGITS,
+            }) as Box<dyn Family>
+        })
     }
 
     fn is_non_negative(&self, coefficient: usize) -> bool {

@@ -20,6 +20,7 @@ mod quadrature;
 mod quasi_linear;
 mod relaxation;
 mod response;
+mod unloading;
 mod voigt;
 
 pub use exponential::ExponentialKelvin;
@@ -30,10 +31,11 @@ pub use maxwell::Maxwell;
 pub(crate) use model::joined;
 pub use model::{AlongError, Body, Model, ModelError, ModelParameter};
 pub use power_series::PowerSeries;
-pub use prony::{Prony, TERMS_MAX};
+pub use prony::{Prony, TERMS_COMPARED, TERMS_MAX};
 pub use quasi_linear::{QUASI_LINEAR_NODES, QuasiLinear};
-pub use relaxation::{Drive, POWER_MAX, Relaxation};
+pub use relaxation::{Drive, POWER_MAX, Relaxation, SOFTENING_MAX};
 pub use response::{Response, StepError};
+pub use unloading::Unloading;
 pub use voigt::Voigt;
 
 use thiserror::Error;
@@ -48,7 +50,8 @@ pub struct UnknownFamily {
     pub known: String,
 }
 
-/// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body.
+/// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body;
+/// unloading of other orders than the third is there by its key.
 #[must_use]
 pub fn all() -> Vec<Box<dyn Family>> {
     let mut all: Vec<Box<dyn Family>> = vec![Box::new(Voigt), Box::new(Maxwell), Box::new(Kelvin)];
@@ -56,15 +59,16 @@ pub fn all() -> Vec<Box<dyn Family>> {
         all.extend(PowerSeries::of_order(order).map(|family| Box::new(family) as Box<dyn Family>));
     }
     all.push(Box::new(ExponentialKelvin));
-    for terms in 2..=TERMS_MAX {
+    for terms in 2..=TERMS_COMPARED {
         all.extend(Prony::of_terms(terms).map(|family| Box::new(family) as Box<dyn Family>));
     }
     all.push(Box::new(FractionalZener::default()));
     all.push(Box::new(QuasiLinear::default()));
+    all.extend(Unloading::of_order(3).map(|family| Box::new(family) as Box<dyn Family>));
     all
 }
 
-/// The family of a key such as `series-3`, `prony-4` or `fung-8`.
+/// The family of a key such as `series-3`, `unloading-3` or `fung-8`.
 pub fn by_key(key: &str) -> Result<Box<dyn Family>, UnknownFamily> {
     let boxed: Option<Box<dyn Family>> = match key {
         "voigt" => Some(Box::new(Voigt)),
@@ -77,6 +81,7 @@ pub fn by_key(key: &str) -> Result<Box<dyn Family>, UnknownFamily> {
             let number: usize = number.parse().ok()?;
             match kind {
                 "series" => PowerSeries::of_order(number).map(|one| Box::new(one) as _),
+                "unloading" => Unloading::of_order(number).map(|one| Box::new(one) as _),
                 "prony" => Prony::of_terms(number).map(|one| Box::new(one) as _),
                 "fung" => QuasiLinear::of_nodes(number).map(|one| Box::new(one) as _),
                 "fractional" => u32::try_from(number)

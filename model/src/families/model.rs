@@ -2,7 +2,7 @@
 
 use super::family::Family;
 use super::relaxation::Relaxation;
-use super::response::{Response, StepError};
+use super::response::{Response, StepError, plain};
 use super::{UnknownFamily, by_key};
 use crate::units::{Depth, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
@@ -49,7 +49,7 @@ pub enum ModelError {
         names: String,
     },
     /// A number out of its range.
-    #[error("{family}: {name} cannot be {value}; it must be {must}")]
+    #[error("{family}: {name} cannot be {}; it must be {must}", plain(.value))]
     Value {
         /// The family.
         family: String,
@@ -119,10 +119,15 @@ impl Model {
     }
 
     /// The body, relaxed with the probe at `depth`.
-    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, ModelError> {
-        Ok(Body {
-            response: Response::new(&[self.terms()?], depth),
-        })
+    pub fn at_rest_from(&self, depth: Depth) -> Result<Body, AlongError> {
+        if !depth.is_finite() {
+            return Err(StepError::Depth(depth.0).into());
+        }
+        let response = Response::new(&[self.terms()?], depth);
+        if !response.sum().is_finite() {
+            return Err(StepError::Rest { depth: depth.0 }.into());
+        }
+        Ok(Body { response })
     }
 
     /// The force in N along a path of `(time, depth)`, from a body relaxed at its first point.
@@ -134,6 +139,9 @@ impl Model {
         let Some((mut before, start)) = path.next() else {
             return Ok(Vec::new());
         };
+        if !before.is_finite() {
+            return Err(StepError::Time(before.0).into());
+        }
         let mut body = self.at_rest_from(start)?;
         let mut forces = vec![body.force().0];
         for (t, depth) in path {

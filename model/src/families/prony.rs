@@ -3,8 +3,13 @@
 use super::family::{Family, Outer, OuterRange};
 use super::relaxation::{Drive, Relaxation};
 
-/// Most terms offered: beyond one for each decade that a recording shows, terms cannot be told apart.
-pub const TERMS_MAX: usize = 6;
+/// Most terms: more than one for each of the thirty-one decades of the longest master curve published
+/// with its series.
+pub const TERMS_MAX: usize = 40;
+
+/// Most terms a selection tries on a recording: beyond one for each decade that it shows, terms cannot
+/// be told apart.
+pub const TERMS_COMPARED: usize = 6;
 
 /// `F = k0 x + sum_i k_i m_i`, `m_i + tau_i m_i' = tau_i x'`: relaxation modulus `k0 + sum k_i e^(-t / tau_i)`
 /// (Prony series), all `k_i >= 0`.

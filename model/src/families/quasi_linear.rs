@@ -22,6 +22,9 @@ pub struct QuasiLinear {
 /// width over six decades of relaxation times, to 1e-7 over four.
 pub const QUASI_LINEAR_NODES: usize = 24;
 
+/// Nodes that suffice to find the valley: one for each decade of the widest spectrum.
+const COARSE_NODES: usize = 6;
+
 impl Default for QuasiLinear {
     fn default() -> Self {
         Self {
@@ -92,6 +95,14 @@ impl Family for QuasiLinear {
             Relaxation::maxwell(spring, tau).scaled(0.5 * weight * width)
         });
         vec![vec![Relaxation::spring(spring)], spectrum.collect()]
+    }
+
+    fn coarse(&self) -> Option<Box<dyn Family>> {
+        (self.nodes > COARSE_NODES).then(|| {
+            Box::new(Self {
+                nodes: COARSE_NODES,
+            }) as Box<dyn Family>
+        })
     }
 
     fn is_non_negative(&self, _coefficient: usize) -> bool {

@@ -8,10 +8,18 @@
 //! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
 
 use super::exponential_step::chi_omega;
-use crate::viscoelastic::{Compensated, psi_first};
+use crate::viscoelastic::{Compensated, psi, psi_first};
 
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;
+
+/// Highest power of depth in a drive's softening.
+pub const SOFTENING_MAX: usize = 3;
+/// A force in N that is refused: below it no sum of terms exceeds the largest number, 1.8e308.
+const FORCE_MAX: f64 = 1e300;
+/// Steps below this share of the relaxation time are jumps: what relaxes within one is beyond all
+/// digits, and their psi functions are near the subnormal numbers, below 2.2e-308, which lack digits.
+const SUDDEN: f64 = 1e-290;
 
 /// A function of depth that is zero at zero depth.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -20,9 +28,9 @@ pub struct Drive {
     pub powers: [f64; POWER_MAX],
     /// Amplitude `A` of `A (e^(B x) - 1)`, in N, and `B` in 1/mm.
     pub exponential: Option<(f64, f64)>,
-    /// Coefficients of `x^j (x_max - x)`, `j = 1, 2, 3`, with `x_max` the greatest depth so far: what
-    /// is lost by having been deeper, in N/mm^(j+1).
-    pub softening: [f64; 3],
+    /// Coefficients of `x^j (1 - x / x_max)`, `j = 1, 2, 3`, with `x_max` the greatest depth so far:
+    /// what having been deeper adds, in N/mm^j (times s for a rate). Zero on first loading.
+    pub softening: [f64; SOFTENING_MAX],
 }
 
 impl Drive {
@@ -46,10 +54,10 @@ impl Drive {
         }
     }
 
-    /// `coefficient * x^power (x_max - x)`, `power` 1 to 3.
+    /// `coefficient * x^power (1 - x / x_max)`, `power` 1 to 3.
     #[must_use]
     pub fn softening(power: usize, coefficient: f64) -> Self {
-        let mut softening = [0.0; 3];
+        let mut softening = [0.0; SOFTENING_MAX];
         softening[power - 1] = coefficient;
         Self {
             softening,
@@ -87,12 +95,22 @@ impl Drive {
         let mut all = [0.0; POWER_MAX + 1];
         all[1..].copy_from_slice(&self.powers);
         if let Some(x_max) = x_max {
-            for (j, lost) in self.softening.iter().enumerate() {
-                all[j + 1] += lost * x_max;
-                all[j + 2] -= lost;
+            for (j, (first, second)) in self.softened(x_max) {
+                all[j] += first;
+                all[j + 1] += second;
             }
         }
         all
+    }
+
+    /// What softening adds after `x_max`, as `(j, (a, b))` for `a x^j + b x^(j+1)`. A depth too small to
+    /// divide by has softened nothing.
+    #[inline]
+    fn softened(&self, x_max: f64) -> impl Iterator<Item = (usize, (f64, f64))> {
+        let pairs = self.softening.into_iter().map(move |s| (s, -s / x_max));
+        (1..)
+            .zip(pairs)
+            .filter(|(_, (_, per_mm))| per_mm.is_finite())
     }
 
     /// Value at depth `x` after `x_max`.
@@ -106,6 +124,35 @@ impl Drive {
         }
     }
 
+    /// How much more it is at `x1` than at `x0`, both in contact, after `x_max`: without the difference
+    /// of the two, which for a small move deep down would leave no digit.
+    fn rise(&self, x0: f64, x1: f64, x_max: Option<f64>) -> f64 {
+        let polynomial = self.polynomial(x_max);
+        // x1^k - x0^k is the move times the complete homogeneous polynomial of the ends.
+        let (mut homogeneous, mut power, mut sum) = (0.0, 1.0, 0.0);
+        for coefficient in &polynomial[1..] {
+            homogeneous = power + x1 * homogeneous;
+            power *= x0;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous;
+            }
+        }
+        sum *= x1 - x0;
+        if let Some((amplitude, b)) = self.exponential {
+            sum += amplitude * (b * x0).exp() * (b * (x1 - x0)).exp_m1();
+        }
+        sum
+    }
+
+    /// The rise over a straight move, the greatest depth so far being `m0`.
+    fn rise_past(&self, x0: f64, x1: f64, m0: f64) -> f64 {
+        if x1 > m0 {
+            self.rise(x0, m0, Some(m0)) + self.rise(m0, x1, None)
+        } else {
+            self.rise(x0, x1, Some(m0))
+        }
+    }
+
     /// Mean over a straight move from `x0` to `x1`, both in contact, after `x_max`.
     fn mean(&self, x0: f64, x1: f64, x_max: Option<f64>) -> f64 {
         let polynomial = self.polynomial(x_max);
@@ -114,7 +161,9 @@ impl Drive {
         for (k, coefficient) in polynomial.iter().enumerate().skip(1) {
             power *= x0;
             homogeneous = power + x1 * homogeneous;
-            sum += coefficient * homogeneous / (k + 1) as f64;
+            if *coefficient != 0.0 {
+                sum += coefficient * homogeneous / (k + 1) as f64;
+            }
         }
         if let Some((amplitude, b)) = self.exponential {
             let turn = b * (x1 - x0);
@@ -128,10 +177,20 @@ impl Drive {
         sum
     }
 
+    /// Highest power of depth, 0 for none.
+    fn degree(&self) -> usize {
+        let powers = self.powers.iter().rposition(|value| *value != 0.0);
+        // x^j (1 - x / x_max) has one power more.
+        let softening = self.softening.iter().rposition(|value| *value != 0.0);
+        powers
+            .map_or(0, |k| k + 1)
+            .max(softening.map_or(0, |j| j + 2))
+    }
+
     /// Whether it depends on the greatest depth so far.
     #[must_use]
     pub fn softens(&self) -> bool {
-        self.softening.iter().any(|lost| *lost != 0.0)
+        self.softening.iter().any(|one| *one != 0.0)
     }
 }
 
@@ -189,6 +248,24 @@ impl Relaxation {
             rate: self.rate.plus(&other.rate)?,
         })
     }
+
+    /// Highest power of depth in the drive along a straight piece, where a rate's power is one less.
+    pub(crate) fn degree(&self) -> usize {
+        let rate = self.rate.degree().saturating_sub(1);
+        self.elastic.degree().max(rate)
+    }
+}
+
+/// `psi_0 ..= psi_degree`, zero above.
+#[inline]
+fn psi_through(degree: usize, r: f64) -> [f64; POWER_MAX + 1] {
+    let mut all = [0.0; POWER_MAX + 1];
+    match degree {
+        0 => all[0] = psi(0, r),
+        1 => all[..2].copy_from_slice(&psi_first::<2>(r)),
+        _ => all = psi_first(r),
+    }
+    all
 }
 
 /// A straight piece of depth in contact.
@@ -208,9 +285,15 @@ pub(super) struct Piece {
 #[derive(Clone, Debug)]
 pub(super) struct Relaxing {
     pub term: Relaxation,
+    /// Whether its elastic part or its rate depends on the greatest depth so far.
+    pub softens: bool,
     value: Compensated,
     dt: f64,
     psi: [f64; POWER_MAX + 1],
+    /// Highest power of depth in the drive along a straight piece.
+    degree: usize,
+    /// A step so short beside the relaxation time that it is a jump.
+    is_sudden: bool,
     /// What the next [`Relaxing::settle`] adds.
     pending: f64,
 }
@@ -220,9 +303,12 @@ impl Relaxing {
     pub fn relaxed(term: Relaxation, depth: f64) -> Self {
         Self {
             term,
+            softens: term.elastic.softens() || term.rate.softens(),
             value: Compensated::new(term.elastic.at(depth, depth)),
             dt: f64::NAN,
             psi: [0.0; POWER_MAX + 1],
+            degree: term.degree(),
+            is_sudden: false,
             pending: 0.0,
         }
     }
@@ -236,27 +322,47 @@ impl Relaxing {
     pub fn prepare(&mut self, piece: &Piece) -> bool {
         if piece.dt != self.dt {
             self.dt = piece.dt;
-            self.psi = psi_first(piece.dt / self.term.tau);
+            let r = piece.dt / self.term.tau;
+            self.psi = psi_through(self.degree, r);
+            self.is_sudden = r < SUDDEN;
+        }
+        if self.is_sudden {
+            let x_max = (!piece.primary).then_some(piece.x_max);
+            let rise = self.term.rate.rise(piece.x0, piece.x0 + piece.d, x_max);
+            self.pending = rise / self.term.tau;
+            return self.is_bounded();
         }
         let Piece { x0, d, dt, .. } = *piece;
-        let speed = d / dt;
-        let mut c = self.polynomial(piece, speed);
-        // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
-        for low in 0..POWER_MAX {
-            for k in (low..POWER_MAX).rev() {
-                c[k] += x0 * c[k + 1];
+        // Powers that no drive has must not be formed: they may be no numbers where the force is one.
+        let (speed, degree) = (d / dt, self.degree);
+        let mut sum = if degree == 0 {
+            self.term.rate.powers[0] * speed * self.psi[0]
+        } else {
+            let mut c = self.polynomial(piece, speed);
+            // Taylor coefficients of the polynomial at x0 by repeated synthetic division.
+            for low in 0..degree {
+                for k in (low..degree).rev() {
+                    c[k] += x0 * c[k + 1];
+                }
             }
-        }
-        let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
-        for (c, psi) in c.iter().zip(&self.psi).skip(1) {
-            power *= d;
-            sum += c * power * psi;
-        }
+            let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
+            for (c, psi) in c[1..=degree].iter().zip(&self.psi[1..]) {
+                power *= d;
+                sum += c * power * psi;
+            }
+            sum
+        };
         if self.term.elastic.exponential.is_some() || self.term.rate.exponential.is_some() {
             sum += self.exponential(piece, speed);
         }
         self.pending = sum;
-        sum.is_finite()
+        self.is_bounded()
+    }
+
+    /// Whether the next value, and any sum of them, is a number.
+    #[inline]
+    fn is_bounded(&self) -> bool {
+        self.pending.abs() < FORCE_MAX && self.value.value.abs() < FORCE_MAX
     }
 
     /// Coefficients by power of depth of the drive along the piece.
@@ -268,14 +374,14 @@ impl Relaxing {
             c[k] += elastic.powers[k - 1];
             c[k - 1] += k as f64 * rate.powers[k - 1] * speed;
         }
-        if !piece.primary {
-            for (j, lost) in elastic.softening.iter().enumerate() {
-                c[j + 1] += lost * piece.x_max;
-                c[j + 2] -= lost;
+        if self.softens && !piece.primary {
+            for (j, (first, second)) in elastic.softened(piece.x_max) {
+                c[j] += first;
+                c[j + 1] += second;
             }
-            for (j, lost) in rate.softening.iter().enumerate() {
-                c[j] += (j + 1) as f64 * lost * piece.x_max * speed;
-                c[j + 1] -= (j + 2) as f64 * lost * speed;
+            for (j, (first, second)) in rate.softened(piece.x_max) {
+                c[j - 1] += j as f64 * first * speed;
+                c[j] += (j + 1) as f64 * second * speed;
             }
         }
         c
@@ -283,6 +389,12 @@ impl Relaxing {
 
     /// What the exponentials add over the piece.
     fn exponential(&self, piece: &Piece, speed: f64) -> f64 {
+        if piece.d == 0.0 {
+            // Held: no rate, and the elastic part stands still.
+            return self.term.elastic.exponential.map_or(0.0, |(amplitude, b)| {
+                amplitude * (b * piece.x0).exp_m1() * self.psi[0]
+            });
+        }
         let r = piece.dt / self.term.tau;
         let mut sum = 0.0;
         if let Some((amplitude, b)) = self.term.elastic.exponential {
@@ -313,21 +425,22 @@ impl Relaxing {
         self.value.relax(self.pending, self.psi[0]);
     }
 
+    /// Whether it can move from `x0` to `x1` in no time: a dashpot alone would need an infinite force.
+    pub fn can_jump(&self, [x0, x1]: [f64; 2], [m0, _]: [f64; 2]) -> bool {
+        self.term.tau > 0.0 || self.term.rate.rise_past(x0, x1, m0) == 0.0
+    }
+
     /// Prepares a move from `x0` to `x1` in no time, which the elastic memory does not feel; `false`
-    /// where it would need an infinite force.
+    /// where the force is too large for a number.
     pub fn prepare_jump(&mut self, [x0, x1]: [f64; 2], [m0, m1]: [f64; 2]) -> bool {
         let Relaxation { tau, elastic, rate } = &self.term;
-        let impulse = rate.at(x1, m1) - rate.at(x0, m0);
         self.pending = if *tau == 0.0 {
-            // Without memory it is where the elastic part is; a dashpot would need infinite force.
-            if impulse != 0.0 {
-                return false;
-            }
+            // Without memory it is where the elastic part is.
             elastic.at(x1, m1) - self.value.value
         } else {
-            impulse / tau
+            rate.rise_past(x0, x1, m0) / tau
         };
-        self.pending.is_finite()
+        self.is_bounded()
     }
 
     /// Takes the prepared jump.

@@ -5,6 +5,16 @@ use crate::units::{Depth, Seconds};
 use crate::viscoelastic::Pieces;
 use thiserror::Error;
 
+/// A number as people write it, by powers of ten where it would be a row of zeros.
+pub(super) fn plain(value: &f64) -> String {
+    let size = value.abs();
+    if size == 0.0 || !value.is_finite() || (1e-6..1e9).contains(&size) {
+        value.to_string()
+    } else {
+        format!("{value:e}")
+    }
+}
+
 /// A step that has no answer; the state is as it was before.
 #[derive(Clone, Copy, Debug, PartialEq, Error)]
 pub enum StepError {
@@ -14,9 +24,9 @@ pub enum StepError {
     /// Negative, NaN or infinite duration.
     #[error("a time step of {0} s is not possible; time steps are zero or more seconds")]
     Time(f64),
-    /// A dashpot moved in no time, or slower than numbers can tell from none.
+    /// A dashpot moved in no time.
     #[error(
-        "a dashpot cannot be moved by {from} -> {to} mm in no time, which takes an infinite force; give the move a duration"
+        "a dashpot cannot be moved from {} mm to {} mm in no time, which takes an infinite force; give the move a duration", plain(.from), plain(.to)
     )]
     Jump {
         /// Depth before, in mm.
@@ -24,9 +34,29 @@ pub enum StepError {
         /// Depth after, in mm.
         to: f64,
     },
+    /// Faster than numbers go.
+    #[error(
+        "a move from {} mm to {} mm in {} s is faster than the largest number; give the move a longer time, or 0 s for a jump", plain(.from), plain(.to), plain(.dt)
+    )]
+    Speed {
+        /// Depth before, in mm.
+        from: f64,
+        /// Depth after, in mm.
+        to: f64,
+        /// Duration in s.
+        dt: f64,
+    },
+    /// The force at rest cannot be written as a number.
+    #[error(
+        "the force at rest at a depth of {} mm is beyond the largest number; check the unit of depth (mm) and the parameters of the body", plain(.depth)
+    )]
+    Rest {
+        /// Depth in mm.
+        depth: f64,
+    },
     /// The force cannot be written as a number.
     #[error(
-        "the force of a move from {from} mm to {to} mm in {dt} s is beyond the largest number; check the units of depth (mm) and the parameters of the body"
+        "the force of a move from {} mm to {} mm in {} s is beyond the largest number; check the units of depth (mm) and the parameters of the body", plain(.from), plain(.to), plain(.dt)
     )]
     Overflow {
         /// Depth before, in mm.
@@ -63,9 +93,7 @@ impl Response {
             .flatten()
             .map(|term| Relaxing::relaxed(*term, start))
             .collect();
-        let softens = terms
-            .iter()
-            .any(|one| one.term.elastic.softens() || one.term.rate.softens());
+        let softens = terms.iter().any(|one| one.softens);
         let owners = columns.iter().enumerate();
         Self {
             terms,
@@ -117,13 +145,19 @@ impl Response {
             let ends = [x0, x1];
             let deepest = [self.depth_max, self.depth_max.max(x1)];
             for term in &mut self.terms {
-                if !term.prepare_jump(ends, deepest) {
+                if !term.can_jump(ends, deepest) {
                     return Err(StepError::Jump { from, to });
+                }
+                if !term.prepare_jump(ends, deepest) {
+                    return Err(StepError::Overflow { from, to, dt });
                 }
             }
             self.terms.iter_mut().for_each(Relaxing::settle_jump);
             self.arrive(to);
             return Ok(());
+        }
+        if !((to - from) / dt).is_finite() {
+            return Err(StepError::Speed { from, to, dt });
         }
         if Pieces::of(from, to) == Pieces::Inside && !self.is_cut_by_softening(x0, x1) {
             let piece = self.piece(x0, x1 - x0, dt);
@@ -186,7 +220,7 @@ impl Response {
             d,
             dt,
             x_max: self.depth_max,
-            primary: d > 0.0 && x0 >= self.depth_max,
+            primary: d >= 0.0 && x0 >= self.depth_max,
         }
     }
 
@@ -195,20 +229,21 @@ impl Response {
         let mut parts = match Pieces::of(from, to) {
             Pieces::Inside => vec![(from, to, dt)],
             Pieces::Outside => vec![(0.0, 0.0, dt)],
-            Pieces::Entering(outside) => {
-                vec![(0.0, 0.0, dt * outside), (0.0, to, dt * (1.0 - outside))]
+            Pieces::Entering([outside, inside]) => {
+                vec![(0.0, 0.0, dt * outside), (0.0, to, dt * inside)]
             }
-            Pieces::Leaving(inside) => {
-                vec![(from, 0.0, dt * inside), (0.0, 0.0, dt * (1.0 - inside))]
+            Pieces::Leaving([inside, outside]) => {
+                vec![(from, 0.0, dt * inside), (0.0, 0.0, dt * outside)]
             }
         };
         if let Some(&(x0, x1, time)) = parts.last()
             && self.is_cut_by_softening(x0, x1)
         {
-            let share = (self.depth_max - x0) / (x1 - x0);
+            let known = (self.depth_max - x0) / (x1 - x0);
+            let new = (x1 - self.depth_max) / (x1 - x0);
             parts.pop();
-            parts.push((x0, self.depth_max, time * share));
-            parts.push((self.depth_max, x1, time * (1.0 - share)));
+            parts.push((x0, self.depth_max, time * known));
+            parts.push((self.depth_max, x1, time * new));
         }
         parts
     }
@@ -222,5 +257,88 @@ impl Response {
         }
         self.terms.iter_mut().for_each(Relaxing::settle);
         Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::relaxation::{Drive, Relaxation};
+    use super::*;
+
+    /// A spring that softens, in series with a dashpot: what it lost relaxes like the rest.
+    fn softening_maxwell(softens: bool) -> Response {
+        let spring = Drive {
+            powers: [0.2, 0.01, 0.0, 0.0, 0.0],
+            softening: if softens {
+                [-0.1, 0.004, -1e-4]
+            } else {
+                [0.0; 3]
+            },
+            ..Drive::default()
+        };
+        Response::new(&[vec![Relaxation::maxwell(spring, 3.0)]], Depth(0.0))
+    }
+
+    /// Two ways of one path: in one step a piece, and in many. Depth over time is the same.
+    #[test]
+    fn a_rate_that_softens_is_cut_where_the_greatest_depth_is() {
+        let path = [
+            (2.0, 8.0),
+            (1.0, 3.0),
+            (1.5, -1.0),
+            (2.5, 12.0),
+            (1.0, 12.0),
+            (0.5, 5.0),
+        ];
+        for parts in [3u32, 64] {
+            let (mut whole, mut cut) = (softening_maxwell(true), softening_maxwell(true));
+            let mut before = 0.0;
+            for (dt, to) in path {
+                whole.step(Depth(to), Seconds(dt)).unwrap();
+                for part in 1..=parts {
+                    let share = f64::from(part) / f64::from(parts);
+                    let depth = Depth(before + (to - before) * share);
+                    cut.step(depth, Seconds(dt / f64::from(parts))).unwrap();
+                }
+                before = to;
+                let miss = (whole.sum() - cut.sum()).abs();
+                assert!(miss < 1e-13, "{to} in {parts}: {miss:e}");
+            }
+            assert_eq!(whole.depth_max(), Depth(12.0));
+        }
+    }
+
+    /// Jumps see no relaxation, so the force is the spring's, whichever way depth was reached.
+    #[test]
+    fn jumps_change_by_what_the_spring_changes() {
+        let mut body = softening_maxwell(true);
+        let spring = |x: f64, x_max: f64| {
+            let lost = (-0.1 * x + 0.004 * x * x - 1e-4 * x.powi(3)) * (1.0 - x / x_max);
+            0.2 * x + 0.01 * x * x + lost
+        };
+        for (to, x_max) in [(8.0, 8.0), (3.0, 8.0), (12.0, 12.0), (6.0, 12.0)] {
+            body.step(Depth(to), Seconds(0.0)).unwrap();
+            assert!((body.sum() - spring(to, x_max)).abs() < 1e-14, "{to}");
+        }
+    }
+
+    #[test]
+    fn nothing_is_softened_on_the_way_in() {
+        let (mut soft, mut hard) = (softening_maxwell(true), softening_maxwell(false));
+        for (dt, to) in [(1.0, 0.5), (2.0, 8.0), (1.0, 8.0), (0.0, 9.0), (1.0, 11.0)] {
+            for body in [&mut soft, &mut hard] {
+                body.step(Depth(to), Seconds(dt)).unwrap();
+            }
+            assert!((soft.sum() - hard.sum()).abs() < 1e-14, "{to}");
+        }
+        soft.step(Depth(6.0), Seconds(1.0)).unwrap();
+        hard.step(Depth(6.0), Seconds(1.0)).unwrap();
+        assert!(soft.sum() < hard.sum() - 0.1);
+        // A greatest depth that cannot be divided by has softened nothing.
+        let mut tiny = softening_maxwell(true);
+        for depth in [5e-324, 0.0, 4.0] {
+            tiny.step(Depth(depth), Seconds(1.0)).unwrap();
+            assert!(tiny.sum().is_finite());
+        }
     }
 }

@@ -292,13 +292,13 @@ impl<const SLOPES: bool> Columns<SLOPES> {
         match Pieces::of(from, to) {
             Pieces::Inside => self.piece(from, to - from, 1.0, &weights),
             Pieces::Outside => self.piece(0.0, 0.0, 0.0, &weights),
-            Pieces::Entering(outside) => {
+            Pieces::Entering([outside, inside]) => {
                 self.part(0.0, 0.0, 0.0, dt * outside);
-                self.part(0.0, to, 1.0, dt * (1.0 - outside));
+                self.part(0.0, to, 1.0, dt * inside);
             }
-            Pieces::Leaving(inside) => {
+            Pieces::Leaving([inside, outside]) => {
                 self.part(from, -from, 1.0, dt * inside);
-                self.part(0.0, 0.0, 0.0, dt * (1.0 - inside));
+                self.part(0.0, 0.0, 0.0, dt * outside);
             }
         }
     }

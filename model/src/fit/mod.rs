@@ -27,7 +27,10 @@ mod triangle;
 mod uncertainty;
 
 pub use bootstrap::{Bootstrap, BootstrapInterval};
-pub use family::{FamilyFit, FamilyOptions, FamilyParameter, RecordFit, fit_family};
+pub use family::{
+    FamilyFit, FamilyOptions, FamilyParameter, Predicted, RecordFit, fit_body, fit_family,
+    fit_family_at, predict,
+};
 pub use live::{LiveEstimate, LiveFit, ResidualBlocks, Verdict};
 pub use maxwell::{MaxwellFit, StrainSample, fit_maxwell};
 pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};

@@ -50,6 +50,18 @@ pub enum FitError {
         /// The number.
         value: f64,
     },
+    /// Numbers whose powers are none.
+    #[error(
+        "a {what} of {value:e} {unit} is out of scale, a fit needs numbers between 1e-50 and 1e50; check its unit"
+    )]
+    Scale {
+        /// Largest depth, largest force or force uncertainty.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// Its unit.
+        unit: &'static str,
+    },
     /// A force uncertainty of zero or less.
     #[error("sample {index} has a force uncertainty of {sigma} N; it must be greater than zero")]
     SigmaNotPositive {
@@ -166,6 +178,33 @@ pub enum FitError {
         "the fit produced numbers that are not finite; check the units of depth (mm) and force (N)"
     )]
     Overflow,
+}
+
+/// Largest and least size of depths, forces and their uncertainties: a fit forms fifth powers of depths
+/// and squares of forces, and their quotients, which doubles hold up to 1.8e308.
+const SIZES: std::ops::RangeInclusive<f64> = 1e-50..=1e50;
+
+/// Refuses samples whose sizes leave no room for a fit.
+pub(super) fn check_scale(samples: &[FitSample]) -> Result<(), FitError> {
+    let measured = || samples.iter().filter(|sample| sample.is_measured());
+    let largest = |values: &mut dyn Iterator<Item = f64>| {
+        values.fold(0.0f64, |largest, value| largest.max(value.abs()))
+    };
+    let depth = largest(&mut samples.iter().map(|one| one.depth.0));
+    let force = largest(&mut measured().map(|one| one.force.0));
+    let sizes = [
+        ("largest depth", "mm", depth),
+        ("largest force", "N", force),
+    ];
+    let sigmas = measured().map(|one| ("force uncertainty", "N", one.sigma.0));
+    match sizes
+        .into_iter()
+        .chain(sigmas)
+        .find(|(.., value)| !SIZES.contains(value))
+    {
+        Some((what, unit, value)) => Err(FitError::Scale { what, value, unit }),
+        None => Ok(()),
+    }
 }
 
 fn list(names: &[String]) -> String {

@@ -12,7 +12,7 @@ use super::design::{
 };
 use super::options::{CONTACT, FitOptions, LINEAR, LINEAR_COUNT, TAU};
 use super::record::{Record, constant_force, depths, force_square, measured};
-use super::sample::{FitError, FitSample, check_samples};
+use super::sample::{FitError, FitSample, check_samples, check_scale};
 use super::thin::{Thin, unit};
 use super::triangle::{Factor, Triangle};
 use crate::vectors::wide;
@@ -117,6 +117,7 @@ impl<'a> System<'a> {
             if deepest <= contact {
                 return Err(named(name, FitError::NeverInTissue { deepest, contact }));
             }
+            check_scale(samples).map_err(|reason| named(name, reason))?;
             depth_mm = depth_mm.max(deepest - contact);
         }
         let sigma_scale = records

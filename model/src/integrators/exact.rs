@@ -108,12 +108,12 @@ impl<R: Real, const N: usize> Integrator<R, N> for Exact<R, N> {
             self.force.relaxed(weighted, self.table.psi_0)
         } else {
             match Pieces::of(from.to_f64(), depth.to_f64()) {
-                Pieces::Entering(outside) => {
-                    let pieces = [(R::ZERO, R::ZERO, outside), (R::ZERO, depth, 1.0 - outside)];
+                Pieces::Entering([outside, inside]) => {
+                    let pieces = [(R::ZERO, R::ZERO, outside), (R::ZERO, depth, inside)];
                     across(self.body, self.dt, self.force, pieces)
                 }
-                Pieces::Leaving(inside) => {
-                    let pieces = [(from, -from, inside), (R::ZERO, R::ZERO, 1.0 - inside)];
+                Pieces::Leaving([inside, outside]) => {
+                    let pieces = [(from, -from, inside), (R::ZERO, R::ZERO, outside)];
                     across(self.body, self.dt, self.force, pieces)
                 }
                 Pieces::Outside | Pieces::Inside => self.force.relaxed(R::ZERO, self.table.psi_0),

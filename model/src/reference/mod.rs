@@ -18,6 +18,9 @@ use thiserror::Error;
 /// the closed forms, which costs the digits of the ratio of times and depths (twelve decades each).
 pub const REFERENCE_DIGITS: usize = 75;
 
+/// Exponents of e beyond this are refused: doubles end at 710.
+const EXPONENT_MAX: f64 = 1e5;
+
 /// What the reference does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
@@ -27,6 +30,9 @@ pub enum ReferenceError {
     /// Too few or too many digits.
     #[error("a reference has 20 to 1000 digits, not {0}")]
     Digits(usize),
+    /// An exponential beyond all numbers.
+    #[error("the force at rest at that depth is beyond the largest number")]
+    Overflow,
     /// A parameter that is no number, or a negative time.
     #[error(
         "a term with a relaxation time below zero or a coefficient that is not finite has no force"
@@ -48,6 +54,8 @@ struct Term {
     tau: Big,
     elastic: Function,
     rate: Function,
+    /// Highest power of depth along a straight piece.
+    degree: usize,
     value: Big,
     /// Duration of the last step and its weights.
     weights: Option<(Big, Weights)>,
@@ -75,14 +83,14 @@ impl Reference {
         if !(20..=1000).contains(&digits) {
             return Err(ReferenceError::Digits(digits));
         }
+        if !depth.is_finite() {
+            return Err(ReferenceError::Term);
+        }
         let digits = Digits::decimal(digits);
         let terms: Result<Vec<Term>, ReferenceError> = terms
             .iter()
             .map(|term| Term::new(digits, term, depth))
             .collect();
-        if !depth.is_finite() {
-            return Err(ReferenceError::Term);
-        }
         Ok(Self {
             digits,
             terms: terms?,
@@ -98,6 +106,13 @@ impl Reference {
         }
         if !(dt.0 >= 0.0 && dt.is_finite()) {
             return Err(StepError::Time(dt.0));
+        }
+        if self.terms.iter().any(|term| term.is_beyond(depth)) {
+            return Err(StepError::Overflow {
+                from: nearest(&self.depth),
+                to: depth.0,
+                dt: dt.0,
+            });
         }
         let to = self.digits.exact(depth.0);
         let from = std::mem::replace(&mut self.depth, to.clone());
@@ -185,14 +200,25 @@ impl Term {
             return Err(ReferenceError::Term);
         }
         let elastic = Function::new(digits, elastic);
+        let rate = Function::new(digits, rate);
         let start = digits.exact(depth.0.max(0.0));
+        if elastic.is_beyond(depth) || rate.is_beyond(depth) {
+            return Err(ReferenceError::Overflow);
+        }
+        // A rate counts by its slope.
+        let degree = elastic.degree().max(rate.degree().saturating_sub(1));
         Ok(Self {
+            degree,
             tau: digits.exact(*tau),
             value: elastic.at(&start),
             elastic,
-            rate: Function::new(digits, rate),
+            rate,
             weights: None,
         })
+    }
+
+    fn is_beyond(&self, depth: Depth) -> bool {
+        self.elastic.is_beyond(depth) || self.rate.is_beyond(depth)
     }
 
     /// What a move in no time adds to `tau` times the value.
@@ -211,16 +237,20 @@ impl Term {
     fn advance(&mut self, digits: Digits, x0: &Big, d: &Big, dt: &Big) {
         let weights = match self.weights.take() {
             Some((last, weights)) if last == *dt => weights,
-            _ => Weights::new(digits, dt, &self.tau, POWER_MAX + 1),
+            _ => Weights::new(digits, dt, &self.tau, self.degree + 1),
         };
         let speed = d / dt;
         let mut sum = &self.value * &weights.kept;
         // The drive by power of depth, then about x0 by binomials, then by powers of d.
         let zero = digits.zero();
-        let mut c = vec![zero; POWER_MAX + 1];
-        for k in 1..=POWER_MAX {
-            c[k] = &c[k] + &self.elastic.powers[k - 1];
-            c[k - 1] = &c[k - 1] + digits.whole(k) * &self.rate.powers[k - 1] * &speed;
+        let mut c = vec![zero; self.degree + 1];
+        for (k, c) in c.iter_mut().enumerate() {
+            if k > 0 {
+                *c += &self.elastic.powers[k - 1];
+            }
+            if k < POWER_MAX {
+                *c += digits.whole(k + 1) * &self.rate.powers[k] * &speed;
+            }
         }
         let mut d_power = digits.whole(1);
         for (j, psi) in weights.psi.iter().enumerate() {
@@ -236,7 +266,9 @@ impl Term {
         }
         if let Some((amplitude, b)) = &self.elastic.exponential {
             let chi = chi(&(b * d), &weights);
-            sum += amplitude * ((b * x0).exp() * chi - &weights.psi[0]);
+            // What the probe rests on and what it adds, each without the difference of large numbers.
+            let rest = (b * x0).exp_m1() * &weights.psi[0];
+            sum += amplitude * (rest + (b * x0).exp() * (chi - &weights.psi[0]));
         }
         if let Some((amplitude, b)) = &self.rate.exponential {
             let chi = chi(&(b * d), &weights);
@@ -252,6 +284,9 @@ fn chi(b: &Big, weights: &Weights) -> Big {
     let Some(r) = &weights.r else {
         return b.exp();
     };
+    if is_zero(b) {
+        return weights.psi[0].clone();
+    }
     let sum = b + r;
     if is_zero(&sum) {
         return r * &weights.kept;
@@ -268,6 +303,18 @@ impl Function {
             exponential: exponential
                 .map(|(amplitude, b)| (digits.exact(amplitude), digits.exact(b))),
         }
+    }
+
+    fn degree(&self) -> usize {
+        let last = self.powers.iter().rposition(|c| !is_zero(c));
+        last.map_or(0, |k| k + 1)
+    }
+
+    /// Whether its exponential is beyond any double by so much that even many digits end.
+    fn is_beyond(&self, depth: Depth) -> bool {
+        let exponent = |b: &Big| nearest(b) * depth.0;
+        let exponential = self.exponential.as_ref();
+        exponential.is_some_and(|(_, b)| exponent(b) > EXPONENT_MAX)
     }
 
     fn at(&self, x: &Big) -> Big {

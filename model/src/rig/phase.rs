@@ -59,6 +59,8 @@ phases! {
     Ended = 10, "ended";
     /// Moved by the operator.
     Jog = 11, "jog";
+    /// Back out of the tissue at constant speed, recorded for a fit.
+    Unload = 12, "unload";
 }
 
 impl fmt::Display for Phase {

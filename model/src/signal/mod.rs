@@ -1,9 +1,11 @@
-//! Signals: filters, the contact position, bounded histories for plots.
+//! Signals: filters, the contact position, work, bounded histories for plots.
 
 mod contact;
 mod filter;
 mod trace;
+mod work;
 
 pub use contact::{ContactError, ContactEstimate, ContactPoint, fit_contact};
 pub use filter::MovingMean;
 pub use trace::{LiveTrace, TracePoint};
+pub use work::work;

@@ -95,20 +95,24 @@ pub(crate) enum Pieces {
     Inside,
     /// Out of contact all the way.
     Outside,
-    /// Out of contact, then in contact; the share of the step spent outside.
-    Entering(f64),
-    /// In contact, then out; the share of the step spent inside.
-    Leaving(f64),
+    /// Out of contact, then in contact; the shares of the step spent outside and inside.
+    Entering([f64; 2]),
+    /// In contact, then out; the shares of the step spent inside and outside.
+    Leaving([f64; 2]),
 }
 
 impl Pieces {
     /// Where a straight move from depth `from` to depth `to` touches; depth 0 is the surface.
+    ///
+    /// Each share is formed on its own: one less the other would keep no digit of a touch at the very
+    /// end of a step.
     pub fn of(from: f64, to: f64) -> Self {
+        let shares = || [from / (from - to), to / (to - from)];
         match (from >= 0.0, to >= 0.0) {
             (true, true) => Self::Inside,
             (false, false) => Self::Outside,
-            (false, true) => Self::Entering(from / (from - to)),
-            (true, false) => Self::Leaving(from / (from - to)),
+            (false, true) => Self::Entering(shares()),
+            (true, false) => Self::Leaving(shares()),
         }
     }
 }
@@ -140,7 +144,9 @@ mod tests {
     fn crossings_are_cut_at_the_surface() {
         assert_eq!(Pieces::of(0.0, 0.0), Pieces::Inside);
         assert_eq!(Pieces::of(-2.0, -0.1), Pieces::Outside);
-        assert_eq!(Pieces::of(-1.0, 3.0), Pieces::Entering(0.25));
-        assert_eq!(Pieces::of(3.0, -1.0), Pieces::Leaving(0.75));
+        assert_eq!(Pieces::of(-1.0, 3.0), Pieces::Entering([0.25, 0.75]));
+        assert_eq!(Pieces::of(3.0, -1.0), Pieces::Leaving([0.75, 0.25]));
+        assert_eq!(Pieces::of(0.0, -1.0), Pieces::Leaving([0.0, 1.0]));
+        assert_eq!(Pieces::of(-1.0, 1e-20), Pieces::Entering([1.0, 1e-20]));
     }
 }

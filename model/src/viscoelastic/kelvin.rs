@@ -150,13 +150,13 @@ impl KelvinState {
         match Pieces::of(from, to) {
             Pieces::Inside => self.advance(from, to - from, &self.weights.clone()),
             Pieces::Outside => self.advance(0.0, 0.0, &self.weights.clone()),
-            Pieces::Entering(outside) => {
+            Pieces::Entering([outside, inside]) => {
                 self.advance(0.0, 0.0, &StepWeights::new(dt * outside, tau));
-                self.advance(0.0, to, &StepWeights::new(dt * (1.0 - outside), tau));
+                self.advance(0.0, to, &StepWeights::new(dt * inside, tau));
             }
-            Pieces::Leaving(inside) => {
+            Pieces::Leaving([inside, outside]) => {
                 self.advance(from, -from, &StepWeights::new(dt * inside, tau));
-                self.advance(0.0, 0.0, &StepWeights::new(dt * (1.0 - inside), tau));
+                self.advance(0.0, 0.0, &StepWeights::new(dt * outside, tau));
             }
         }
         self.force(body)

@@ -82,7 +82,7 @@ pub(super) enum Active {
     Home(Homing),
     Tare(Taring),
     Contact(Box<ContactSearch>),
-    /// Ramp, retract and jog: one move, done when the axis rests.
+    /// Ramp, unload, retract and jog: one move, done when the axis rests.
     Move,
     /// Hold until this controller tick.
     Hold {
@@ -178,7 +178,10 @@ impl State {
     /// Cycle number; a ramp and hold has one cycle.
     #[must_use]
     pub fn cycle(&self) -> u32 {
-        u32::from(matches!(self.phase, Phase::Ramp | Phase::Hold))
+        u32::from(matches!(
+            self.phase,
+            Phase::Ramp | Phase::Hold | Phase::Unload
+        ))
     }
 
     /// Index of the step in progress, and since when.

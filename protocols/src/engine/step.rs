@@ -159,7 +159,11 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
         Step::Hold { duration, .. } => Active::Hold {
             until_tick: cx.state.tick + cx.state.ticks(duration),
         },
-        Step::Retract {
+        Step::Unload {
+            speed,
+            clearance_mm,
+        }
+        | Step::Retract {
             speed,
             clearance_mm,
         } => {

@@ -59,6 +59,13 @@ pub enum Step {
         #[serde(default, skip_serializing_if = "Option::is_none")]
         until: Option<HoldUntil>,
     },
+    /// Come back to the surface at constant speed, as carefully recorded as the way in.
+    Unload {
+        /// Speed of the way back.
+        speed: MmPerS,
+        /// Distance from contact to stop at, in mm: where the force is surely gone.
+        clearance_mm: f64,
+    },
     /// Leave the tissue.
     Retract {
         /// Speed of the way out.
@@ -122,6 +129,7 @@ impl Step {
             Self::FindContact(_) => Phase::Contact,
             Self::Ramp { .. } => Phase::Ramp,
             Self::Hold { .. } => Phase::Hold,
+            Self::Unload { .. } => Phase::Unload,
             Self::Retract { .. } => Phase::Retract,
             Self::Jog { .. } => Phase::Jog,
         }
@@ -132,7 +140,7 @@ impl Step {
     pub fn needs_homed_axis(&self) -> bool {
         matches!(
             self,
-            Self::FindContact(_) | Self::Ramp { .. } | Self::Retract { .. }
+            Self::FindContact(_) | Self::Ramp { .. } | Self::Unload { .. } | Self::Retract { .. }
         )
     }
 }

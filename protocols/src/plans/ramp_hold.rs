@@ -1,8 +1,13 @@
-//! Ramp and hold: find the tissue, indent at constant speed, hold while the force relaxes.
+//! Ramp and hold: find the tissue, indent at constant speed, hold while the force relaxes, and, if asked,
+//! unload at constant speed.
 
 use super::{FindContact, HoldUntil, Plan, Step};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use serde::{Deserialize, Serialize};
+
+/// Where an unloading ends, in mm before contact: five times the widest accepted standard error of the
+/// contact position and well clear of the tissue that the probe draws after it.
+const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
 /// What a technician chooses for a ramp and hold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -16,6 +21,9 @@ pub struct RampHold {
     /// What may end the hold before.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub until: Option<HoldUntil>,
+    /// Speed of a recorded way back to the surface; without it the probe only leaves.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub unload: Option<MmPerS>,
 }
 
 impl Default for RampHold {
@@ -26,6 +34,7 @@ impl Default for RampHold {
             depth: Depth(30.0),
             hold: Seconds(50.0),
             until: None,
+            unload: None,
         }
     }
 }
@@ -34,34 +43,39 @@ impl RampHold {
     /// The plan, from self-test to retract.
     #[must_use]
     pub fn plan(&self) -> Plan {
+        let mut steps = vec![
+            Step::SelfTest {
+                duration: Seconds(0.5),
+            },
+            Step::Home {
+                speed: MmPerS(9.0),
+                touch_speed: MmPerS(0.3),
+            },
+            Step::Tare {
+                duration: Seconds(1.0),
+            },
+            Step::FindContact(FindContact::default()),
+            Step::Ramp {
+                speed: self.speed,
+                depth: self.depth,
+            },
+            Step::Hold {
+                duration: self.hold,
+                until: self.until,
+            },
+        ];
+        steps.extend(self.unload.map(|speed| Step::Unload {
+            speed,
+            clearance_mm: UNLOAD_CLEARANCE_MM,
+        }));
+        steps.push(Step::Retract {
+            speed: MmPerS(6.0),
+            clearance_mm: 10.0,
+        });
         Plan {
             name: "ramp-hold".into(),
             version: 1,
-            steps: vec![
-                Step::SelfTest {
-                    duration: Seconds(0.5),
-                },
-                Step::Home {
-                    speed: MmPerS(9.0),
-                    touch_speed: MmPerS(0.3),
-                },
-                Step::Tare {
-                    duration: Seconds(1.0),
-                },
-                Step::FindContact(FindContact::default()),
-                Step::Ramp {
-                    speed: self.speed,
-                    depth: self.depth,
-                },
-                Step::Hold {
-                    duration: self.hold,
-                    until: self.until,
-                },
-                Step::Retract {
-                    speed: MmPerS(6.0),
-                    clearance_mm: 10.0,
-                },
-            ],
+            steps,
         }
     }
 }

@@ -19,6 +19,8 @@ pub struct Table {
     pub depth: Vec<f64>,
     /// Force in N.
     pub force: Vec<f64>,
+    /// Whether a row's phase is `unload`; all false where the table has no phases.
+    pub is_unload: Vec<bool>,
     /// What a reader should know.
     pub notes: Vec<String>,
 }
@@ -142,9 +144,8 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
                 layout.width
             ));
         }
-        if let Some(phase) = layout.phase
-            && !matches!(cells[phase].as_str(), "ramp" | "hold")
-        {
+        let phase = layout.phase.map(|phase| cells[phase].as_str());
+        if phase.is_some_and(|phase| !matches!(phase, "ramp" | "hold" | "unload")) {
             left_out += 1;
             continue;
         }
@@ -157,13 +158,14 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
         table.t.push(t);
         table.depth.push(depth);
         table.force.push(force);
+        table.is_unload.push(phase == Some("unload"));
     }
     if table.t.is_empty() {
         return Err("the table has no rows to fit".into());
     }
     if left_out > 0 {
         table.notes.push(format!(
-            "{left_out} rows outside ramp and hold are left out"
+            "{left_out} rows outside ramp, hold and unload are left out"
         ));
     }
     Ok(table)
@@ -272,11 +274,11 @@ mod tests {
     }
 
     #[test]
-    fn our_own_export_keeps_ramp_and_hold_only() {
-        let text =
-            "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,retract\n";
+    fn our_own_export_keeps_what_is_indentation() {
+        let text = "t_s,depth_mm,force_N,phase\n0,,,tare\n1,0,0,ramp\n2,1,0.1,hold\n3,0.5,0,unload\n4,-1,0,retract\n";
         let table = parse_table(text, None).unwrap();
-        assert_eq!(table.t, [1.0, 2.0]);
+        assert_eq!(table.t, [1.0, 2.0, 3.0]);
+        assert_eq!(table.is_unload, [false, false, true]);
         assert!(table.notes[0].contains("2 rows"));
     }
 

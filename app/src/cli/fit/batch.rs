@@ -153,47 +153,5 @@ fn table(sources: &[PathBuf], rows: &[Result<FitReport, Failure>]) -> String {
         }
         lines.push(line);
     }
-    in_columns(&lines)
-}
-
-/// Cells in columns as wide as their widest; a sentence at the end of a short line widens none.
-fn in_columns(lines: &[Vec<String>]) -> String {
-    let columns = lines.first().map_or(0, Vec::len);
-    let letters = |text: &String| text.chars().count();
-    let width = |column: usize| {
-        let whole = lines
-            .iter()
-            .filter(|line| column == 0 || line.len() == columns);
-        whole.filter_map(|line| line.get(column)).map(letters).max()
-    };
-    let widths: Vec<usize> = (0..columns).filter_map(width).collect();
-    let line = |cells: &Vec<String>| {
-        let padded = cells.iter().zip(&widths).map(|(cell, &width)| {
-            // Counted by letters: `±` is two bytes and one letter.
-            format!("{cell:<width$}")
-        });
-        let joined = padded.collect::<Vec<_>>().join("  ");
-        joined.trim_end().to_owned()
-    };
-    lines.iter().map(line).collect::<Vec<_>>().join("\n")
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn a_sentence_does_not_widen_the_columns() {
-        let lines = [
-            vec!["source".into(), "mu1".into(), "R²".into()],
-            vec!["a-long-name".into(), "1 [0, 2]".into(), "1".into()],
-            vec!["b".into(), "failed: a long sentence".into()],
-        ];
-        let expected = [
-            "source       mu1       R²",
-            "a-long-name  1 [0, 2]  1",
-            "b            failed: a long sentence",
-        ];
-        assert_eq!(in_columns(&lines), expected.join("\n"));
-    }
+    text::in_columns(&lines)
 }

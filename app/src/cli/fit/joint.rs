@@ -4,7 +4,6 @@ use super::super::{Failure, output::Output};
 use super::{Recipe, sources};
 use crate::report::text;
 use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
-use palpate_protocols::analysis;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -34,27 +33,7 @@ pub(super) fn run(
         ));
     }
     let shared = names(shared);
-    let mut real: Vec<PathBuf> = found
-        .iter()
-        .map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()))
-        .collect();
-    real.sort();
-    if let Some(pair) = real.windows(2).find(|pair| pair[0] == pair[1]) {
-        return Err(Failure::usage(format!(
-            "{} is given twice; fitted together it would count as two recordings",
-            pair[0].display()
-        )));
-    }
-    let mut records: Vec<(String, Vec<FitSample>)> = Vec::with_capacity(found.len());
-    for path in &found {
-        let source = analysis::read_named(path, recipe.columns.as_ref())
-            .map_err(super::super::source_failure)?;
-        let name = path.display().to_string();
-        for note in &source.notes {
-            output.note(&format!("{name}: {note}"));
-        }
-        records.push((name, source.samples));
-    }
+    let records = sources::read(&found, recipe.columns.as_ref(), output)?;
     let borrowed: Vec<(&str, &[FitSample])> = records
         .iter()
         .map(|(name, samples)| (name.as_str(), samples.as_slice()))

@@ -1,9 +1,10 @@
 //! `palpate fit`: the force model fitted to a session or a table, or to folders full of them.
 
 mod batch;
+mod family;
 mod intervals;
 mod joint;
-mod sources;
+pub(super) mod sources;
 
 use super::Failure;
 use super::output::Output;
@@ -40,6 +41,12 @@ pub struct FitArgs {
     /// body stands for the five of the tissue
     #[arg(long, value_name = "NAMES", conflicts_with_all = ["picture", "profile", "bootstrap"])]
     share: Option<String>,
+    /// Fit another model family, such as maxwell, prony-2 or unloading-3: one body for all sources
+    #[arg(long, value_name = "KEY", conflicts_with_all = ["share", "profile", "bootstrap", "fixed", "free", "jobs"])]
+    family: Option<String>,
+    /// With --family: take the recorded unloading of sessions as well
+    #[arg(long, requires = "family")]
+    unload: bool,
     /// Add 95 % intervals from the profile likelihood
     #[arg(long)]
     profile: bool,
@@ -81,11 +88,15 @@ struct FitOutput<'a> {
 
 pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let columns = args.columns.as_deref().map(str::parse).transpose();
+    let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
+    intervals::check(args)?;
+    if let Some(key) = &args.family {
+        return family::run(key, args, columns.as_ref(), output);
+    }
     let recipe = Recipe {
         options: options(args)?,
-        columns: columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?,
+        columns,
     };
-    intervals::check(args)?;
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
     }
@@ -106,12 +117,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
 
 fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
-    if let Some(to) = to.filter(|to| to.exists()) {
-        return Err(Failure::usage(format!(
-            "{} exists already; give the picture another name",
-            to.display()
-        )));
-    }
+    check_picture(to)?;
     let fitted = recipe.fit(source)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
@@ -124,12 +130,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             Ok(report) => picture::of_report(&short, &fitted.samples, report),
             Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
         };
-        std::fs::write(to, picture).map_err(|err| {
-            Failure::failed(format!(
-                "cannot write the picture {} ({err}); choose a folder that may be written",
-                to.display()
-            ))
-        })?;
+        write_picture(to, &picture)?;
     }
     let report = fitted
         .result
@@ -147,6 +148,26 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         lines.join("\n")
     });
     Ok(())
+}
+
+/// A picture is a new file.
+fn check_picture(to: Option<&Path>) -> Result<(), Failure> {
+    match to.filter(|to| to.exists()) {
+        Some(to) => Err(Failure::usage(format!(
+            "{} exists already; give the picture another name",
+            to.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+fn write_picture(to: &Path, picture: &str) -> Result<(), Failure> {
+    std::fs::write(to, picture).map_err(|err| {
+        Failure::failed(format!(
+            "cannot write the picture {} ({err}); choose a folder that may be written",
+            to.display()
+        ))
+    })
 }
 
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {

@@ -1,6 +1,11 @@
 //! What a batch fits: every session and table in folders, in order.
 
+use super::super::output::Output;
+use super::super::source_failure;
 use super::Failure;
+use palpate_model::fit::FitSample;
+use palpate_protocols::analysis;
+use palpate_sessions::import::ColumnNames;
 use palpate_sessions::log::ReadError;
 use std::fs;
 use std::io;
@@ -42,7 +47,7 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 }
 
 /// Every source named, and every one in the folders named: folder by folder, by name.
-pub(super) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for path in paths {
         if !path.exists() {
@@ -67,6 +72,34 @@ pub(super) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
         }
     }
     Ok(found)
+}
+
+/// Reads sources that are looked at together, each once, by name.
+pub(in crate::cli) fn read(
+    found: &[PathBuf],
+    columns: Option<&ColumnNames>,
+    output: &Output,
+) -> Result<Vec<(String, Vec<FitSample>)>, Failure> {
+    let mut real: Vec<PathBuf> = found
+        .iter()
+        .map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()))
+        .collect();
+    real.sort();
+    if let Some(pair) = real.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(Failure::usage(format!(
+            "{} is given twice; fitted together it would count as two recordings",
+            pair[0].display()
+        )));
+    }
+    let one = |path: &PathBuf| {
+        let source = analysis::read_named(path, columns).map_err(source_failure)?;
+        let name = path.display().to_string();
+        for note in &source.notes {
+            output.note(&format!("{name}: {note}"));
+        }
+        Ok((name, source.samples))
+    };
+    found.iter().map(one).collect()
 }
 
 /// Sources below a folder. Links to folders are not followed, so no walk is endless and nothing

@@ -302,7 +302,7 @@ fn offer(proposal: Proposal, bench: &OpenRig, depth: Depth) -> Offer {
                     speed,
                     depth,
                     hold,
-                    until: None,
+                    ..RampHold::default()
                 },
                 bench,
             )

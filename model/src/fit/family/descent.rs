@@ -8,9 +8,13 @@ use super::problem::{Problem, Rows};
 const STEP_MAX: f64 = 1.0;
 /// A step below this is the last.
 const STEP_MIN: f64 = 1e-9;
-/// So is one that gains less than this share of the sum of squares: a thousandth of the share a single
+/// So is one that gains less than this share of the sum of squares: a thousandth of the share that one
 /// sample has in a long record.
-const GAIN_MIN: f64 = 1e-9;
+pub(super) const GAIN_EXACT: f64 = 1e-9;
+/// The same where the parameters shall be right to a tenth of a standard error.
+pub(super) const GAIN_THIN: f64 = 1e-6;
+/// The same where valleys are compared.
+pub(super) const GAIN_VALLEY: f64 = 1e-4;
 /// Damping, relative to the size of the column, beyond which no step helps.
 const DAMPING_MAX: f64 = 1e8;
 /// Steps at most; each either lowers the sum or raises the damping tenfold.
@@ -41,9 +45,12 @@ pub(super) fn place(problem: &Problem<'_>, z: &[f64], rows: Rows) -> Option<Plac
     })
 }
 
-/// Follows a start down to its valley's floor.
-pub(super) fn descend(problem: &Problem<'_>, start: Place, rows: Rows) -> Place {
-    let mut here = start;
+/// Follows a start down to its valley's floor, until a step gains less than `gain_min`.
+pub(super) fn descend(problem: &Problem<'_>, start: Place, rows: Rows, gain_min: f64) -> Place {
+    let mut here = Place {
+        is_converged: problem.outers() == 0,
+        ..start
+    };
     let mut damping = 1e-3;
     let mut factor = None;
     for _ in 0..STEPS_MAX {
@@ -54,7 +61,7 @@ pub(super) fn descend(problem: &Problem<'_>, start: Place, rows: Rows) -> Place 
             factor = problem.slopes(&here.z, &here.solution, rows);
         }
         let Some(known) = &factor else { break };
-        let step = step(problem, known, damping);
+        let step = bounded_step(problem, known, damping, &here.z);
         let target: Vec<f64> = here
             .z
             .iter()
@@ -73,7 +80,7 @@ pub(super) fn descend(problem: &Problem<'_>, start: Place, rows: Rows) -> Place 
             Some(there) => {
                 let gain = 1.0 - there.sum / here.sum;
                 // A damped step may be short for being damped only.
-                let is_last = moved < STEP_MIN || (gain < GAIN_MIN && damping < 1e-2);
+                let is_last = moved < STEP_MIN || (gain < gain_min && damping < 1e-2);
                 here = Place {
                     is_converged: is_last || there.sum == 0.0,
                     ..there
@@ -88,24 +95,47 @@ pub(super) fn descend(problem: &Problem<'_>, start: Place, rows: Rows) -> Place 
     here
 }
 
-/// The damped step of the outer parameters; zero where it is not determined.
-fn step(problem: &Problem<'_>, factor: &Factor, damping: f64) -> Vec<f64> {
+/// The damped step, with the parameters held that it would push over the end of their range.
+fn bounded_step(problem: &Problem<'_>, factor: &Factor, damping: f64, z: &[f64]) -> Vec<f64> {
+    let mut is_held = vec![false; z.len()];
+    loop {
+        let step = step(problem, factor, damping, &is_held);
+        let over = (0..z.len()).find(|&i| {
+            let (low, high) = problem.ranges[i];
+            (z[i] <= low && step[i] < 0.0) || (z[i] >= high && step[i] > 0.0)
+        });
+        match over {
+            Some(index) => is_held[index] = true,
+            None => return step,
+        }
+    }
+}
+
+/// The damped step of the outer parameters that are not held; zero where it is not determined.
+fn step(problem: &Problem<'_>, factor: &Factor, damping: f64, is_held: &[bool]) -> Vec<f64> {
     let (linear, outers) = (problem.linear(), problem.outers());
     let mut triangle = Triangle::new(outers + 1);
     let mut sizes = vec![0.0f64; outers];
+    let mut row = vec![0.0; outers + 1];
     for i in linear..factor.width() {
-        let row = &factor.row(i)[linear..];
-        triangle.push(row, 1.0);
-        for (size, value) in sizes.iter_mut().zip(row) {
-            *size += value * value;
+        row.copy_from_slice(&factor.row(i)[linear..]);
+        for ((value, size), held) in row.iter_mut().zip(&mut sizes).zip(is_held) {
+            if *held {
+                *value = 0.0;
+            }
+            *size += *value * *value;
         }
+        triangle.push(&row, 1.0);
     }
     // Along a direction that the linear unknowns make up for nothing is left; the largest of the
     // others still bounds the step.
     let largest = sizes.iter().fold(0.0f64, |all, size| all.max(*size));
     for (i, size) in sizes.iter().enumerate() {
         let mut row = vec![0.0; outers + 1];
-        row[i] = (damping * size.max(1e-12 * largest)).sqrt();
+        row[i] = match is_held[i] {
+            true => 1.0,
+            false => (damping * size.max(1e-12 * largest)).sqrt(),
+        };
         triangle.push(&row, 1.0);
     }
     let step = triangle.finish().solve(outers);

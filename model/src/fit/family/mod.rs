@@ -5,13 +5,18 @@
 //! deepest valleys on the thinned records, damped Gauss-Newton steps follow them, first there and
 //! then on every sample.
 
+mod curve;
 mod descent;
+mod given;
 mod nonnegative;
+mod predict;
 mod problem;
 mod report;
 mod search;
 
-pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_family};
+pub use given::fit_family_at;
+pub use predict::{Predicted, predict};
+pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_body, fit_family};
 
 /// What a family's fit finds besides the body: the same for every family, or they could not be
 /// compared.

@@ -4,8 +4,9 @@ use super::super::triangle::{Factor, Triangle};
 use super::problem::{Problem, Rows};
 use crate::families::{Drive, Relaxation};
 
-/// Relaxation times of the grid from which a Prony series is grown.
-const GRID: usize = 40;
+/// Relaxation times of the grid from which a Prony series is grown: at least so many, and so many for
+/// each factor of ten, since non-negative sums of neighbours closer than that cannot be told apart.
+const GRID: (usize, f64) = (40, 6.0);
 
 /// Coefficients of the columns of `factor` that fit its last column best, those marked not below
 /// zero (Lawson & Hanson, "Solving Least Squares Problems", chapter 23).
@@ -92,8 +93,10 @@ fn gradient(factor: &Factor, solution: &[f64]) -> Vec<f64> {
 pub(super) fn grown(problem: &Problem<'_>, terms: usize) -> Option<Vec<f64>> {
     let (low, high) = problem.ranges.first().copied()?;
     let spring = Drive::power(1, 1.0);
-    let log_taus: Vec<f64> = (0..GRID)
-        .map(|i| low + (high - low) * i as f64 / (GRID - 1) as f64)
+    let decades = (high - low) / std::f64::consts::LN_10;
+    let grid = GRID.0.max((GRID.1 * decades).ceil() as usize);
+    let log_taus: Vec<f64> = (0..grid)
+        .map(|i| low + (high - low) * i as f64 / (grid - 1) as f64)
         .collect();
     let relaxing = log_taus
         .iter()
@@ -102,12 +105,12 @@ pub(super) fn grown(problem: &Problem<'_>, terms: usize) -> Option<Vec<f64>> {
         .chain(relaxing)
         .collect();
     let factor = problem.columns_factor(&columns, None, Rows::Thin)?;
-    let is_bound: Vec<bool> = (0..factor.width() - 1).map(|k| k <= GRID).collect();
+    let is_bound: Vec<bool> = (0..factor.width() - 1).map(|k| k <= grid).collect();
     let solution = non_negative(&factor, &is_bound);
     // Weight and centre of each run of neighbours.
     let mut groups: Vec<(f64, f64)> = Vec::new();
     let mut is_running = false;
-    for (log_tau, &weight) in log_taus.iter().zip(&solution[1..=GRID]) {
+    for (log_tau, &weight) in log_taus.iter().zip(&solution[1..=grid]) {
         match groups.last_mut().filter(|_| is_running && weight > 0.0) {
             Some(group) => *group = merged(*group, (weight, *log_tau)),
             None if weight > 0.0 => groups.push((weight, *log_tau)),
@@ -128,14 +131,18 @@ pub(super) fn grown(problem: &Problem<'_>, terms: usize) -> Option<Vec<f64>> {
     if log_taus.is_empty() {
         log_taus.push(0.5 * (low + high));
     }
-    // Too few: new ones go into the widest gaps, the ends of the range included.
+    // Too few: new ones go into the widest gaps between those found, where something relaxes; the ends of
+    // the range count only beside a single one.
     while log_taus.len() < terms {
-        let mut ends = vec![low];
-        ends.extend(&log_taus);
-        ends.push(high);
+        let mut ends = log_taus.clone();
+        if ends.len() == 1 {
+            ends.insert(0, low);
+            ends.push(high);
+        }
         let widest = (0..ends.len() - 1)
             .max_by(|&i, &j| (ends[i + 1] - ends[i]).total_cmp(&(ends[j + 1] - ends[j])))?;
-        log_taus.insert(widest, 0.5 * (ends[widest] + ends[widest + 1]));
+        log_taus.push(0.5 * (ends[widest] + ends[widest + 1]));
+        log_taus.sort_by(f64::total_cmp);
     }
     Some(log_taus)
 }

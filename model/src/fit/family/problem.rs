@@ -1,7 +1,7 @@
 //! Records and a family as a linear problem for any given outer parameters.
 
 use super::super::record::{constant_force, depths, measured};
-use super::super::sample::{FitError, FitSample, check_samples};
+use super::super::sample::{FitError, FitSample, check_samples, check_scale};
 use super::super::scan::{log_tau_range, union};
 use super::super::thin::Thin;
 use super::super::triangle::{Factor, Triangle};
@@ -14,7 +14,12 @@ use crate::units::{Depth, Seconds};
 /// direction.
 const DIFFERENCE: f64 = 1e-5;
 
+/// Share of its greatest depth by which the probe must come back in some record before what having
+/// been deeper adds can be told: less than a tenth would be extrapolated over all the rest.
+const RETURN_MIN: f64 = 0.1;
+
 /// One record.
+#[derive(Clone)]
 pub(super) struct Record<'a> {
     pub name: &'a str,
     pub samples: &'a [FitSample],
@@ -31,6 +36,7 @@ pub(super) enum Rows {
 }
 
 /// A family and records.
+#[derive(Clone)]
 pub(super) struct Problem<'a> {
     pub family: &'a dyn Family,
     pub records: Vec<Record<'a>>,
@@ -108,7 +114,42 @@ impl<'a> Problem<'a> {
                 parameters: problem.free(),
             });
         }
+        problem.check_return()?;
         Ok(problem)
+    }
+
+    /// Refuses a family that softens where no record unloads.
+    fn check_return(&self) -> Result<(), FitError> {
+        let middle: Vec<f64> = self.ranges.iter().map(|(a, b)| 0.5 * (a + b)).collect();
+        let columns = self.family.columns(&self.outer(&middle));
+        let softens = |term: &Relaxation| term.elastic.softens() || term.rate.softens();
+        if !columns.iter().flatten().any(softens) {
+            return Ok(());
+        }
+        let share = self.records.iter().map(|record| returned(record.samples));
+        let share = share.fold(0.0, f64::max);
+        if share >= RETURN_MIN {
+            return Ok(());
+        }
+        Err(FitError::Unsupported {
+            family: self.family.name(),
+            reason: format!(
+                "the probe comes back by {:.0} % of its greatest depth where {:.0} % are needed to tell unloading from loading; give a record with its unloading",
+                100.0 * share,
+                100.0 * RETURN_MIN
+            ),
+        })
+    }
+
+    /// The same records and ranges with another member of the family.
+    pub fn with<'b>(&self, family: &'b dyn Family) -> Problem<'b>
+    where
+        'a: 'b,
+    {
+        Problem {
+            family,
+            ..self.clone()
+        }
     }
 
     /// Samples whose force counts.
@@ -199,7 +240,7 @@ impl<'a> Problem<'a> {
             let own = columns.len() + record * self.own();
             self.walk(record, rows, &[columns], |step| {
                 row.fill(0.0);
-                row[..columns.len()].copy_from_slice(step.values[0]);
+                row[..columns.len()].copy_from_slice(&step.values[0]);
                 self.own_columns(&mut row[own..linear], step.elapsed, fading);
                 row[linear] = step.force;
                 triangle.push(&row, step.weight);
@@ -241,18 +282,25 @@ impl<'a> Problem<'a> {
         let outer = self.outer(z);
         let columns = self.family.columns(&outer);
         let fading = self.family.fading(&outer);
-        // The whole body shifted both ways along every outer parameter.
+        // The body shifted both ways along every outer parameter, without the terms that a shift
+        // leaves as they are: they cancel in the difference.
         let mut bodies = vec![columns];
         let mut fadings = vec![fading];
         for i in 0..z.len() {
-            for sign in [1.0, -1.0] {
+            let [up, down] = [1.0, -1.0].map(|sign| {
                 let mut shifted = z.to_vec();
                 shifted[i] += sign * DIFFERENCE;
                 let outer = self.outer(&shifted);
                 let coefficients = solution[..self.coefficients].iter().copied();
-                bodies.push(vec![joined(&self.family.columns(&outer), coefficients)]);
                 fadings.push(self.family.fading(&outer));
-            }
+                joined(&self.family.columns(&outer), coefficients)
+            });
+            let only = |one: &[Relaxation], other: &[Relaxation]| {
+                let kept = one.iter().filter(|term| !other.contains(term));
+                vec![kept.copied().collect::<Vec<_>>()]
+            };
+            bodies.push(only(&up, &down));
+            bodies.push(only(&down, &up));
         }
         let bodies: Vec<&[Vec<Relaxation>]> = bodies.iter().map(Vec::as_slice).collect();
         let (linear, free) = (self.linear(), self.free());
@@ -266,7 +314,7 @@ impl<'a> Problem<'a> {
             };
             self.walk(record, rows, &bodies, |step| {
                 row.fill(0.0);
-                row[..self.coefficients].copy_from_slice(step.values[0]);
+                row[..self.coefficients].copy_from_slice(&step.values[0]);
                 self.own_columns(&mut row[own..own + self.own()], step.elapsed, fading);
                 for i in 0..z.len() {
                     let [up, down] =
@@ -303,9 +351,8 @@ impl<'a> Problem<'a> {
             .collect();
         let mut values: Vec<Vec<f64>> = bodies.iter().map(|one| vec![0.0; one.len()]).collect();
         let mut visit = |elapsed: f64, force: f64, weight: f64, values: &[Vec<f64>]| {
-            let values: Vec<&[f64]> = values.iter().map(Vec::as_slice).collect();
             visit(&Step {
-                values: &values,
+                values,
                 elapsed,
                 force,
                 weight,
@@ -358,7 +405,7 @@ impl<'a> Problem<'a> {
 
 /// One row of a walk: the columns of every body there.
 struct Step<'s> {
-    values: &'s [&'s [f64]],
+    values: &'s [Vec<f64>],
     /// Since the first sample, in s.
     elapsed: f64,
     force: f64,
@@ -370,6 +417,18 @@ pub(super) struct SlopeRow<'s> {
     /// Columns, outer slopes, residual.
     pub row: &'s [f64],
     pub weight: f64,
+}
+
+/// Share of the greatest depth before by which the probe comes back while its force counts, at most.
+fn returned(samples: &[FitSample]) -> f64 {
+    let (mut deepest, mut share) = (0.0f64, 0.0f64);
+    for sample in samples {
+        deepest = deepest.max(sample.depth.0);
+        if sample.is_measured() && deepest > 0.0 {
+            share = share.max(1.0 - sample.depth.0.max(0.0) / deepest);
+        }
+    }
+    share
 }
 
 fn check(samples: &[FitSample]) -> Result<(), FitError> {
@@ -394,5 +453,5 @@ fn check(samples: &[FitSample]) -> Result<(), FitError> {
             contact: 0.0,
         });
     }
-    Ok(())
+    check_scale(samples)
 }

@@ -1,6 +1,7 @@
-//! Where to start: the sum of squares over a grid of all outer parameters, on the thinned records.
+//! Where to start: the sum of squares over a grid of all outer parameters, on the thinned records and
+//! with a coarse member of the family where it has one.
 
-use super::descent::{Place, descend, place};
+use super::descent::{GAIN_THIN, GAIN_VALLEY, Place, descend, place};
 use super::nonnegative::grown;
 use super::problem::{Problem, Rows};
 use crate::families::OuterRange;
@@ -15,15 +16,29 @@ const OTHERS: [usize; 3] = [7, 4, 6];
 
 /// The best place on the thinned records, or `None` where the family has no finite force at all.
 pub(super) fn search(problem: &Problem<'_>) -> Option<Place> {
+    let start = match problem.family.coarse() {
+        Some(coarse) => place(problem, &valley(&problem.with(&*coarse))?.z, Rows::Thin)?,
+        None => valley(problem)?,
+    };
+    Some(descend(problem, start, Rows::Thin, GAIN_THIN))
+}
+
+/// The deepest valley, not followed to its very floor.
+fn valley(problem: &Problem<'_>) -> Option<Place> {
     let family = problem.family.outer();
     let times = family
         .iter()
         .filter(|one| one.range == OuterRange::Time)
         .count();
-    // Several relaxation times would need a grid of their own each; they grow from one dense series.
+    // Several relaxation times would need a grid of their own each; they start from one dense series,
+    // and evenly spread.
     if times > 1 {
-        let start = place(problem, &grown(problem, times)?, Rows::Thin)?;
-        return Some(descend(problem, start, Rows::Thin));
+        let &(low, high) = problem.ranges.first()?;
+        let share = |i: usize| (i as f64 + 0.5) / times as f64;
+        let even = (0..times).map(|i| low + (high - low) * share(i)).collect();
+        let starts = grown(problem, times).into_iter().chain([even]);
+        let starts = starts.filter_map(|z| place(problem, &z, Rows::Thin));
+        return deepest(problem, starts);
     }
     let alone = family.len() == 1;
     let axes: Vec<Vec<f64>> = family
@@ -79,10 +94,20 @@ pub(super) fn search(problem: &Problem<'_>) -> Option<Place> {
         })
         .collect();
     valleys.sort_by(|&a, &b| sum(a).total_cmp(&sum(b)));
-    valleys
-        .into_iter()
-        .take(VALLEYS)
-        .filter_map(|cell| places[cell].clone())
-        .map(|start| descend(problem, start, Rows::Thin))
-        .min_by(|a, b| a.sum.total_cmp(&b.sum))
+    let starts = valleys.into_iter().take(VALLEYS);
+    deepest(problem, starts.filter_map(|cell| places[cell].clone()))
+}
+
+/// The deepest floor below these starts; one whose coefficients the family allows, if there is any.
+fn deepest(problem: &Problem<'_>, starts: impl Iterator<Item = Place>) -> Option<Place> {
+    let is_refused = |place: &Place| {
+        let mut coefficients = place.solution[..problem.coefficients].iter().enumerate();
+        coefficients.any(|(k, &value)| value < 0.0 && problem.family.is_non_negative(k))
+    };
+    starts
+        .map(|start| descend(problem, start, Rows::Thin, GAIN_VALLEY))
+        .min_by(|a, b| {
+            let refused = is_refused(a).cmp(&is_refused(b));
+            refused.then(a.sum.total_cmp(&b.sum))
+        })
 }

@@ -124,13 +124,13 @@ impl Bank {
         match Pieces::of(from, to) {
             Pieces::Inside => self.piece(from, to - from, dt),
             Pieces::Outside => self.piece(0.0, 0.0, dt),
-            Pieces::Entering(outside) => {
+            Pieces::Entering([outside, inside]) => {
                 self.piece(0.0, 0.0, dt * outside);
-                self.piece(0.0, to, dt * (1.0 - outside));
+                self.piece(0.0, to, dt * inside);
             }
-            Pieces::Leaving(inside) => {
+            Pieces::Leaving([inside, outside]) => {
                 self.piece(from, -from, dt * inside);
-                self.piece(0.0, 0.0, dt * (1.0 - inside));
+                self.piece(0.0, 0.0, dt * outside);
             }
         }
     }

@@ -1,0 +1,171 @@
+//! `palpate fit --family KEY`: any model family, one body for all sources.
+
+use super::super::{Failure, output::Output, source_failure};
+use super::{FitArgs, sources};
+use crate::report::family::{self, FittedRecord};
+use palpate_model::families::by_key;
+use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
+use palpate_model::signal::work;
+use palpate_model::units::Newtons;
+use palpate_protocols::analysis::{self, Stretch};
+use palpate_protocols::runner::Stopwatch;
+use palpate_sessions::import::ColumnNames;
+use serde::Serialize;
+
+#[derive(Serialize)]
+struct FamilyOutput<'a> {
+    command: &'static str,
+    family: &'a str,
+    name: String,
+    equation: &'static str,
+    cannot_represent: &'static str,
+    parameters: Vec<ParameterOutput<'a>>,
+    records: Vec<RecordOutput<'a>>,
+    samples: usize,
+    free: usize,
+    rmse_n: f64,
+    effective_samples: f64,
+    warnings: &'a [String],
+    /// The fit alone, without reading.
+    seconds: f64,
+}
+
+#[derive(Serialize)]
+struct ParameterOutput<'a> {
+    name: &'a str,
+    value: f64,
+    unit: &'a str,
+    std_error: Option<f64>,
+}
+
+#[derive(Serialize)]
+struct RecordOutput<'a> {
+    record: &'a str,
+    f_offset_n: f64,
+    f0_n: f64,
+    samples: usize,
+    r2: f64,
+    rmse_n: f64,
+    worst_n: f64,
+    work_measured_n_mm: f64,
+    work_fitted_n_mm: f64,
+}
+
+/// Fits the family of `key` to all sources together.
+pub(super) fn run(
+    key: &str,
+    args: &FitArgs,
+    columns: Option<&ColumnNames>,
+    output: &Output,
+) -> Result<(), Failure> {
+    let family = by_key(key).map_err(Failure::usage)?;
+    let found = sources::find(&args.sources)?;
+    let to = args.picture.as_deref();
+    super::check_picture(to)?;
+    if to.is_some() && found.len() > 1 {
+        return Err(Failure::usage(
+            "--picture is for one record; name a single session or table",
+        ));
+    }
+    let stretch = match args.unload {
+        true => Stretch::WithUnload,
+        false => Stretch::RampHold,
+    };
+    let mut named: Vec<(String, Vec<FitSample>)> = Vec::with_capacity(found.len());
+    for path in &found {
+        let source = analysis::read_stretch(path, columns, stretch).map_err(source_failure)?;
+        let name = path.display().to_string();
+        for note in &source.notes {
+            output.note(&format!("{name}: {note}"));
+        }
+        named.push((name, source.samples));
+    }
+    let borrowed: Vec<(&str, &[FitSample])> = named
+        .iter()
+        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
+        .collect();
+    let watch = Stopwatch::start();
+    let fit = fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
+    let seconds = watch.seconds();
+    let forces = forces(&fit, &borrowed)?;
+    let records: Vec<FittedRecord<'_>> = borrowed
+        .iter()
+        .zip(&forces)
+        .zip(&fit.records)
+        .map(|((&(_, samples), forces), own)| fitted(samples, forces, own.r2(samples)))
+        .collect();
+    if let (Some(to), [record]) = (to, records.as_slice()) {
+        let name = found[0].file_name().unwrap_or(found[0].as_os_str());
+        let picture = family::picture(&name.to_string_lossy(), &*family, &fit, record);
+        super::write_picture(to, &picture)?;
+    }
+    let object = FamilyOutput {
+        command: "fit",
+        family: &fit.model.family,
+        name: family.name(),
+        equation: family.equation(),
+        cannot_represent: family.cannot_represent(),
+        parameters: parameters(&fit),
+        records: outputs(&fit, &records),
+        samples: fit.samples,
+        free: fit.free,
+        rmse_n: fit.rms,
+        effective_samples: fit.effective_samples,
+        warnings: &fit.warnings,
+        seconds,
+    };
+    output.result(&object, || family::whole(&*family, &fit, &records));
+    Ok(())
+}
+
+fn forces(fit: &FamilyFit, records: &[(&str, &[FitSample])]) -> Result<Vec<Vec<Newtons>>, Failure> {
+    let each = records.iter().enumerate();
+    each.map(|(index, (_, samples))| fit.forces(index, samples).map_err(Failure::failed))
+        .collect()
+}
+
+/// A record beside its fit; energies over the samples whose force counts.
+fn fitted<'a>(samples: &'a [FitSample], forces: &'a [Newtons], r2: f64) -> FittedRecord<'a> {
+    let known = || {
+        samples
+            .iter()
+            .zip(forces)
+            .filter(|(one, _)| one.is_measured())
+    };
+    FittedRecord {
+        samples,
+        forces,
+        r2,
+        work: [
+            work(known().map(|(one, _)| (one.depth, one.force))),
+            work(known().map(|(one, fit)| (one.depth, *fit))),
+        ],
+    }
+}
+
+fn parameters(fit: &FamilyFit) -> Vec<ParameterOutput<'_>> {
+    let all = fit.parameters.iter().map(|one| ParameterOutput {
+        name: &one.name,
+        value: one.value,
+        unit: &one.unit,
+        std_error: one.std_error,
+    });
+    all.collect()
+}
+
+fn outputs<'a>(fit: &'a FamilyFit, records: &[FittedRecord<'_>]) -> Vec<RecordOutput<'a>> {
+    let pairs = fit.records.iter().zip(records);
+    pairs
+        .map(|(own, record)| RecordOutput {
+            record: &own.name,
+            f_offset_n: own.offset,
+            f0_n: own.initial,
+            samples: own.samples,
+            r2: record.r2,
+            rmse_n: own.rms,
+            worst_n: own.worst,
+            work_measured_n_mm: record.work[0],
+            work_fitted_n_mm: record.work[1],
+        })
+        .collect()
+}

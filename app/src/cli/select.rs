@@ -1,0 +1,121 @@
+//! `palpate select`: model families compared on sessions and tables.
+
+use super::Failure;
+use super::fit::sources;
+use super::output::Output;
+use crate::report::{of_selection, selection};
+use clap::Args;
+use palpate_model::families::by_key;
+use palpate_model::fit::FitSample;
+use palpate_model::select::{SelectError, SelectOptions, Selection, select};
+use palpate_protocols::runner::Stopwatch;
+use serde::Serialize;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+
+/// Arguments of `palpate select`.
+#[derive(Debug, Args)]
+pub struct SelectArgs {
+    /// Session folders, delimited tables with columns for time, depth and force, or folders of them;
+    /// all are taken for presses of one body
+    #[arg(required = true, value_name = "SOURCE")]
+    sources: Vec<PathBuf>,
+    /// Error of force that does not matter: newtons (0.05N), percent of the peak force (1%) or
+    /// percent of what a hand notices (10%jnd)
+    #[arg(long, value_name = "ERROR")]
+    tolerance: Option<String>,
+    /// What is held out and predicted: auto (each record in turn; of one record its last part),
+    /// speed, depth, specimen or none
+    #[arg(long, value_name = "WHAT", default_value = "auto")]
+    hold_out: String,
+    /// Families to compare, as in kelvin,series-3,prony-2; all without it
+    #[arg(long, value_name = "NAMES")]
+    families: Option<String>,
+    /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
+    #[arg(long, value_name = "NAMES")]
+    columns: Option<String>,
+    /// Draw error over cost as a new SVG file
+    #[arg(long, value_name = "FILE")]
+    plot: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct SelectOutput<'a> {
+    command: &'static str,
+    #[serde(flatten)]
+    selection: &'a Selection,
+    /// The comparison alone, without reading.
+    seconds: f64,
+}
+
+pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
+    let options = options(args)?;
+    let columns = args.columns.as_deref().map(str::parse).transpose();
+    let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
+    if let Some(to) = args.plot.as_deref().filter(|to| to.exists()) {
+        return Err(Failure::usage(format!(
+            "{} exists already; give the plot another name",
+            to.display()
+        )));
+    }
+    let found = sources::find(&args.sources)?;
+    let records = sources::read(&found, columns.as_ref(), output)?;
+    let borrowed: Vec<(&str, &[FitSample])> = records
+        .iter()
+        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
+        .collect();
+    let bar = output.count_bar(0);
+    let watch = Stopwatch::start();
+    let selection = select(&borrowed, &options, &|news| {
+        bar.set_length(news.total as u64);
+        bar.set_position(news.done as u64);
+        bar.set_message(news.family.clone());
+        ControlFlow::Continue(())
+    });
+    let seconds = watch.seconds();
+    bar.finish_and_clear();
+    let selection = selection.map_err(|err| match err {
+        SelectError::HoldOut(_) | SelectError::NoFamilies | SelectError::NoRecords => {
+            Failure::usage(err)
+        }
+        SelectError::Fit(_) | SelectError::Ended => Failure::failed(err),
+    })?;
+    if let Some(to) = &args.plot {
+        std::fs::write(to, of_selection(&selection)).map_err(|err| {
+            Failure::failed(format!(
+                "cannot write the plot {} ({err}); choose a folder that may be written",
+                to.display()
+            ))
+        })?;
+    }
+    let object = SelectOutput {
+        command: "select",
+        selection: &selection,
+        seconds,
+    };
+    output.result(&object, || selection::whole(&selection));
+    Ok(())
+}
+
+fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
+    let mut options = SelectOptions {
+        hold_out: args.hold_out.parse().map_err(Failure::usage)?,
+        ..SelectOptions::default()
+    };
+    let tolerance = args.tolerance.as_deref().map(str::parse).transpose();
+    options.tolerance = tolerance.map_err(Failure::usage)?;
+    if let Some(names) = &args.families {
+        let mut keys: Vec<&str> = Vec::new();
+        for key in names.split(',').map(str::trim) {
+            if !keys.contains(&key) {
+                keys.push(key);
+            }
+        }
+        let families = keys.into_iter().map(by_key).collect::<Result<_, _>>();
+        options.families = families.map_err(Failure::usage)?;
+    }
+    Ok(options)
+}

@@ -1,0 +1,266 @@
+//! The extremes as people read them: a summary by group, and the page with all tables.
+
+use palpate_model::extremes::{Row, Verdict};
+use std::collections::BTreeMap;
+
+/// All verdicts, in the order of [`GroupSummary::counts`].
+pub const VERDICTS: [Verdict; 4] = [
+    Verdict::Right,
+    Verdict::Refused,
+    Verdict::Flagged,
+    Verdict::Wrong,
+];
+
+/// One group of cases in numbers.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GroupSummary {
+    /// The group.
+    pub group: &'static str,
+    /// Rows of each of [`VERDICTS`].
+    pub counts: [usize; 4],
+    /// The right row that used most of its tolerance, in words.
+    pub tightest: Option<String>,
+}
+
+/// Every group in numbers, in the order they were run.
+#[must_use]
+pub fn summary(rows: &[Row]) -> Vec<GroupSummary> {
+    groups(rows)
+        .into_iter()
+        .map(|(group, rows)| GroupSummary {
+            group,
+            counts: VERDICTS
+                .map(|verdict| rows.iter().filter(|row| row.verdict == verdict).count()),
+            tightest: tightest(&rows).map(|(row, error)| {
+                format!(
+                    "{error:.1e} of {:.0e}: {}, {}",
+                    row.tolerance, row.subject, row.case
+                )
+            }),
+        })
+        .collect()
+}
+
+/// Groups in the order they were run, with their rows.
+fn groups(rows: &[Row]) -> Vec<(&'static str, Vec<&Row>)> {
+    let mut groups: Vec<(&'static str, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        match groups.iter_mut().find(|(group, _)| *group == row.group) {
+            Some((_, own)) => own.push(row),
+            None => groups.push((row.group, vec![row])),
+        }
+    }
+    groups
+}
+
+/// The right row that used most of its tolerance.
+fn tightest<'a>(rows: &[&'a Row]) -> Option<(&'a Row, f64)> {
+    rows.iter()
+        .filter(|row| row.verdict == Verdict::Right)
+        .filter_map(|row| Some((*row, row.relative_error?)))
+        .max_by(|(a, x), (b, y)| (x / a.tolerance).total_cmp(&(y / b.tolerance)))
+}
+
+/// One line for each group, then every wrong row.
+#[must_use]
+pub fn text(rows: &[Row]) -> String {
+    let mut lines = Vec::new();
+    for one in summary(rows) {
+        let [right, refused, flagged, wrong] = one.counts;
+        lines.push(format!(
+            "{}: {right} right, {refused} refused, {flagged} flagged, {wrong} WRONG",
+            one.group
+        ));
+        if let Some(tightest) = one.tightest {
+            lines.push(format!("  closest to its tolerance: {tightest}"));
+        }
+    }
+    let wrong = rows.iter().filter(|row| row.verdict == Verdict::Wrong);
+    lines.extend(wrong.map(|row| {
+        format!(
+            "WRONG {}: {}, {}: {}",
+            row.group, row.subject, row.case, row.sentence
+        )
+    }));
+    lines.join("\n")
+}
+
+/// The Markdown page.
+#[must_use]
+pub fn page(rows: &[Row]) -> String {
+    let mut page = INTRODUCTION.to_owned();
+    page += "| group | right | refused | flagged | wrong | closest to its tolerance |\n|---|---|---|---|---|---|\n";
+    for one in summary(rows) {
+        let [right, refused, flagged, wrong] = one.counts;
+        let (group, tightest) = (one.group, one.tightest.unwrap_or_default());
+        page += &format!("| {group} | {right} | {refused} | {flagged} | {wrong} | {tightest} |\n");
+    }
+    for (group, rows) in groups(rows) {
+        page += &format!("\n## {}\n\n", capital(group));
+        page += &match group {
+            "relaxation time and step" => by_time_and_step(&rows),
+            "integrators, relaxation time and step" => by_ratio(&rows),
+            _ => by_case(&rows),
+        };
+    }
+    page
+}
+
+const INTRODUCTION: &str = "\
+# Extremes
+
+Written by `palpate extremes --page docs/guide/extremes.md`; do not edit.
+
+What happens where numbers end: relaxation times of a nanosecond and of thirty years, depths of a metre,
+a hundred million samples, records of one sample, NaN. Every family of force models, every integrator and
+every fit is put to the same cases, and each row is
+
+* **right**: the error is within the tolerance. For a force it is relative to the largest force of
+  the path, against a reference in 75 digits or more; for the exact step and the families the
+  tolerance is 1e-13, in single precision 3e-6, and for an approximate integrator what its order
+  promises of a path of so many samples. For a fit of a record without noise it is that of the worst
+  parameter, tolerance 1e-6 (1e-3 with an offset of a million times the signal, or times since 1970).
+* **refused**: no number, and one sentence that names the reason and what to do.
+* **flagged**: numbers of a fit with a warning not to rely on them.
+* **wrong**: anything else, NaN, infinity, or a refusal of what has an answer. The command then ends
+  with exit code 1.
+
+Forces below 1e-180 N count as none, and forces beyond 1e300 N are refused.
+
+";
+
+fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
+/// What became of several rows in one short cell: the worst error, or the worst verdict.
+fn cell(rows: &[&Row]) -> String {
+    let worst = rows.iter().max_by(|a, b| {
+        let error = |row: &Row| row.relative_error.unwrap_or_default();
+        a.verdict
+            .cmp(&b.verdict)
+            .then(error(a).total_cmp(&error(b)))
+    });
+    match worst {
+        None => String::new(),
+        Some(row) if row.verdict == Verdict::Right => {
+            format!("{:.0e}", row.relative_error.unwrap_or_default())
+        }
+        Some(row) => row.verdict.word().to_owned(),
+    }
+}
+
+/// Exponents of a case called `tau 1e3 s, step 1e-6 s`.
+fn exponents(case: &str) -> Option<(i32, i32)> {
+    let (tau, step) = case.split_once(" s, step 1e")?;
+    let tau = tau.strip_prefix("tau 1e")?.parse().ok()?;
+    Some((tau, step.strip_suffix(" s")?.parse().ok()?))
+}
+
+fn by_time_and_step(rows: &[&Row]) -> String {
+    let mut cells: BTreeMap<i32, BTreeMap<i32, Vec<&Row>>> = BTreeMap::new();
+    for row in rows {
+        if let Some((tau, step)) = exponents(&row.case) {
+            cells
+                .entry(tau)
+                .or_default()
+                .entry(step)
+                .or_default()
+                .push(row);
+        }
+    }
+    let steps: Vec<i32> = cells
+        .values()
+        .next()
+        .map_or(Vec::new(), |row| row.keys().copied().collect());
+    let mut table = "Worst error of any family, relative to the peak force, by relaxation time (down) and step\n(across). The path enters, is held, goes half back, leaves and comes again in 20 steps.\n\n".to_owned();
+    table += &header(
+        "tau \\ step",
+        steps.iter().map(|step| format!("1e{step} s")),
+    );
+    for (tau, row) in &cells {
+        let line = row.values().map(|rows| cell(rows)).collect();
+        table += &line_of(&format!("1e{tau} s"), line);
+    }
+    table
+}
+
+fn by_ratio(rows: &[&Row]) -> String {
+    let mut subjects: Vec<&str> = Vec::new();
+    let mut cells: BTreeMap<i32, BTreeMap<&str, Vec<&Row>>> = BTreeMap::new();
+    for row in rows {
+        let Some((tau, step)) = exponents(&row.case) else {
+            continue;
+        };
+        if !subjects.contains(&row.subject.as_str()) {
+            subjects.push(&row.subject);
+        }
+        let of_ratio = cells.entry(step - tau).or_default();
+        of_ratio.entry(&row.subject).or_default().push(row);
+    }
+    let mut table = "Worst error, relative to the peak force, by step over relaxation time. Down to 20 mm, a hold and\nhalf back, 20 steps each. Unstable integrators are refused.\n\n".to_owned();
+    table += &header("step / tau", subjects.iter().map(|&name| name.to_owned()));
+    for (ratio, row) in &cells {
+        let line = subjects
+            .iter()
+            .map(|name| row.get(name).map_or(String::new(), |rows| cell(rows)));
+        table += &line_of(&format!("1e{ratio}"), line.collect());
+    }
+    table
+}
+
+fn by_case(rows: &[&Row]) -> String {
+    let mut cases: Vec<(&str, Vec<&Row>)> = Vec::new();
+    for row in rows {
+        match cases.iter_mut().find(|(case, _)| *case == row.case) {
+            Some((_, own)) => own.push(row),
+            None => cases.push((&row.case, vec![row])),
+        }
+    }
+    let names = ["what", "worst error", "the first sentence"];
+    let mut table = header("case", names.into_iter().map(str::to_owned));
+    for (case, rows) in cases {
+        let error = tightest(&rows).map_or(String::new(), |(_, error)| format!("{error:.0e}"));
+        let sentence = rows.iter().find(|row| !row.sentence.is_empty());
+        let sentence = sentence.map_or(String::new(), |row| row.sentence.replace('|', "/"));
+        table += &line_of(case, vec![verdicts(&rows), error, sentence]);
+    }
+    table
+}
+
+/// Who did what: `all right`, or `right but for refused: voigt + fung`, the most first.
+fn verdicts(rows: &[&Row]) -> String {
+    let mut named: Vec<(Verdict, Vec<&str>)> = VERDICTS
+        .into_iter()
+        .map(|verdict| {
+            let own = rows.iter().filter(|row| row.verdict == verdict);
+            (verdict, own.map(|row| row.subject.as_str()).collect())
+        })
+        .collect();
+    named.sort_by_key(|(_, subjects)| std::cmp::Reverse(subjects.len()));
+    let others: Vec<String> = named[1..]
+        .iter()
+        .filter(|(_, subjects)| !subjects.is_empty())
+        .map(|(verdict, subjects)| format!("{}: {}", verdict.word(), subjects.join(" + ")))
+        .collect();
+    let most = named[0].0.word();
+    if others.is_empty() {
+        format!("all {most}")
+    } else {
+        format!("{most} but for {}", others.join("; "))
+    }
+}
+
+fn header(first: &str, others: impl Iterator<Item = String>) -> String {
+    let others: Vec<String> = others.collect();
+    let rule = "|---".repeat(others.len() + 1);
+    format!("{}{rule}|\n", line_of(first, others))
+}
+
+fn line_of(first: &str, others: Vec<String>) -> String {
+    format!("| {first} | {} |\n", others.join(" | "))
+}

@@ -1,0 +1,237 @@
+//! What is compared, and how.
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use crate::widgets::quantity_input::form_label;
+use crate::workers::path_dialog::Ask;
+use eframe::egui::{Button, ComboBox, Label, RichText, TextEdit, Ui};
+use palpate_model::select::{HoldOut, SelectOptions};
+use palpate_model::tolerance::{BadTolerance, Tolerance};
+use std::path::{Path, PathBuf};
+
+/// More recordings than this compared by hand are a job for the command line.
+const SOURCES_MAX: usize = 24;
+
+/// What may be held out and predicted, with its words.
+const HOLD_OUTS: [(HoldOut, &str); 5] = [
+    (HoldOut::Auto, "each recording in turn"),
+    (HoldOut::Speed, "each speed in turn"),
+    (HoldOut::Depth, "each depth in turn"),
+    (HoldOut::Specimen, "each specimen in turn"),
+    (HoldOut::None, "nothing"),
+];
+
+/// The form as typed.
+#[derive(Clone, Debug)]
+pub struct ModelsForm {
+    sources: Vec<PathBuf>,
+    typed: String,
+    tolerance: String,
+    hold_out: HoldOut,
+}
+
+impl Default for ModelsForm {
+    fn default() -> Self {
+        Self {
+            sources: Vec::new(),
+            typed: String::new(),
+            tolerance: "2%".into(),
+            hold_out: HoldOut::Auto,
+        }
+    }
+}
+
+/// A comparison that can be made.
+#[derive(Debug)]
+pub struct Request {
+    /// Sessions and tables.
+    pub paths: Vec<PathBuf>,
+    /// How they are compared.
+    pub options: SelectOptions,
+}
+
+impl ModelsForm {
+    /// Adds a recording, once.
+    pub fn add(&mut self, path: &Path) {
+        if self.sources.len() < SOURCES_MAX && !self.sources.iter().any(|known| known == path) {
+            self.sources.push(path.to_path_buf());
+        }
+    }
+
+    /// What the form asks for, or why it asks for nothing.
+    pub fn request(&self) -> Result<Request, String> {
+        if self.sources.is_empty() {
+            return Err("add a recording first".into());
+        }
+        Ok(Request {
+            paths: self.sources.clone(),
+            options: SelectOptions {
+                tolerance: self.tolerance()?,
+                hold_out: self.hold_out,
+                ..SelectOptions::default()
+            },
+        })
+    }
+
+    fn tolerance(&self) -> Result<Option<Tolerance>, String> {
+        match self.tolerance.trim() {
+            "" => Ok(None),
+            text => text
+                .parse()
+                .map(Some)
+                .map_err(|err: BadTolerance| err.to_string()),
+        }
+    }
+
+    pub(super) fn sources_ui(
+        &mut self,
+        ui: &mut Ui,
+        last_run: Option<&Path>,
+        commands: &mut Commands,
+    ) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let mut dropped = None;
+        for (index, path) in self.sources.iter().enumerate() {
+            ui.horizontal(|ui| {
+                let name = short(path);
+                let button = Button::new("×").small();
+                let button = ui.add(button).on_hover_text(format!("leave out {name}"));
+                button.widget_info(|| {
+                    eframe::egui::WidgetInfo::labeled(
+                        eframe::egui::Role::Button,
+                        true,
+                        format!("leave out {name}"),
+                    )
+                });
+                if button.clicked() {
+                    dropped = Some(index);
+                }
+                ui.add(Label::new(name).truncate())
+                    .on_hover_text(path.display().to_string());
+            });
+        }
+        if let Some(index) = dropped {
+            self.sources.remove(index);
+        }
+        if self.sources.is_empty() {
+            ui.label(RichText::new("none yet").color(tokens.text_quiet));
+        }
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "path");
+            let width = ui.available_width() - 52.0;
+            let input = TextEdit::singleline(&mut self.typed)
+                .desired_width(width)
+                .char_limit(4096)
+                .hint_text("session folder or table");
+            let typed = ui.add(input).labelled_by(label.id);
+            let is_entered =
+                typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
+            let is_pressed = ui.button("Add").clicked();
+            let path = PathBuf::from(self.typed.trim());
+            if (is_entered || is_pressed) && !path.as_os_str().is_empty() {
+                self.add(&path);
+                self.typed.clear();
+            }
+        });
+        ui.horizontal_wrapped(|ui| {
+            if ui.button("Choose table...").clicked() {
+                commands.push(Command::Choose(Ask::Table));
+            }
+            if ui.button("Choose session...").clicked() {
+                commands.push(Command::Choose(Ask::Session));
+            }
+            let button = Button::new("Add the last run");
+            if ui.add_enabled(last_run.is_some(), button).clicked()
+                && let Some(path) = last_run
+            {
+                self.add(path);
+            }
+        });
+        if last_run.is_none() {
+            let text = "the run screen has no run that ended";
+            ui.label(RichText::new(text).color(tokens.text_quiet).small());
+        }
+    }
+
+    pub(super) fn choices_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "tolerance");
+            let input = TextEdit::singleline(&mut self.tolerance)
+                .desired_width(96.0)
+                .char_limit(24)
+                .hint_text("none");
+            ui.add(input).labelled_by(label.id);
+        });
+        match self.tolerance() {
+            Err(reason) => {
+                ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+            }
+            Ok(tolerance) => {
+                let text = tolerance.map_or_else(
+                    || "none: information criteria alone decide".to_owned(),
+                    |tolerance| format!("an error of {tolerance} does not matter"),
+                );
+                ui.label(RichText::new(text).color(tokens.text_quiet).small());
+            }
+        }
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "hold out");
+            let words = |choice| {
+                let known = HOLD_OUTS.iter().find(|(known, _)| *known == choice);
+                known.map_or("", |(_, words)| *words)
+            };
+            ComboBox::from_id_salt("hold_out")
+                .selected_text(words(self.hold_out))
+                .width(ui.available_width() - 16.0)
+                .show_ui(ui, |ui| {
+                    for (choice, words) in HOLD_OUTS {
+                        ui.selectable_value(&mut self.hold_out, choice, words);
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+    }
+}
+
+/// The last two parts of a path: enough to tell recordings apart.
+fn short(path: &Path) -> String {
+    let parts: Vec<String> = path
+        .iter()
+        .rev()
+        .take(2)
+        .map(|part| part.to_string_lossy().into_owned())
+        .collect();
+    parts.into_iter().rev().collect::<Vec<_>>().join("/")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_form_asks_for_nothing_without_recordings_or_with_a_bad_tolerance() {
+        let mut form = ModelsForm::default();
+        assert!(form.request().unwrap_err().contains("add a recording"));
+        form.add(Path::new("a/b/c.csv"));
+        form.add(Path::new("a/b/c.csv"));
+        let request = form.request().unwrap();
+        assert_eq!(request.paths.len(), 1);
+        assert!(request.options.tolerance.is_some());
+        form.tolerance = "much".into();
+        assert!(
+            form.request()
+                .unwrap_err()
+                .contains("'much' is not a tolerance")
+        );
+        form.tolerance = " ".into();
+        assert!(form.request().unwrap().options.tolerance.is_none());
+    }
+
+    #[test]
+    fn a_path_is_shown_by_its_end() {
+        assert_eq!(short(Path::new("/data/runs/s1/log.csv")), "s1/log.csv");
+        assert_eq!(short(Path::new("log.csv")), "log.csv");
+    }
+}

@@ -1,0 +1,140 @@
+//! A table of short texts: headings, aligned columns, a marked row; only rows in sight are laid out.
+
+use crate::theme::Tokens;
+use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, Ui, UiBuilder, Vec2, pos2, vec2};
+use eframe::egui::{Rect, Sense};
+
+/// Height of a row in points.
+const ROW: f32 = 22.0;
+/// Space between columns in points.
+const GAP: f32 = 10.0;
+
+/// One column.
+#[derive(Clone, Debug)]
+pub struct Column {
+    /// Heading with its unit.
+    pub head: String,
+    /// Width in points.
+    pub width: f32,
+    /// Whether its texts are numbers, which stand on the right.
+    pub is_number: bool,
+}
+
+impl Column {
+    /// A column of words.
+    #[must_use]
+    pub fn words(head: &str, width: f32) -> Self {
+        Self {
+            head: head.to_owned(),
+            width,
+            is_number: false,
+        }
+    }
+
+    /// A column of numbers.
+    #[must_use]
+    pub fn numbers(head: &str, width: f32) -> Self {
+        Self {
+            head: head.to_owned(),
+            width,
+            is_number: true,
+        }
+    }
+}
+
+/// How a row stands out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum RowLook {
+    /// As the others.
+    #[default]
+    Plain,
+    /// The one to look at.
+    Marked,
+    /// Of less use.
+    Quiet,
+    /// Wrong.
+    Alarm,
+}
+
+/// One row.
+#[derive(Clone, Debug, Default)]
+pub struct Row {
+    /// A text for each column.
+    pub cells: Vec<String>,
+    /// How it stands out.
+    pub look: RowLook,
+    /// What is said of it under the pointer.
+    pub hint: Option<String>,
+}
+
+/// Draws the table in the space there is; scrolls both ways.
+pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let width = columns.iter().map(|column| column.width + GAP).sum::<f32>();
+    ScrollArea::horizontal()
+        .id_salt((name, "across"))
+        .auto_shrink(false)
+        .show(ui, |ui| {
+            ui.set_min_width(width);
+            ui.spacing_mut().item_spacing = Vec2::ZERO;
+            row_ui(ui, columns, width, |ui, _, column| {
+                let text = RichText::new(&column.head).color(tokens.text_quiet).small();
+                ui.add(Label::new(text).truncate());
+            });
+            ui.separator();
+            ScrollArea::vertical()
+                .id_salt((name, "rows"))
+                .auto_shrink(false)
+                .show_rows(ui, ROW, rows.len(), |ui, shown| {
+                    for row in &rows[shown] {
+                        let ink = match row.look {
+                            RowLook::Plain | RowLook::Marked => tokens.text,
+                            RowLook::Quiet => tokens.text_quiet,
+                            RowLook::Alarm => tokens.alarm_text,
+                        };
+                        let rect = row_ui(ui, columns, width, |ui, index, _| {
+                            let Some(cell) = row.cells.get(index) else {
+                                return;
+                            };
+                            let mut text = RichText::new(cell).color(ink);
+                            if row.look == RowLook::Marked {
+                                text = text.strong();
+                            }
+                            ui.add(Label::new(text).truncate());
+                        });
+                        if row.look == RowLook::Marked {
+                            let mark = Rect::from_min_size(rect.min, vec2(3.0, ROW));
+                            ui.painter().rect_filled(mark, 0.0, tokens.text);
+                        }
+                        if let Some(hint) = &row.hint {
+                            let id = ui.scope_id().with((name, &row.cells));
+                            ui.interact(rect, id, Sense::hover()).on_hover_text(hint);
+                        }
+                    }
+                });
+        });
+}
+
+/// One line of cells; returns where it stands.
+fn row_ui(
+    ui: &mut Ui,
+    columns: &[Column],
+    width: f32,
+    mut cell_ui: impl FnMut(&mut Ui, usize, &Column),
+) -> Rect {
+    let (rect, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
+    let mut left = rect.left() + GAP * 0.5;
+    for (index, column) in columns.iter().enumerate() {
+        let cell = Rect::from_min_size(pos2(left, rect.top()), vec2(column.width, ROW));
+        let layout = if column.is_number {
+            Layout::right_to_left(Align::Center)
+        } else {
+            Layout::left_to_right(Align::Center)
+        };
+        ui.scope_builder(UiBuilder::new().max_rect(cell).layout(layout), |ui| {
+            cell_ui(ui, index, column);
+        });
+        left += column.width + GAP;
+    }
+    rect
+}

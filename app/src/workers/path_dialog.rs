@@ -1,0 +1,52 @@
+//! The desktop's own dialog for folders and files, on its own thread: it blocks whoever opens it.
+
+use super::Job;
+use eframe::egui::Context;
+use std::path::PathBuf;
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ask {
+    /// Where new sessions go.
+    NewSessions,
+    /// A recorded session to compare models on.
+    Session,
+    /// A table to compare models on.
+    Table,
+}
+
+/// A dialog that may be open.
+#[derive(Debug, Default)]
+pub struct PathDialog(Job<Option<(Ask, PathBuf)>>);
+
+impl PathDialog {
+    /// Whether the dialog is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.0.is_busy()
+    }
+
+    /// Opens the dialog, unless one is open.
+    pub fn open(&mut self, ask: Ask, ctx: &Context) -> std::io::Result<()> {
+        let ctx = ctx.clone();
+        let dialog = rfd::FileDialog::new();
+        let pick = move || match ask {
+            Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
+            Ask::Session => dialog.set_title("Folder of a session").pick_folder(),
+            Ask::Table => dialog
+                .set_title("Table of a recording")
+                .add_filter("tables", &["csv", "tsv", "txt"])
+                .pick_file(),
+        };
+        self.0.start(
+            "path-dialog",
+            move || pick().map(|path| (ask, path)),
+            move || ctx.request_repaint(),
+        )
+    }
+
+    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
+    pub fn poll(&mut self) -> Option<(Ask, PathBuf)> {
+        self.0.poll().flatten()
+    }
+}

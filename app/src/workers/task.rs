@@ -1,0 +1,222 @@
+//! Work of seconds to minutes on a thread of its own, with progress, time left and cancel.
+
+use super::Job;
+use eframe::egui::Context;
+use palpate_protocols::runner::Stopwatch;
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+/// What a worker tells while it works.
+#[derive(Debug, Default)]
+pub struct Progress {
+    done: AtomicUsize,
+    of: AtomicUsize,
+    what: Mutex<String>,
+    is_cancelled: AtomicBool,
+}
+
+impl Progress {
+    /// `done` of `of` pieces of like length are done and `what` comes next. Break: nobody wants the rest.
+    pub fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+        self.done.store(done, Ordering::Relaxed);
+        self.of.store(of, Ordering::Relaxed);
+        let mut text = self.what.lock().unwrap_or_else(PoisonError::into_inner);
+        text.clear();
+        text.push_str(what);
+        if self.is_cancelled.load(Ordering::Relaxed) {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    }
+}
+
+/// How far a task is, for drawing.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Standing {
+    /// Share done, 0 to 1.
+    pub fraction: f64,
+    /// What it is at.
+    pub what: String,
+    /// Seconds since it began.
+    pub seconds: f64,
+    /// Seconds left at this pace, once a piece is done.
+    pub seconds_left: Option<f64>,
+}
+
+/// One task at a time and its last answer.
+pub struct Task<T> {
+    job: Job<Result<T, String>>,
+    progress: Arc<Progress>,
+    since: Option<Stopwatch>,
+    answer: Option<Result<T, String>>,
+}
+
+impl<T> Default for Task<T> {
+    fn default() -> Self {
+        Self {
+            job: Job::default(),
+            progress: Arc::default(),
+            since: None,
+            answer: None,
+        }
+    }
+}
+
+impl<T: Send + 'static> Task<T> {
+    /// Starts work, unless some is under way. The last answer stays until the new one is there.
+    pub fn start(
+        &mut self,
+        name: &str,
+        ctx: &Context,
+        work: impl FnOnce(&Progress) -> Result<T, String> + Send + 'static,
+    ) {
+        if self.job.is_busy() {
+            return;
+        }
+        self.progress = Arc::default();
+        let (progress, wake) = (Arc::clone(&self.progress), ctx.clone());
+        let started = self.job.start(
+            name,
+            move || work(&progress),
+            move || wake.request_repaint(),
+        );
+        match started {
+            Ok(()) => self.since = Some(Stopwatch::start()),
+            Err(err) => self.answer = Some(Err(format!("the work cannot be started: {err}"))),
+        }
+    }
+
+    /// Fetches the answer if it has come.
+    pub fn poll(&mut self) {
+        if !self.job.is_busy() {
+            return;
+        }
+        let answer = self.job.poll();
+        if self.job.is_busy() {
+            return;
+        }
+        self.since = None;
+        let is_cancelled = self.progress.is_cancelled.load(Ordering::Relaxed);
+        match answer {
+            // A cancelled task has no answer; what was known before stays.
+            Some(Err(_)) if is_cancelled => {}
+            Some(answer) => self.answer = Some(answer),
+            None => {
+                let gone = "the work ended unexpectedly; start it again, and report it if it happens twice";
+                self.answer = Some(Err(gone.to_owned()));
+            }
+        }
+    }
+
+    /// Asks the work to end at its next piece.
+    pub fn cancel(&self) {
+        self.progress.is_cancelled.store(true, Ordering::Relaxed);
+    }
+
+    /// Whether it was asked to end and has not yet.
+    #[must_use]
+    pub fn is_ending(&self) -> bool {
+        self.job.is_busy() && self.progress.is_cancelled.load(Ordering::Relaxed)
+    }
+
+    /// The last answer.
+    #[must_use]
+    pub fn answer(&self) -> Option<&Result<T, String>> {
+        self.answer.as_ref()
+    }
+
+    /// How far it is; none when nothing is under way.
+    #[must_use]
+    pub fn standing(&self) -> Option<Standing> {
+        let seconds = self.since.as_ref()?.seconds();
+        let done = self.progress.done.load(Ordering::Relaxed) as f64;
+        let of = self.progress.of.load(Ordering::Relaxed) as f64;
+        let what = self.progress.what.lock();
+        Some(Standing {
+            fraction: if of > 0.0 { (done / of).min(1.0) } else { 0.0 },
+            what: what.unwrap_or_else(PoisonError::into_inner).clone(),
+            seconds,
+            seconds_left: (done > 0.0).then(|| seconds * (of - done).max(0.0) / done),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::mpsc::{Receiver, sync_channel};
+    use std::time::Duration;
+
+    fn finish<T: Send + 'static>(task: &mut Task<T>) {
+        for _ in 0..1000 {
+            task.poll();
+            if task.standing().is_none() {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(5));
+        }
+        panic!("the task stayed busy");
+    }
+
+    /// A task that does `of` pieces, each when `go` says so.
+    fn stepwise(task: &mut Task<usize>, of: usize, go: Receiver<()>) {
+        task.start("test", &Context::default(), move |progress| {
+            for done in 0..of {
+                if progress.tell(done, of, "a piece").is_break() {
+                    return Err("cancelled".into());
+                }
+                go.recv().map_err(|err| err.to_string())?;
+            }
+            Ok(of)
+        });
+    }
+
+    #[test]
+    fn progress_is_told_and_the_answer_stays() {
+        let (step, go) = sync_channel(8);
+        let mut task = Task::default();
+        stepwise(&mut task, 4, go);
+        for _ in 0..2 {
+            step.send(()).unwrap();
+        }
+        let standing = loop {
+            let standing = task.standing().unwrap();
+            if standing.fraction == 0.5 {
+                break standing;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        };
+        assert_eq!(standing.what, "a piece");
+        assert!(standing.seconds_left.is_some());
+        for _ in 0..2 {
+            step.send(()).unwrap();
+        }
+        finish(&mut task);
+        assert_eq!(task.answer(), Some(&Ok(4)));
+    }
+
+    #[test]
+    fn a_cancelled_task_keeps_the_answer_before() {
+        let mut task = Task::default();
+        task.start("test", &Context::default(), |_| Ok(7));
+        finish(&mut task);
+        let (step, go) = sync_channel(8);
+        stepwise(&mut task, 4, go);
+        task.cancel();
+        assert!(task.is_ending());
+        step.send(()).unwrap();
+        finish(&mut task);
+        assert_eq!(task.answer(), Some(&Ok(7)));
+        assert!(!task.is_ending());
+    }
+
+    #[test]
+    fn a_task_that_dies_says_so() {
+        let mut task: Task<u32> = Task::default();
+        task.start("test", &Context::default(), |_| panic!("on purpose"));
+        finish(&mut task);
+        assert!(matches!(task.answer(), Some(Err(text)) if text.contains("unexpectedly")));
+    }
+}

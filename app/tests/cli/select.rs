@@ -1,0 +1,203 @@
+//! `palpate select` as a user meets it.
+
+use super::{json, palpate, stderr, stdout, succeeded};
+use palpate_model::families::{Model, by_key};
+use palpate_model::{Depth, Seconds};
+use serde_json::Value;
+use std::fmt::Write;
+use std::path::Path;
+
+/// A press of `model` at `speed` to `depth` mm and a hold up to 30 s, with 1 % of noise that is the
+/// same on every machine.
+fn table(at: &Path, name: &str, model: &Model, [speed, depth]: [f64; 2]) {
+    let path: Vec<(Seconds, Depth)> = (0..=600)
+        .map(|i| {
+            let t = 0.05 * f64::from(i);
+            (Seconds(t), Depth((speed * t).min(depth)))
+        })
+        .collect();
+    let forces = model.along(path.iter().copied()).expect("a force");
+    let mut text = String::from("t_s,depth_mm,force_N\n");
+    let mut state = (100.0 * speed) as u64 + depth as u64;
+    for ((t, x), force) in path.iter().zip(forces) {
+        // The sum of twelve uniform numbers has the variance of a normal one.
+        let mut sum = -6.0;
+        for _ in 0..12 {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            sum += (state >> 33) as f64 / f64::from(1u32 << 31);
+        }
+        let _ = writeln!(text, "{},{},{}", t.0, x.0, force + 0.02 * sum);
+    }
+    std::fs::write(at.join(name), text).expect("a table");
+}
+
+fn kelvin() -> Model {
+    let family = by_key("kelvin").expect("a family");
+    family.model(&[1.5], &[0.15, 0.6]).expect("a model")
+}
+
+fn three_tables(at: &Path) {
+    table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
+    table(at, "fast.csv", &kelvin(), [5.0, 10.0]);
+    table(at, "deep.csv", &kelvin(), [5.0, 20.0]);
+}
+
+fn candidate<'a>(selection: &'a Value, family: &str) -> &'a Value {
+    let all = selection["candidates"].as_array().expect("candidates");
+    all.iter()
+        .find(|one| one["family"] == family)
+        .expect("the family")
+}
+
+#[test]
+fn the_body_that_was_pressed_is_recommended() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    three_tables(at);
+    let args = ["select", "slow.csv", "fast.csv", "deep.csv"];
+    let by_criterion = palpate(at, &[&args[..], &["--json"]].concat());
+    succeeded(&by_criterion);
+    let found = json(&by_criterion);
+    assert_eq!(
+        found["verdict"]["outcome"], "recommended",
+        "{}",
+        found["verdict"]
+    );
+    assert_eq!(found["verdict"]["family"], "kelvin");
+    assert_eq!(found["tolerance_n"], Value::Null);
+    let kelvin = candidate(&found, "kelvin");
+    assert_eq!(kelvin["bic_above"], 0.0);
+    // Noise of 0.02 N, fitted and predicted; a fifth of it is what 600 samples may miss it by.
+    for error in [&kelvin["rms_n"], &kelvin["prediction"]["rms_n"]] {
+        assert!((error.as_f64().unwrap() - 0.02).abs() < 0.004, "{error}");
+    }
+    let unseen: Vec<&Value> = kelvin["prediction"]["records"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| &one["unseen"])
+        .collect();
+    assert_eq!(unseen, ["speed", "specimen", "depth"]);
+
+    // A coarse hand is content with less, and the plot shows it.
+    let coarse = ["--tolerance", "0.4N", "--plot", "plot.svg"];
+    let text = palpate(at, &[&args[..], &coarse].concat());
+    succeeded(&text);
+    let text = stdout(&text);
+    assert!(
+        text.contains("use maxwell") || text.contains("use voigt"),
+        "{text}"
+    );
+    assert!(text.contains("What each extra term buys"));
+    let plot = std::fs::read_to_string(at.join("plot.svg")).unwrap();
+    assert!(plot.starts_with("<svg") && plot.contains("tolerance") && plot.contains("kelvin"));
+
+    // A tolerance below the noise has no winner.
+    let fine = palpate(
+        at,
+        &[&args[..], &["--tolerance", "0.1%", "--json"]].concat(),
+    );
+    succeeded(&fine);
+    let fine = json(&fine);
+    assert_eq!(fine["verdict"]["outcome"], "none-within");
+    assert_eq!(fine["verdict"]["family"], Value::Null);
+}
+
+#[test]
+fn one_record_is_split_in_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
+    let args = [
+        "select",
+        "slow.csv",
+        "--families",
+        "maxwell,kelvin,series-2",
+        "--json",
+    ];
+    let found = palpate(at, &args);
+    succeeded(&found);
+    let found = json(&found);
+    let names: Vec<&Value> = found["candidates"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .map(|one| &one["family"])
+        .collect();
+    assert_eq!(names, ["maxwell", "kelvin", "series-2"]);
+    let records = &candidate(&found, "kelvin")["prediction"]["records"];
+    assert_eq!(records[0]["unseen"], "rest");
+    let none = palpate(at, &[&args[..], &["--hold-out", "none"]].concat());
+    succeeded(&none);
+    assert_eq!(candidate(&json(&none), "kelvin")["prediction"], Value::Null);
+}
+
+#[test]
+fn wrong_use_is_told_in_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
+    std::fs::write(at.join("empty.csv"), "t_s,depth_mm,force_N\n").unwrap();
+    std::fs::write(
+        at.join("flat.csv"),
+        "t_s,depth_mm,force_N\n0,1,1\n1,1,2\n2,1,3\n",
+    )
+    .unwrap();
+    std::fs::write(at.join("there.svg"), "").unwrap();
+    let cases: [(&[&str], i32, &str); 8] = [
+        (
+            &["slow.csv", "--families", "kelvin,zener"],
+            2,
+            "error: there is no model family 'zener'; there are voigt, maxwell, kelvin,",
+        ),
+        (
+            &["none.csv"],
+            2,
+            "error: there is no session at none.csv; check the path\n",
+        ),
+        (
+            &["slow.csv", "--tolerance", "5kg"],
+            2,
+            "error: '5kg' is not a tolerance of force; write newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd), above zero\n",
+        ),
+        (
+            &["slow.csv", "--hold-out", "weather"],
+            2,
+            "error: 'weather' cannot be held out; choose auto, speed, depth, specimen or none\n",
+        ),
+        (
+            &["slow.csv", "--hold-out", "speed"],
+            2,
+            "error: no speed can be held out, because the 1 record(s) have one speed only; add records of another, or hold out 'auto'\n",
+        ),
+        (&["empty.csv"], 2, "error: "),
+        (
+            &["flat.csv"],
+            1,
+            "error: the depth never changes from 1 mm, so the tissue is not indented; move deeper, or check the columns\n",
+        ),
+        (
+            &["slow.csv", "--plot", "there.svg"],
+            2,
+            "error: there.svg exists already; give the plot another name\n",
+        ),
+    ];
+    for (args, code, sentence) in cases {
+        let output = palpate(at, &[&["select"], args].concat());
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{args:?}: {}",
+            stderr(&output)
+        );
+        let said = stderr(&output);
+        assert!(said.starts_with(sentence), "{args:?}: {said}");
+        assert_eq!(said.lines().count(), 1, "{said}");
+        assert_eq!(stdout(&output), "");
+    }
+    let twice = palpate(at, &["select", "slow.csv", "./slow.csv"]);
+    assert_eq!(twice.status.code(), Some(2));
+    assert!(stderr(&twice).contains("is given twice"));
+}

@@ -1,0 +1,185 @@
+//! What is no number, and time that stands still or runs backwards.
+
+use super::fits::{ThesisFit, family_fit};
+use super::judge::{Answer, Expected, PathCase, Row, judge};
+use super::members::member;
+use super::records::ramp_hold;
+use super::subjects::FamilyBody;
+use super::{Extent, Part};
+use crate::families::{Family, by_key};
+use crate::fit::FitSample;
+use crate::units::{Depth, Newtons, Seconds};
+
+/// Name of the group.
+pub(super) const GROUP: &str = "input";
+
+pub(super) fn parts(_extent: Extent, key: &str) -> Vec<Part> {
+    let key = key.to_owned();
+    vec![Part::new(GROUP, key.clone(), move |_| {
+        by_key(&key).map_or_else(|_| Vec::new(), |family| rows(&*family))
+    })]
+}
+
+fn rows(family: &dyn Family) -> Vec<Row> {
+    let usual = || member(family, 1.0, 20.0, 2.0);
+    let mut rows = Vec::new();
+    for (case, start, step) in [
+        ("NaN depth at the start", f64::NAN, (0.1, 1.0)),
+        ("infinite depth at the start", f64::INFINITY, (0.1, 1.0)),
+        ("NaN depth in a step", 0.0, (0.1, f64::NAN)),
+        ("infinite depth in a step", 0.0, (0.1, f64::INFINITY)),
+        (
+            "minus infinite depth in a step",
+            0.0,
+            (0.1, f64::NEG_INFINITY),
+        ),
+        ("NaN duration of a step", 0.0, (f64::NAN, 1.0)),
+        ("infinite duration of a step", 0.0, (f64::INFINITY, 1.0)),
+        ("negative duration of a step", 0.0, (-0.1, 1.0)),
+    ] {
+        let path = PathCase {
+            group: GROUP,
+            case: case.to_owned(),
+            start,
+            steps: vec![(0.1, 0.5), step, (0.1, 1.0)],
+        };
+        rows.push(path.put_to(&FamilyBody(usual())));
+    }
+    rows.push(after_bad_steps(family));
+    let plain = |case: &str| PathCase {
+        group: GROUP,
+        case: case.to_owned(),
+        start: 0.0,
+        steps: vec![(0.1, 1.0), (0.1, 1.0)],
+    };
+    for (name, value) in [
+        ("NaN", f64::NAN),
+        ("infinite", f64::INFINITY),
+        ("negative infinite", f64::NEG_INFINITY),
+    ] {
+        let mut model = usual();
+        model.linear[0] = value;
+        rows.push(plain(&format!("{name} coefficient")).put_to(&FamilyBody(model)));
+        for index in 0..usual().outer.len() {
+            let mut model = usual();
+            model.outer[index] = value;
+            let name = format!("{name} relaxation time or other outer parameter");
+            rows.push(plain(&name).put_to(&FamilyBody(model)));
+        }
+    }
+    for index in 0..usual().outer.len() {
+        for value in [0.0, -1.0] {
+            let mut model = usual();
+            model.outer[index] = value;
+            let name = format!("relaxation time or other outer parameter of {value}");
+            rows.push(plain(&name).put_to(&FamilyBody(model)));
+        }
+    }
+    rows.extend(
+        bad_records(|samples| family_fit(family, samples, None)).map(|(case, answer)| {
+            let subject = format!("fit of {}", family.key());
+            judge([GROUP, case], &subject, Expected::Refusal, 0.0, answer)
+        }),
+    );
+    rows
+}
+
+/// A body that refused steps goes on as if they had not been asked for.
+fn after_bad_steps(family: &dyn Family) -> Row {
+    struct Refusing(FamilyBody);
+    impl super::judge::Subject for Refusing {
+        fn name(&self) -> String {
+            self.0.name()
+        }
+
+        fn terms(&self) -> Result<Vec<crate::families::Relaxation>, String> {
+            self.0.terms()
+        }
+
+        fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
+            let mut body = (self.0.0)
+                .at_rest_from(Depth(path.start))
+                .map_err(|err| err.to_string())?;
+            let mut forces = Vec::new();
+            for &(dt, depth) in &path.steps {
+                for (bad_dt, bad_depth) in [(0.1, f64::NAN), (-1.0, 3.0), (1e-300, 1e300)] {
+                    if let Ok(force) = body.step(Depth(bad_depth), Seconds(bad_dt)) {
+                        return Ok(vec![force.0]);
+                    }
+                }
+                let force = body.step(Depth(depth), Seconds(dt));
+                forces.push(force.map_err(|err| err.to_string())?.0);
+            }
+            Ok(forces)
+        }
+    }
+    let path = PathCase {
+        group: GROUP,
+        case: "refused steps between good ones".to_owned(),
+        start: 0.0,
+        steps: vec![(0.1, 1.0), (0.5, 9.0), (0.2, 9.0), (0.1, 4.0)],
+    };
+    path.put_to(&Refusing(FamilyBody(member(family, 1.0, 20.0, 2.0))))
+}
+
+/// A good record with one sample spoilt, and what a fit makes of it.
+fn bad_records(
+    fit: impl Fn(&[FitSample]) -> Answer,
+) -> impl Iterator<Item = (&'static str, Answer)> {
+    type Spoil = fn(&mut Vec<FitSample>);
+    let spoilt: [(&str, Spoil); 14] = [
+        ("a NaN time", |all| all[7].t = Seconds(f64::NAN)),
+        ("an infinite time at the end", |all| {
+            if let Some(last) = all.last_mut() {
+                last.t = Seconds(f64::INFINITY);
+            }
+        }),
+        ("a NaN depth", |all| all[7].depth = Depth(f64::NAN)),
+        ("an infinite depth", |all| {
+            all[7].depth = Depth(f64::INFINITY)
+        }),
+        ("a NaN force", |all| all[7].force = Newtons(f64::NAN)),
+        ("an infinite force", |all| {
+            all[7].force = Newtons(f64::NEG_INFINITY)
+        }),
+        ("a NaN uncertainty", |all| all[7].sigma = Newtons(f64::NAN)),
+        ("an uncertainty of zero", |all| all[7].sigma = Newtons(0.0)),
+        ("a negative uncertainty", |all| {
+            all[7].sigma = Newtons(-0.02)
+        }),
+        ("a duplicate time", |all| all[7].t = all[6].t),
+        ("a backward time", |all| all.swap(6, 7)),
+        ("every force censored", |all| {
+            all.iter_mut()
+                .for_each(|one| one.sigma = Newtons(f64::INFINITY));
+        }),
+        ("constant force", |all| {
+            all.iter_mut().for_each(|one| one.force = Newtons(1.5));
+        }),
+        ("never in contact", |all| {
+            all.iter_mut().for_each(|one| one.depth.0 -= 100.0);
+        }),
+    ];
+    spoilt.into_iter().map(move |(case, spoil)| {
+        let mut samples = ramp_hold(60);
+        spoil(&mut samples);
+        (case, fit(&samples))
+    })
+}
+
+/// The same records put to the fit of the thesis body.
+pub(super) fn thesis_parts() -> Vec<Part> {
+    vec![Part::new(GROUP, ThesisFit::NAME.to_owned(), |_| {
+        let rows = bad_records(|samples| ThesisFit::of(samples, None));
+        rows.map(|(case, answer)| {
+            judge(
+                [GROUP, case],
+                ThesisFit::NAME,
+                Expected::Refusal,
+                0.0,
+                answer,
+            )
+        })
+        .collect()
+    })]
+}

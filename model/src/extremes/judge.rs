@@ -1,0 +1,290 @@
+//! What right means.
+
+use crate::families::Relaxation;
+use crate::reference::{REFERENCE_DIGITS, Reference};
+use crate::units::{Depth, Newtons, Seconds};
+use serde::Serialize;
+
+/// Largest error of an exact step, relative to the peak force of the path.
+pub const TOLERANCE: f64 = 1e-13;
+/// Forces in N below this count as none: the exact step drops what falls below 1e-200 N, and this is
+/// that over the tolerance with room for a hundred terms.
+const FORCE_MIN: f64 = 1e-180;
+/// Forces in N beyond this may be refused, numbers though they are: a sum of terms may not be one.
+const FORCE_MAX: f64 = 1e299;
+
+/// What became of one case.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// The right number.
+    Right,
+    /// No number, and the reason in words.
+    Refused,
+    /// Numbers of a fit, with a warning in words not to rely on them.
+    Flagged,
+    /// Anything else.
+    Wrong,
+}
+
+impl Verdict {
+    /// The word.
+    #[must_use]
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Right => "right",
+            Self::Refused => "refused",
+            Self::Flagged => "flagged",
+            Self::Wrong => "WRONG",
+        }
+    }
+}
+
+/// One case put to one subject.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Row {
+    /// Group of cases.
+    pub group: &'static str,
+    /// The case in words.
+    pub case: String,
+    /// Family, integrator or fit.
+    pub subject: String,
+    /// What became of it.
+    pub verdict: Verdict,
+    /// Error of the answer: of a force relative to the peak of the path, of parameters the largest
+    /// relative one; null where there is no finite number.
+    pub relative_error: Option<f64>,
+    /// What it may be.
+    pub tolerance: f64,
+    /// The refusal or warning; what is wrong; empty where the number is right.
+    pub sentence: String,
+}
+
+/// What a case should meet.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Expected {
+    /// A number: a double can hold the answer.
+    Number,
+    /// A refusal: there is no answer.
+    Refusal,
+    /// Either: what the case can tell is for the subject to judge.
+    Either,
+}
+
+/// What a subject made of a case.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Answer {
+    /// A number with this relative error, and the warnings that came with it.
+    Number {
+        /// Relative error.
+        error: f64,
+        /// Warnings in words.
+        warnings: Vec<String>,
+    },
+    /// A refusal.
+    Refused(String),
+}
+
+/// Judges an answer.
+#[must_use]
+pub fn judge(
+    [group, case]: [&'static str; 2],
+    subject: &str,
+    expected: Expected,
+    tolerance: f64,
+    answer: Answer,
+) -> Row {
+    judged(group, case.to_owned(), subject, expected, tolerance, answer)
+}
+
+/// Judges an answer to a case that is named at run time.
+pub(super) fn judged(
+    group: &'static str,
+    case: String,
+    subject: &str,
+    expected: Expected,
+    tolerance: f64,
+    answer: Answer,
+) -> Row {
+    let (verdict, error, sentence) = match answer {
+        Answer::Refused(reason) if reason.trim().is_empty() => {
+            (Verdict::Wrong, None, "refused without a reason".to_owned())
+        }
+        Answer::Refused(reason) if expected == Expected::Number => (
+            Verdict::Wrong,
+            None,
+            format!("refused what has an answer: {reason}"),
+        ),
+        Answer::Refused(reason) => (Verdict::Refused, None, reason),
+        Answer::Number { error, .. } if !error.is_finite() => (
+            Verdict::Wrong,
+            None,
+            "the answer is not a finite number".to_owned(),
+        ),
+        Answer::Number { error, .. } if expected == Expected::Refusal => (
+            Verdict::Wrong,
+            Some(error),
+            "a number where there is no answer".to_owned(),
+        ),
+        Answer::Number { error, .. } if error <= tolerance => {
+            (Verdict::Right, Some(error), String::new())
+        }
+        Answer::Number { error, warnings } if !warnings.is_empty() => {
+            (Verdict::Flagged, Some(error), warnings.join("; "))
+        }
+        Answer::Number { error, .. } => (
+            Verdict::Wrong,
+            Some(error),
+            format!("off by {error:.1e}, more than {tolerance:.0e}"),
+        ),
+    };
+    Row {
+        group,
+        case,
+        subject: subject.to_owned(),
+        verdict,
+        relative_error: error,
+        tolerance,
+        sentence,
+    }
+}
+
+/// Something that turns depth over time into force.
+pub trait Subject {
+    /// Its name.
+    fn name(&self) -> String;
+
+    /// The terms whose exact response it should give; a refusal in words where there are none.
+    fn terms(&self) -> Result<Vec<Relaxation>, String>;
+
+    /// The force in N after every step of a path, or a refusal.
+    fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String>;
+
+    /// Largest error allowed, relative to the peak force of the path.
+    fn tolerance(&self, _path: &PathCase) -> f64 {
+        TOLERANCE
+    }
+
+    /// Why it may refuse this path although there is an answer, such as a limit of stability.
+    fn may_refuse(&self, _path: &PathCase) -> bool {
+        false
+    }
+}
+
+/// A depth history.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PathCase {
+    /// Group of cases.
+    pub group: &'static str,
+    /// What it is, in words.
+    pub case: String,
+    /// Depth in mm at which the body is at rest at first.
+    pub start: f64,
+    /// Duration in s and depth in mm of every step.
+    pub steps: Vec<(f64, f64)>,
+}
+
+impl PathCase {
+    /// Puts the path to a subject.
+    #[must_use]
+    pub fn put_to(&self, subject: &dyn Subject) -> Row {
+        let forces = subject.forces(self);
+        let truth = self.truth(subject, forces.as_deref().unwrap_or_default());
+        let expected = match truth {
+            // What has no truth has no answer.
+            Err(_) => Expected::Refusal,
+            Ok(truth)
+                if truth.peak > FORCE_MAX || subject.may_refuse(self) || self.is_too_fast() =>
+            {
+                Expected::Either
+            }
+            Ok(_) => Expected::Number,
+        };
+        let answer = match (forces, truth) {
+            (Err(reason), _) => Answer::Refused(reason),
+            (Ok(_), Ok(truth)) => Answer::Number {
+                error: truth.error / truth.peak.max(FORCE_MIN),
+                warnings: Vec::new(),
+            },
+            // Judged as a number where there is none.
+            (Ok(_), Err(_)) => Answer::Number {
+                error: 0.0,
+                warnings: Vec::new(),
+            },
+        };
+        judged(
+            self.group,
+            self.case.clone(),
+            &subject.name(),
+            expected,
+            subject.tolerance(self),
+            answer,
+        )
+    }
+
+    /// Whether a speed of this path is beyond the largest number.
+    fn is_too_fast(&self) -> bool {
+        let mut from = self.start;
+        self.steps.iter().any(|&(dt, to)| {
+            let speed = (to - std::mem::replace(&mut from, to)) / dt;
+            dt > 0.0 && !speed.is_finite()
+        })
+    }
+
+    /// The exact force, as far as forces are given compared with them.
+    fn truth(&self, subject: &dyn Subject, forces: &[f64]) -> Result<Truth, String> {
+        let terms = subject.terms()?;
+        let words = |err: &dyn std::fmt::Display| err.to_string();
+        let mut reference = Reference::with_digits(&terms, Depth(self.start), self.digits(&terms))
+            .map_err(|err| words(&err))?;
+        let mut truth = Truth {
+            peak: reference.force().0.abs(),
+            error: if forces.is_empty() || forces.len() == self.steps.len() {
+                0.0
+            } else {
+                f64::INFINITY
+            },
+        };
+        for (index, &(dt, depth)) in self.steps.iter().enumerate() {
+            let exact = reference
+                .step(Depth(depth), Seconds(dt))
+                .map_err(|err| words(&err))?;
+            truth.peak = truth.peak.max(exact.0.abs());
+            if let Some(&force) = forces.get(index) {
+                let miss = reference.error_of(Newtons(force)).abs();
+                // A NaN must not get lost in the maximum.
+                let is_worse = force.is_nan() || miss > truth.error;
+                truth.error = match (force.is_finite(), is_worse) {
+                    (false, _) => f64::INFINITY,
+                    (true, true) => miss,
+                    (true, false) => truth.error,
+                };
+            }
+        }
+        Ok(truth)
+    }
+
+    /// Digits the reference needs: its closed forms lose those between the smallest number and one,
+    /// twice.
+    fn digits(&self, terms: &[Relaxation]) -> usize {
+        let drives = terms.iter().flat_map(|term| [term.elastic, term.rate]);
+        let coefficients = drives.flat_map(|drive| {
+            let (amplitude, b) = drive.exponential.unwrap_or_default();
+            drive.powers.into_iter().chain([amplitude, b])
+        });
+        let steps = self.steps.iter().flat_map(|&(dt, depth)| [dt, depth]);
+        let smallest = steps
+            .chain(terms.iter().map(|term| term.tau))
+            .chain(coefficients)
+            .filter(|value| *value != 0.0)
+            .fold(1.0f64, |least, value| least.min(value.abs()));
+        REFERENCE_DIGITS + 2 * (-smallest.log10()).max(0.0) as usize
+    }
+}
+
+/// What a path comes to, in N.
+#[derive(Clone, Copy, Debug)]
+struct Truth {
+    peak: f64,
+    error: f64,
+}

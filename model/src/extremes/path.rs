@@ -1,0 +1,160 @@
+//! Speeds, depths and where they change.
+
+use super::judge::{PathCase, Row};
+use super::members::member;
+use super::subjects::FamilyBody;
+use super::{Extent, Part};
+use crate::families::by_key;
+
+/// Name of the group.
+pub(super) const GROUP: &str = "speed and depth";
+/// Steps of a ramp.
+const STEPS: u32 = 12;
+
+pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
+    let key = key.to_owned();
+    vec![Part::new(GROUP, key.clone(), move |progress| {
+        let Ok(family) = by_key(&key) else {
+            return Vec::new();
+        };
+        let subject = FamilyBody(member(&*family, 1.0, 20.0, 2.0));
+        let cases = cases(extent);
+        let count = cases.len() as f64;
+        let rows = cases.iter().enumerate().map(|(index, case)| {
+            progress((index + 1) as f64 / count);
+            case.put_to(&subject)
+        });
+        rows.collect::<Vec<Row>>()
+    })]
+}
+
+/// Every path of this group; the body relaxes in 1 s.
+pub(super) fn cases(extent: Extent) -> Vec<PathCase> {
+    let mut cases = Vec::new();
+    let speeds: &[i32] = match extent {
+        Extent::Quick => &[-6, 0, 3],
+        Extent::Whole | Extent::Soak => &[-6, -5, -4, -3, -2, -1, 0, 1, 2, 3],
+    };
+    for &speed in speeds {
+        cases.push(ramp(
+            format!("1e{speed} mm/s to 10 mm and 1 s of hold"),
+            10f64.powi(speed),
+            10.0,
+        ));
+    }
+    cases.push(still("speed 0 at 10 mm", 10.0));
+    let depths: &[i32] = match extent {
+        Extent::Quick => &[-6, 2],
+        Extent::Whole | Extent::Soak => &[-9, -6, -3, -2, -1, 0, 1, 2, 3],
+    };
+    for &depth in depths {
+        let depth_mm = 10f64.powi(depth);
+        cases.push(ramp(
+            format!("1 mm/s to 1e{depth} mm and 1 s of hold"),
+            1.0,
+            depth_mm,
+        ));
+    }
+    cases.push(still("depth 0", 0.0));
+    cases.push(still("-1e3 mm, far out of contact", -1e3));
+    cases.extend(special());
+    cases
+}
+
+/// Down in [`STEPS`] steps, then a hold of 1 s in as many, then back out in one.
+fn ramp(case: String, speed: f64, depth: f64) -> PathCase {
+    let dt = depth / speed / f64::from(STEPS);
+    let down = (1..=STEPS).map(|i| (dt, depth * f64::from(i) / f64::from(STEPS)));
+    let hold = (0..STEPS).map(|_| (1.0 / f64::from(STEPS), depth));
+    let out = [(2.0 * depth / speed, -depth), (0.5, -depth)];
+    PathCase {
+        group: GROUP,
+        case,
+        start: 0.0,
+        steps: down.chain(hold).chain(out).collect(),
+    }
+}
+
+fn still(case: &str, depth: f64) -> PathCase {
+    PathCase {
+        group: GROUP,
+        case: case.to_owned(),
+        start: depth,
+        steps: vec![(0.1, depth); STEPS as usize],
+    }
+}
+
+/// Paths that touch the surface awkwardly, jump or crawl.
+fn special() -> Vec<PathCase> {
+    let path = |case: &str, start: f64, steps: &[(f64, f64)]| PathCase {
+        group: GROUP,
+        case: case.to_owned(),
+        start,
+        steps: steps.to_vec(),
+    };
+    let mut crossings = Vec::new();
+    for _ in 0..8 {
+        crossings.extend([(0.01, 1e-3), (0.01, -1e-3)]);
+    }
+    vec![
+        path(
+            "touches at the last 1e-12 of a step",
+            -1.0,
+            &[(1.0, 1e-12), (1.0, 2e-12)],
+        ),
+        path(
+            "leaves at the last 1e-12 of a step",
+            5.0,
+            &[(1.0, 5.0), (1e3, -1e-12), (1e-3, -1e-12), (1.0, 4.0)],
+        ),
+        path(
+            "ends exactly at the surface",
+            -3.0,
+            &[(1.0, 0.0), (1.0, 4.0), (1.0, 0.0), (1.0, -4.0)],
+        ),
+        path("crosses the surface sixteen times", -1e-3, &crossings),
+        path(
+            "1e3 mm in one step and back",
+            -1e3,
+            &[(1.0, 1e3), (1.0, -1e3), (1.0, 1e3)],
+        ),
+        path(
+            "a move of 1e-12 mm at 10 mm",
+            10.0,
+            &[(1e-3, 10.000_000_000_001), (1e-3, 10.0), (1.0, 10.0)],
+        ),
+        path(
+            "a jump of 1e-9 mm at 1e3 mm and a jump back",
+            1e3,
+            &[
+                (0.0, 1_000.000_000_001),
+                (1.0, 1_000.000_000_001),
+                (0.0, 1e3),
+            ],
+        ),
+        path(
+            "a jump to 10 mm, 1 s, a jump out",
+            -1.0,
+            &[
+                (0.0, 10.0),
+                (0.5, 10.0),
+                (0.5, 10.0),
+                (0.0, -1.0),
+                (1.0, -1.0),
+            ],
+        ),
+        path(
+            "steps of 1e-9 s and of 1e3 s by turns",
+            0.0,
+            &[
+                (1e-9, 1.0),
+                (1e3, 2.0),
+                (1e-9, 3.0),
+                (1e3, 3.0),
+                (1e-9, 2.0),
+                (1e3, 10.0),
+                (1e-9, 10.0),
+            ],
+        ),
+    ]
+}

@@ -1,0 +1,281 @@
+//! Records of few samples, of too little movement, of odd sizes.
+
+use super::fits::{ThesisFit, family_fit};
+use super::judge::{Answer, Expected, Row, judge};
+use super::members::member;
+use super::{Extent, Part};
+use crate::families::{Family, Model, Outer, OuterRange, by_key};
+use crate::fit::FitSample;
+use crate::units::{Depth, Newtons, Seconds};
+use crate::viscoelastic::ModifiedKelvin;
+
+/// Name of the group.
+pub(super) const GROUP: &str = "records";
+/// Largest relative error of a parameter from a record without noise: rounding times the condition of
+/// the worst design.
+const TOLERANCE: f64 = 1e-6;
+
+/// A record without noise of any size.
+struct Plan {
+    case: &'static str,
+    expected: Expected,
+    /// Depth over time at a scale of 1 s and 20 mm.
+    path: Vec<(f64, f64)>,
+    time: f64,
+    depth: f64,
+    force: f64,
+    offset: f64,
+    tolerance: f64,
+    /// What is done to every sample, after which no body is the true one.
+    spoil: Option<fn(&mut FitSample)>,
+}
+
+impl Plan {
+    fn new(case: &'static str, expected: Expected, path: Vec<(f64, f64)>) -> Self {
+        Self {
+            case,
+            expected,
+            path,
+            time: 1.0,
+            depth: 1.0,
+            force: 1.0,
+            offset: 0.0,
+            tolerance: TOLERANCE,
+            spoil: None,
+        }
+    }
+
+    /// Its record of a body, with `force` filled in along `(t, depth)`.
+    fn samples(&self, force: impl Fn(&[(Seconds, Depth)]) -> Option<Vec<f64>>) -> Vec<FitSample> {
+        let path: Vec<(Seconds, Depth)> = self
+            .path
+            .iter()
+            .map(|&(t, depth)| (Seconds(self.time * t), Depth(self.depth * depth)))
+            .collect();
+        let forces = force(&path).unwrap_or_default();
+        let mut samples: Vec<FitSample> = path
+            .iter()
+            .zip(forces)
+            .map(|(&(t, depth), force)| FitSample {
+                t,
+                depth,
+                force: Newtons(force + self.offset),
+                sigma: Newtons(0.02 * self.force),
+            })
+            .collect();
+        if let Some(spoil) = self.spoil {
+            samples.iter_mut().for_each(spoil);
+        }
+        samples
+    }
+}
+
+/// A ramp to 20 mm in 5 s, a hold of 15 s, half the way back in 1 s and a hold of 4 s, in `count`
+/// samples.
+fn path(count: u32) -> Vec<(f64, f64)> {
+    let at = |t: f64| {
+        let back = 10.0 * (t - 20.0).clamp(0.0, 1.0);
+        4.0 * t.min(5.0) - back
+    };
+    (0..count)
+        .map(|i| 25.0 * f64::from(i) / f64::from(count - 1))
+        .map(|t| (t, at(t)))
+        .collect()
+}
+
+/// A record of the thesis body along that path.
+pub(super) fn ramp_hold(count: u32) -> Vec<FitSample> {
+    let plan = Plan::new("", Expected::Number, path(count));
+    plan.samples(|path| {
+        thesis(ModifiedKelvin::THESIS)
+            .along(path.iter().copied())
+            .ok()
+    })
+}
+
+/// A thesis body as a model of the third order.
+fn thesis(body: ModifiedKelvin) -> Model {
+    let [mu1, mu2, mu3] = body.mu;
+    Model {
+        family: "series-3".to_owned(),
+        outer: vec![body.tau_eps],
+        linear: vec![mu1, mu2, mu3, body.tau_sig],
+    }
+}
+
+fn plans(extent: Extent) -> Vec<Plan> {
+    use Expected::{Either, Number, Refusal};
+    let full = || path(161);
+    let ramp: Vec<(f64, f64)> = (0..100)
+        .map(|i| f64::from(i) * 0.05)
+        .map(|t| (t, 4.0 * t))
+        .collect();
+    let stairs: Vec<(f64, f64)> = full()
+        .chunks(2)
+        .flat_map(|pair| pair.iter().map(|&(t, _)| (t, pair[0].1)))
+        .collect();
+    let mut plans = vec![
+        Plan::new("0 samples", Refusal, Vec::new()),
+        Plan::new("1 sample", Refusal, path(161)[..1].to_vec()),
+        Plan::new("2 samples", Refusal, path(2)),
+        Plan::new("5 samples", Either, path(5)),
+        Plan::new(
+            "constant depth",
+            Refusal,
+            (0..100).map(|i| (0.1 * f64::from(i), 8.0)).collect(),
+        ),
+        Plan::new("ramp only", Either, ramp),
+        Plan::new("every depth twice", Number, stairs),
+        Plan::new("ramp, hold and half back", Number, full()),
+        Plan {
+            offset: 2e6,
+            tolerance: 1e-3,
+            ..Plan::new("an offset of 1e6 times the signal", Number, full())
+        },
+        Plan {
+            spoil: Some(|one| one.depth.0 *= 1e-310),
+            ..Plan::new("subnormal depths", Refusal, full())
+        },
+        Plan {
+            spoil: Some(|one| one.force.0 *= 1e-310),
+            ..Plan::new("subnormal forces", Refusal, full())
+        },
+        Plan {
+            spoil: Some(|one| one.sigma.0 *= 1e-310),
+            ..Plan::new("subnormal uncertainties", Refusal, full())
+        },
+        Plan {
+            spoil: Some(|one| one.t.0 *= 1e-310),
+            ..Plan::new("subnormal times", Refusal, full())
+        },
+        Plan {
+            // Seconds since 1970, which a double holds to 2.4e-7 s: two millionths of a step.
+            spoil: Some(|one| one.t.0 += 1.8e9),
+            tolerance: 1e-3,
+            ..Plan::new("times since 1970", Number, full())
+        },
+    ];
+    if extent == Extent::Quick {
+        return plans;
+    }
+    let sized = |case: &'static str, expected, [time, depth, force]: [f64; 3]| Plan {
+        time,
+        depth,
+        force,
+        ..Plan::new(case, expected, full())
+    };
+    plans.extend([
+        sized("forces of 1e-6 N", Number, [1.0, 1.0, 1e-6]),
+        sized("forces of 1e6 N", Number, [1.0, 1.0, 1e6]),
+        sized("forces of 1e-100 N", Either, [1.0, 1.0, 1e-100]),
+        sized("forces of 1e100 N", Either, [1.0, 1.0, 1e100]),
+        sized("forces of 1e290 N", Either, [1.0, 1.0, 1e290]),
+        sized("depths of 1e-6 mm", Number, [1.0, 1e-6, 1.0]),
+        sized("depths of 1e3 mm", Number, [1.0, 50.0, 1.0]),
+        sized("depths of 1e100 mm", Either, [1.0, 1e100, 1.0]),
+        sized(
+            "relaxation in 1e-9 s, steps of 1e-10 s",
+            Number,
+            [1e-9, 1.0, 1.0],
+        ),
+        sized(
+            "relaxation in 1e4 s, steps of 1e3 s",
+            Number,
+            [1e4, 1.0, 1.0],
+        ),
+        sized(
+            "relaxation in 1e9 s, steps of 1e8 s",
+            Number,
+            [1e9, 1.0, 1.0],
+        ),
+        sized("relaxation in 1e-100 s", Either, [1e-100, 1.0, 1.0]),
+        sized("relaxation in 1e100 s", Either, [1e100, 1.0, 1.0]),
+    ]);
+    plans
+}
+
+pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
+    let key = key.to_owned();
+    let subject = format!("fit of {key}");
+    vec![Part::new(GROUP, subject.clone(), move |progress| {
+        let Ok(family) = by_key(&key) else {
+            return Vec::new();
+        };
+        let mut plans = plans(extent);
+        if times(&*family) > TIMES_SHOWN {
+            for plan in &mut plans {
+                if plan.expected == Expected::Number {
+                    plan.expected = Expected::Either;
+                }
+            }
+        }
+        rows(plans, &subject, progress, |plan| {
+            family_answer(&*family, plan)
+        })
+    })]
+}
+
+fn family_answer(family: &dyn Family, plan: &Plan) -> Answer {
+    // Relaxation times around a second on the record's scale.
+    let first = if times(family) > 1 { 0.2 } else { 1.0 };
+    let body = member(
+        family,
+        first * plan.time,
+        20.0 * plan.depth,
+        2.0 * plan.force,
+    );
+    let samples = plan.samples(|path| body.along(path.iter().copied()).ok());
+    family_fit(family, &samples, Some(&body))
+}
+
+fn times(family: &dyn Family) -> usize {
+    let outer = family.outer();
+    let is_time = |one: &&Outer| one.range == OuterRange::Time;
+    outer.iter().filter(is_time).count()
+}
+
+/// More relaxation times than these, a decade apart, are beyond what a record of 25 s can show.
+const TIMES_SHOWN: usize = 2;
+
+/// The same records put to the fit of the thesis body.
+pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
+    vec![Part::new(
+        GROUP,
+        ThesisFit::NAME.to_owned(),
+        move |progress| {
+            rows(plans(extent), ThesisFit::NAME, progress, |plan| {
+                let known = ModifiedKelvin::THESIS;
+                let scale = |power: i32| plan.force / plan.depth.powi(power);
+                let body = ModifiedKelvin {
+                    tau_eps: known.tau_eps * plan.time,
+                    mu: [1, 2, 3].map(|power| known.mu[power as usize - 1] * scale(power)),
+                    tau_sig: known.tau_sig * scale(2) * plan.time,
+                };
+                let model = thesis(body);
+                let samples = plan.samples(|path| model.along(path.iter().copied()).ok());
+                ThesisFit::of(&samples, Some(&body))
+            })
+        },
+    )]
+}
+
+fn rows(
+    plans: Vec<Plan>,
+    subject: &str,
+    progress: &mut dyn FnMut(f64),
+    answer: impl Fn(&Plan) -> Answer,
+) -> Vec<Row> {
+    let count = plans.len() as f64;
+    let rows = plans.iter().enumerate().map(|(index, plan)| {
+        let answer = answer(plan);
+        progress((index + 1) as f64 / count);
+        judge(
+            [GROUP, plan.case],
+            subject,
+            plan.expected,
+            plan.tolerance,
+            answer,
+        )
+    });
+    rows.collect()
+}

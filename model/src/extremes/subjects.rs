@@ -1,0 +1,128 @@
+//! What is put to the paths: the exact step of every family, and every integrator.
+
+use super::judge::{PathCase, Subject, TOLERANCE};
+use crate::families::{Model, Relaxation};
+use crate::integrators::{Real, Scheme, SeriesBody};
+use crate::units::{Depth, Seconds};
+
+/// A member of a family, stepped by its own exact step.
+#[derive(Clone, Debug)]
+pub struct FamilyBody(pub Model);
+
+impl Subject for FamilyBody {
+    fn name(&self) -> String {
+        self.0.family.clone()
+    }
+
+    fn terms(&self) -> Result<Vec<Relaxation>, String> {
+        let model = self.0.clone().checked().map_err(|err| err.to_string())?;
+        model.terms().map_err(|err| err.to_string())
+    }
+
+    fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
+        let model = self.0.clone().checked().map_err(|err| err.to_string())?;
+        let mut body = model
+            .at_rest_from(Depth(path.start))
+            .map_err(|err| err.to_string())?;
+        let forces = path.steps.iter().map(|&(dt, depth)| {
+            let force = body.step(Depth(depth), Seconds(dt));
+            force.map(|force| force.0).map_err(|err| err.to_string())
+        });
+        forces.collect()
+    }
+}
+
+/// The thesis body, with another relaxation time, stepped by an integrator.
+#[derive(Clone, Copy, Debug)]
+pub struct SchemeBody {
+    /// The integrator.
+    pub scheme: Scheme,
+    /// Its numbers.
+    pub precision: Precision,
+    /// The body.
+    pub body: SeriesBody<3>,
+}
+
+/// Numbers an integrator computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Precision {
+    /// 32 bits.
+    Single,
+    /// 64 bits.
+    Double,
+}
+
+impl Precision {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::Double, Self::Single];
+
+    /// Its name in Rust.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Single => "f32",
+            Self::Double => "f64",
+        }
+    }
+}
+
+/// An error of single precision, relative to the peak force: some ten roundings of 6e-8, and the
+/// depths themselves are rounded.
+const TOLERANCE_SINGLE: f64 = 3e-6;
+
+impl SchemeBody {
+    fn run<R: Real>(&self, path: &PathCase) -> Result<Vec<f64>, String> {
+        let Some(&(dt, _)) = path.steps.first() else {
+            return Ok(Vec::new());
+        };
+        let depths = std::iter::once(path.start).chain(path.steps.iter().map(|step| step.1));
+        let depths: Vec<R> = depths.map(R::of).collect();
+        let mut forces = Vec::new();
+        self.scheme
+            .respond(&self.body, dt, &depths, &mut forces)
+            .map_err(|err| err.to_string())?;
+        Ok(forces.iter().skip(1).map(|force| force.to_f64()).collect())
+    }
+}
+
+impl Subject for SchemeBody {
+    fn name(&self) -> String {
+        format!("{}, {}", self.scheme.name(), self.precision.name())
+    }
+
+    fn terms(&self) -> Result<Vec<Relaxation>, String> {
+        let body = self.body.checked().map_err(|err| err.to_string())?;
+        Ok(vec![body.term()])
+    }
+
+    fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
+        match self.precision {
+            Precision::Single => self.run::<f32>(path),
+            Precision::Double => self.run::<f64>(path),
+        }
+    }
+
+    /// Rounding, and for all but the exact step what its order says of a path of so many samples.
+    fn tolerance(&self, path: &PathCase) -> f64 {
+        let rounding = match self.precision {
+            Precision::Single => TOLERANCE_SINGLE,
+            Precision::Double => TOLERANCE,
+        };
+        let Some(order) = self.scheme.order() else {
+            return rounding;
+        };
+        let h = path.steps.first().map_or(0.0, |step| step.0) / self.body.tau_eps;
+        let samples = path.steps.len() as f64;
+        // The path bends every few samples and the force every h: each counts to the order's power.
+        let order = order.min(2) as i32;
+        (10.0 / samples.powi(order) + 2.0 * h.powi(order)).min(2.0) + rounding
+    }
+
+    /// Beyond its limit of stability.
+    fn may_refuse(&self, path: &PathCase) -> bool {
+        let h = path.steps.first().map_or(0.0, |step| step.0) / self.body.tau_eps;
+        self.scheme
+            .stability_limit()
+            .is_some_and(|limit| h >= limit)
+    }
+}

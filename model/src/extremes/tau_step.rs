@@ -1,0 +1,62 @@
+//! Relaxation times 1e-9..1e9 s against steps 1e-9..1e3 s.
+
+use super::judge::{PathCase, Row};
+use super::members::member;
+use super::subjects::FamilyBody;
+use super::{Extent, Part};
+use crate::families::by_key;
+
+/// Name of the group.
+pub(super) const GROUP: &str = "relaxation time and step";
+
+/// Depths in mm of the path: in from outside, down, hold, partly back and down again, out and in.
+const DEPTHS: [f64; 20] = [
+    0.5, 2.0, 4.0, 6.0, 8.0, 10.0, 10.0, 10.0, 10.0, 7.0, 4.0, 6.0, 8.0, 3.0, -2.0, -2.0, -2.0,
+    1.0, 10.0, 10.0,
+];
+
+/// Families of more terms than this take every third power of ten outside a soak: their reference takes
+/// half a minute for all.
+const MANY: usize = 12;
+
+pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
+    let key = key.to_owned();
+    vec![Part::new(GROUP, key.clone(), move |progress| {
+        rows(extent, &key, progress)
+    })]
+}
+
+/// Powers of ten of relaxation times and of steps.
+pub(super) fn decades(extent: Extent) -> [Vec<i32>; 2] {
+    match extent {
+        Extent::Quick => [vec![-9, 0, 9], vec![-9, -3, 3]],
+        Extent::Whole | Extent::Soak => [(-9..=9).collect(), (-9..=3).collect()],
+    }
+}
+
+fn rows(extent: Extent, key: &str, progress: &mut dyn FnMut(f64)) -> Vec<Row> {
+    let Ok(family) = by_key(key) else {
+        return Vec::new();
+    };
+    let [mut taus, steps] = decades(extent);
+    let probe = member(&*family, 1.0, 20.0, 2.0);
+    if extent == Extent::Whole && probe.terms().is_ok_and(|terms| terms.len() > MANY) {
+        taus.retain(|tau| tau % 3 == 0);
+    }
+    let mut rows = Vec::new();
+    for (index, tau) in taus.iter().enumerate() {
+        let subject = FamilyBody(member(&*family, 10f64.powi(*tau), 20.0, 2.0));
+        for step in &steps {
+            let dt = 10f64.powi(*step);
+            let path = PathCase {
+                group: GROUP,
+                case: format!("tau 1e{tau} s, step 1e{step} s"),
+                start: -1.0,
+                steps: DEPTHS.iter().map(|&depth| (dt, depth)).collect(),
+            };
+            rows.push(path.put_to(&subject));
+        }
+        progress((index + 1) as f64 / taus.len() as f64);
+    }
+    rows
+}

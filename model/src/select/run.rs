@@ -1,0 +1,357 @@
+//! The selection itself: fits, criteria, predictions, costs, verdict.
+
+use super::cost::Cost;
+use super::criteria::criteria;
+use super::facts::RecordFacts;
+use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
+use super::ladder::{Step, steps};
+use super::verdict::{Counts, Verdict, verdict};
+use crate::families::{Family, Model, all};
+use crate::fit::{FamilyFit, FamilyOptions, FitError, FitSample, fit_family};
+use crate::tolerance::Tolerance;
+use crate::units::Newtons;
+use serde::Serialize;
+use std::ops::ControlFlow;
+use thiserror::Error;
+
+/// What is compared, and how.
+#[derive(Debug)]
+pub struct SelectOptions {
+    /// Families compared.
+    pub families: Vec<Box<dyn Family>>,
+    /// Error of force that does not matter; without it information criteria alone decide.
+    pub tolerance: Option<Tolerance>,
+    /// What is held out.
+    pub hold_out: HoldOut,
+    /// What each record has of its own; by default an offset alone. An initial force that fades is not
+    /// defined for families of several relaxation times, and would make the others look costlier.
+    pub fit: FamilyOptions,
+}
+
+impl Default for SelectOptions {
+    fn default() -> Self {
+        Self {
+            families: all(),
+            tolerance: None,
+            hold_out: HoldOut::Auto,
+            fit: FamilyOptions {
+                offset: true,
+                initial: false,
+            },
+        }
+    }
+}
+
+/// How far a selection is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Progress {
+    /// Fits done.
+    pub done: usize,
+    /// Fits in all.
+    pub total: usize,
+    /// Family under way.
+    pub family: String,
+}
+
+/// Nothing could be compared.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SelectError {
+    /// No record.
+    #[error("there is no record to compare models on; name a session or a table")]
+    NoRecords,
+    /// No family.
+    #[error("there is no family to compare; name at least one")]
+    NoFamilies,
+    /// Nothing to hold out.
+    #[error(transparent)]
+    HoldOut(#[from] HoldOutError),
+    /// The records themselves cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The caller ended it.
+    #[error("the comparison was ended before it was done")]
+    Ended,
+}
+
+/// A family fitted to all records, and judged.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Candidate {
+    /// Key of the family.
+    pub family: String,
+    /// Its name in words.
+    pub name: String,
+    /// Parameters of the body.
+    pub parameters: usize,
+    /// Numbers the fit found: parameters, and what each record has of its own.
+    pub free: usize,
+    /// Root mean square residual in N.
+    pub rms_n: f64,
+    /// Largest residual in N.
+    pub worst_n: f64,
+    /// Corrected Akaike criterion above the lowest; null where there are too few samples for it.
+    pub aicc_above: Option<f64>,
+    /// Bayesian criterion.
+    pub bic: f64,
+    /// Bayesian criterion above the lowest.
+    pub bic_above: f64,
+    /// Error over what was held out; null where nothing was or its fit was refused.
+    pub prediction: Option<Prediction>,
+    /// Why there is no prediction, if something was held out.
+    pub prediction_refused: Option<String>,
+    /// Cost of one evaluation.
+    pub cost: Cost,
+    /// Whether its error, of prediction where there is one, is within the tolerance; null without one.
+    pub is_within: Option<bool>,
+    /// Independent samples that its residuals are worth.
+    pub effective_samples: f64,
+    /// The fitted model.
+    pub model: Model,
+    /// What to know of the fit.
+    pub warnings: Vec<String>,
+}
+
+impl Candidate {
+    /// The error that a tolerance is compared with: of prediction where `is_predicted`, else of the fit.
+    pub(super) fn error(&self, is_predicted: bool) -> Option<f64> {
+        if is_predicted {
+            self.prediction.as_ref().map(|one| one.rms_n)
+        } else {
+            Some(self.rms_n)
+        }
+    }
+}
+
+/// A family that the records do not hold.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Refused {
+    /// Key of the family.
+    pub family: String,
+    /// Why.
+    pub reason: String,
+}
+
+/// All families compared.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Selection {
+    /// The records.
+    pub records: Vec<RecordFacts>,
+    /// Samples whose force counts.
+    pub samples: usize,
+    /// Independent samples that the criteria count: those of the residuals that come closest to noise.
+    pub effective_samples: f64,
+    /// The tolerance in N.
+    pub tolerance_n: Option<f64>,
+    /// Whether something was held out and predicted.
+    pub is_predicted: bool,
+    /// Families in the order given.
+    pub candidates: Vec<Candidate>,
+    /// Families that the records do not hold.
+    pub refused: Vec<Refused>,
+    /// What each extra term buys.
+    pub steps: Vec<Step>,
+    /// The choice, or why there is none.
+    pub verdict: Verdict,
+}
+
+/// Fits every family to all records together, predicts what is held out, and judges.
+///
+/// `progress` is told before each fit and may end the whole.
+///
+/// ```
+/// use palpate_model::families::{Kelvin, Maxwell, Model, PowerSeries};
+/// use palpate_model::fit::FitSample;
+/// use palpate_model::select::{SelectOptions, select};
+/// use palpate_model::{Depth, Newtons, Seconds};
+/// use std::ops::ControlFlow;
+///
+/// let truth = Model { family: "kelvin".into(), outer: vec![1.5], linear: vec![0.15, 0.6] };
+/// let record = |speed: f64| -> Vec<FitSample> {
+///     let path = (0..400).map(|i| 0.1 * f64::from(i));
+///     let path: Vec<_> = path.map(|t| (Seconds(t), Depth((speed * t).min(10.0)))).collect();
+///     let forces = truth.along(path.iter().copied()).expect("a force");
+///     let noise = |i: usize| 0.01 * ((i * i * 37 + 11 * i) % 101) as f64 / 29.0;
+///     let samples = path.iter().zip(forces).enumerate();
+///     samples
+///         .map(|(i, (&(t, depth), force))| FitSample {
+///             t,
+///             depth,
+///             force: Newtons(force + noise(i)),
+///             sigma: Newtons(0.01),
+///         })
+///         .collect()
+/// };
+/// let (slow, fast) = (record(0.5), record(4.0));
+/// let families = SelectOptions {
+///     families: vec![Box::new(Maxwell), Box::new(Kelvin), Box::new(PowerSeries::of_order(3).expect("3"))],
+///     ..SelectOptions::default()
+/// };
+/// let found = select(&[("slow", &slow), ("fast", &fast)], &families, &|_| ControlFlow::Continue(()))?;
+/// assert_eq!(found.verdict.family.as_deref(), Some("kelvin"));
+/// # Ok::<(), palpate_model::select::SelectError>(())
+/// ```
+pub fn select(
+    records: &[(&str, &[FitSample])],
+    options: &SelectOptions,
+    progress: &dyn Fn(&Progress) -> ControlFlow<()>,
+) -> Result<Selection, SelectError> {
+    if records.is_empty() {
+        return Err(SelectError::NoRecords);
+    }
+    if options.families.is_empty() {
+        return Err(SelectError::NoFamilies);
+    }
+    check(records)?;
+    let facts: Vec<RecordFacts> = records
+        .iter()
+        .map(|(name, samples)| RecordFacts::of(name, samples))
+        .collect();
+    let samples: Vec<&[FitSample]> = records.iter().map(|record| record.1).collect();
+    let folds = folds(options.hold_out, &facts, &samples)?;
+    let total = options.families.len() * (1 + folds.len());
+    let mut done = 0;
+    let mut begin = |family: &dyn Family| {
+        let news = Progress {
+            done,
+            total,
+            family: family.key(),
+        };
+        done += 1;
+        match progress(&news) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(SelectError::Ended),
+        }
+    };
+    let mut fitted = Vec::new();
+    let mut refused = Vec::new();
+    for family in &options.families {
+        begin(&**family)?;
+        let fit = match fit_family(&**family, records, options.fit) {
+            Ok(fit) => fit,
+            Err(reason) => {
+                refused.push((family.key(), reason));
+                // Its folds are not fitted either, but were counted.
+                for _ in &folds {
+                    begin(&**family)?;
+                }
+                continue;
+            }
+        };
+        let mut predicted = Ok(Vec::new());
+        for fold in &folds {
+            begin(&**family)?;
+            if let Ok(known) = &mut predicted {
+                match predict_fold(&**family, records, &facts, fold, options.fit) {
+                    Ok(more) => known.extend(more),
+                    Err(reason) => predicted = Err(reason.to_string()),
+                }
+            }
+        }
+        fitted.push((family, fit, predicted));
+    }
+    if fitted.is_empty()
+        && let Some((_, reason)) = refused.first()
+    {
+        return Err(reason.clone().into());
+    }
+    let samples = fitted.first().map_or(0, |(_, fit, _)| fit.samples);
+    let best = fitted.iter().min_by(|a, b| a.1.sum.total_cmp(&b.1.sum));
+    let effective = best.map_or(0.0, |(_, fit, _)| fit.effective_samples);
+    let mut candidates: Vec<Candidate> = fitted
+        .into_iter()
+        .map(|(family, fit, predicted)| candidate(&**family, fit, predicted, effective))
+        .collect::<Result<_, FitError>>()?;
+    let lowest =
+        |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
+    let (bic, aicc) = (
+        lowest(|one| one.bic),
+        lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)),
+    );
+    let peak = facts.iter().fold(0.0f64, |all, one| all.max(one.peak_n));
+    let tolerance_n = options.tolerance.map(|one| one.in_newtons(Newtons(peak)).0);
+    let is_predicted = candidates.iter().any(|one| one.prediction.is_some());
+    for one in &mut candidates {
+        one.bic_above = one.bic - bic;
+        one.aicc_above = one.aicc_above.map(|value| value - aicc);
+        one.is_within = tolerance_n.map(|tolerance| {
+            one.error(is_predicted)
+                .is_some_and(|error| error <= tolerance)
+        });
+    }
+    let counts = Counts {
+        records: records.len(),
+        samples,
+        effective,
+    };
+    let verdict = verdict(&candidates, tolerance_n, is_predicted, counts);
+    Ok(Selection {
+        steps: steps(&candidates),
+        verdict,
+        records: facts,
+        samples,
+        effective_samples: effective,
+        tolerance_n,
+        is_predicted,
+        candidates,
+        refused: refused
+            .into_iter()
+            .map(|(family, reason)| Refused {
+                family,
+                reason: reason.to_string(),
+            })
+            .collect(),
+    })
+}
+
+/// Refuses records that no family could be fitted to, before anything is measured on them.
+fn check(records: &[(&str, &[FitSample])]) -> Result<(), SelectError> {
+    for (name, samples) in records {
+        if samples.is_empty() {
+            let reason = FitError::TooFewSamples {
+                samples: 0,
+                parameters: 2,
+            };
+            return Err(match records.len() {
+                1 => reason,
+                _ => FitError::InRecord {
+                    record: (*name).to_owned(),
+                    reason: Box::new(reason),
+                },
+            }
+            .into());
+        }
+    }
+    Ok(())
+}
+
+/// A row of the comparison; the criteria are relative to the lowest only once all are known.
+fn candidate(
+    family: &dyn Family,
+    fit: FamilyFit,
+    predicted: Result<Vec<super::PredictionOf>, String>,
+    effective: f64,
+) -> Result<Candidate, FitError> {
+    let terms = fit.model.terms().map_err(|_| FitError::Overflow)?;
+    let (aicc, bic) = criteria(fit.sum / fit.samples as f64, effective, fit.free);
+    let (prediction, prediction_refused) = match predicted {
+        Ok(records) => (Prediction::of(records), None),
+        Err(reason) => (None, Some(reason)),
+    };
+    Ok(Candidate {
+        family: family.key(),
+        name: family.name(),
+        parameters: fit.model.outer.len() + fit.model.linear.len(),
+        free: fit.free,
+        rms_n: fit.rms,
+        worst_n: fit.records.iter().fold(0.0, |all, one| all.max(one.worst)),
+        aicc_above: aicc,
+        bic,
+        bic_above: 0.0,
+        prediction,
+        prediction_refused,
+        cost: Cost::of(&terms),
+        is_within: None,
+        effective_samples: fit.effective_samples,
+        model: fit.model,
+        warnings: fit.warnings,
+    })
+}

@@ -1,0 +1,197 @@
+//! The window driven by accessible name: no display, no graphics card, no pixels.
+//!
+//! Every wait is bounded by a count of frames, so a flow that hangs fails instead.
+#![expect(
+    clippy::unwrap_used,
+    clippy::missing_panics_doc,
+    reason = "a test that cannot go on must fail"
+)]
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::{NodeT, Queryable};
+use palpate_app::app::WorkbenchApp;
+use palpate_app::report::text::{self, ParameterText};
+use palpate_app::window::WindowOptions;
+use palpate_app::workers::fit::{Refit, fit_source};
+use palpate_drivers::sim::SimSettings;
+use palpate_model::fit::{FitOptions, FitReport};
+use palpate_model::rig::Phase;
+use palpate_protocols::runner::{LogLine, RunView, TimeScale};
+use std::path::PathBuf;
+use std::time::Duration;
+use tempfile::TempDir;
+
+/// The window under test.
+pub type Window = Harness<'static, WorkbenchApp>;
+
+/// Sleep between two frames of a wait.
+pub const FRAME: Duration = Duration::from_millis(5);
+
+/// Most frames of a wait: over a minute, ten times what the slowest flow took on two slow cores.
+const FRAMES_MAX: usize = 12_000;
+
+/// A window on a simulated rig, driven by accessible name.
+pub struct Flow {
+    /// The window.
+    pub window: Window,
+    /// Where its sessions go.
+    pub folder: TempDir,
+}
+
+impl Flow {
+    /// Opens a window; the rig answers.
+    #[must_use]
+    pub fn open(scale: TimeScale) -> Self {
+        let folder = tempfile::tempdir().unwrap();
+        let settings = SimSettings {
+            seed: 7,
+            ..SimSettings::default()
+        };
+        let mut options = WindowOptions::open("sim", &settings, scale).unwrap();
+        options.sessions = Some(folder.path().to_path_buf());
+        let window = Harness::builder()
+            .with_size((1280.0, 800.0))
+            .build_eframe(|cc| WorkbenchApp::new(options, &cc.egui_ctx).unwrap());
+        let mut flow = Self { window, folder };
+        flow.wait("the first sample", |window| {
+            window.state().snapshot().rig.reading.is_some()
+        });
+        flow
+    }
+
+    /// Draws frames until `is_done`.
+    pub fn wait(&mut self, what: &str, is_done: impl Fn(&Window) -> bool) {
+        for _ in 0..FRAMES_MAX {
+            self.window.step();
+            if is_done(&self.window) {
+                return;
+            }
+            std::thread::sleep(FRAME);
+        }
+        panic!("{what} did not come; {}", self.story());
+    }
+
+    /// What happened so far, for a failure's message.
+    fn story(&self) -> String {
+        let lines = self.run().map_or(Vec::new(), |run| {
+            let text = |line: &LogLine| format!("{} {}", line.at, line.text);
+            run.events.iter().map(text).collect()
+        });
+        format!("the events were:\n{}", lines.join("\n"))
+    }
+
+    /// Waits for a phase of the run; any stop before it is a failure.
+    pub fn wait_for_phase(&mut self, phase: Phase) {
+        let is_there = |run: &RunView| run.phase == phase;
+        let is_stopped = |run: &RunView| run.holding.is_some() || run.outcome.is_some();
+        self.wait(phase.name(), |window| {
+            let run = window.state().snapshot().run.as_ref();
+            run.is_some_and(|run| is_there(run) || is_stopped(run))
+        });
+        assert!(
+            self.run().is_some_and(|run| is_there(&run)),
+            "{}",
+            self.story()
+        );
+    }
+
+    /// The run on the screen.
+    #[must_use]
+    pub fn run(&self) -> Option<RunView> {
+        self.window.state().snapshot().run.clone()
+    }
+
+    /// Types into a named field.
+    pub fn type_into(&mut self, name: &str, text: &str) {
+        self.window.get_by_label(name).focus();
+        self.window.step();
+        self.window
+            .get_by_label(name)
+            .set_text_value_accesskit(text);
+        self.window.run_steps(2);
+    }
+
+    /// Presses a named control.
+    pub fn click(&mut self, name: &str) {
+        // By name and not by place: a control may be scrolled out of sight.
+        self.window.get_by_label(name).click_accesskit();
+        self.window.run_steps(2);
+    }
+
+    /// Whether a named control can be pressed.
+    #[must_use]
+    pub fn is_enabled(&self, name: &str) -> bool {
+        !self
+            .window
+            .get_by_label(name)
+            .accesskit_node()
+            .is_disabled()
+    }
+
+    /// Whether any label has these words.
+    #[must_use]
+    pub fn says(&self, words: &str) -> bool {
+        self.window
+            .query_all_by_label_contains(words)
+            .next()
+            .is_some()
+    }
+
+    /// Sessions written.
+    #[must_use]
+    pub fn sessions(&self) -> Vec<PathBuf> {
+        std::fs::read_dir(self.folder.path())
+            .unwrap()
+            .map(|item| item.unwrap().path())
+            .collect()
+    }
+
+    /// Waits for the exact fit of the last session; the window must then say of it what
+    /// `palpate fit` prints, be it a report or a refusal. Returns the report.
+    pub fn same_words_as_the_command_line(&mut self) -> Option<FitReport> {
+        self.wait("the exact fit", |window| {
+            matches!(window.state().refit(), Refit::Done(_) | Refit::Refused(_))
+        });
+        self.window.run_steps(2);
+        let session = self.sessions().pop().unwrap();
+        let fitted = fit_source(&session, None, &FitOptions::default());
+        let result = match fitted {
+            Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
+            Err(err) => Err(err.to_string()),
+        };
+        match result {
+            Ok(report) => {
+                self.says_all_of(&report);
+                Some(report)
+            }
+            Err(reason) => {
+                assert!(self.says(&format!("No exact fit: {reason}")), "{reason}");
+                None
+            }
+        }
+    }
+
+    /// The window must say every word of a report.
+    fn says_all_of(&self, report: &FitReport) {
+        let printed = text::whole(report);
+        let mut words: Vec<String> = report.sentences().map(String::from).collect();
+        words.push(text::quality(report));
+        for parameter in &report.parameters {
+            let text = ParameterText::of(parameter);
+            words.extend([text.name, text.value, text.unit, text.interval]);
+        }
+        for word in words {
+            assert!(self.says(&word), "the window does not say '{word}'");
+            assert!(printed.contains(&word), "'{word}' is not in:\n{printed}");
+        }
+    }
+
+    /// Waits for the end of the run.
+    pub fn wait_for_end(&mut self) -> RunView {
+        self.wait("the end of the run", |window| {
+            let run = window.state().snapshot().run.as_ref();
+            run.is_some_and(|run| run.outcome.is_some())
+        });
+        self.run().unwrap()
+    }
+}
