@@ -151,9 +151,7 @@ fn fits(out: &mut String, curves: &TradeCurves) {
     }
     for row in &curves.live {
         let name = format!("live, {} relaxation times, a sample", row.nodes);
-        let error = row
-            .tau_error
-            .map_or("no answer".to_owned(), |error| percent(error));
+        let error = row.tau_error.map_or("no answer".to_owned(), percent);
         let _ = writeln!(
             out,
             "{name:34}{} {error:>10} without noise {}",
