@@ -5,7 +5,7 @@
 mod support;
 
 use palpate_model::fit::{FitOptions, FitSample, LiveEstimate, LiveFit, fit};
-use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
 use support::{noisy, ramp_hold, respond};
 
@@ -262,5 +262,43 @@ fn residual_blocks_are_means_of_the_residuals() {
             .sum::<f64>()
             / length as f64;
         assert!((force - modelled - residual).abs() < 1e-9);
+    }
+}
+
+#[test]
+fn a_bank_may_have_more_or_fewer_relaxation_times() {
+    for count in [0, 8, 20, 63, 520, usize::MAX] {
+        assert!(
+            LiveFit::with_relaxation_times(Depth(30.0), count).is_none(),
+            "{count}"
+        );
+    }
+    let deep = Depth(30.0);
+    assert_eq!(
+        LiveFit::with_relaxation_times(deep, 64),
+        Some(LiveFit::new(deep))
+    );
+    // Between nodes a polynomial in log tau is used, so closer nodes are more exact until sums of products
+    // have no more digits: half a double's.
+    let mut before = f64::INFINITY;
+    for count in [16, 32, 64] {
+        let mut live = LiveFit::with_relaxation_times(deep, count).unwrap();
+        let mut state = KelvinState::at_rest();
+        for i in 0..9000u32 {
+            let t = f64::from(i) * 0.01;
+            let depth = Depth((0.75 * t).min(30.0));
+            let dt = Seconds(if i == 0 { 0.0 } else { 0.01 });
+            let force = state.step(&ModifiedKelvin::THESIS, depth, dt);
+            live.push(Seconds(t), depth, force, Newtons(0.02));
+        }
+        let tau = live
+            .estimate()
+            .unwrap()
+            .identified("tau_eps")
+            .unwrap()
+            .value;
+        let miss = (tau / ModifiedKelvin::THESIS.tau_eps - 1.0).abs();
+        assert!(miss < before, "{count}: {miss:e} after {before:e}");
+        before = miss.max(1e-7);
     }
 }

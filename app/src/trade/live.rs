@@ -10,20 +10,21 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use std::hint::black_box;
 
 /// Relaxation times in the bank.
-const NODES: [usize; 1] = [64];
+const NODES: [usize; 5] = [16, 32, 64, 128, 256];
 
-fn pushed(samples: &[FitSample]) -> LiveFit {
-    let mut live = LiveFit::new(Depth(30.0));
+/// A live fit with so many relaxation times after all samples; none that a bank cannot have.
+fn pushed(nodes: usize, samples: &[FitSample]) -> Option<LiveFit> {
+    let mut live = LiveFit::with_relaxation_times(Depth(30.0), nodes)?;
     for sample in samples {
         live.push(sample.t, sample.depth, sample.force, sample.sigma);
     }
-    live
+    Some(live)
 }
 
 pub(super) fn rows(paths: &Paths) -> Result<Vec<LiveRow>, String> {
     let recording = fit::recording(0, 0.0, paths)?;
     let row = |&nodes: &usize| {
-        let answer = pushed(&recording).estimate();
+        let answer = pushed(nodes, &recording).and_then(|live| live.estimate());
         let tau = answer.and_then(|answer| answer.identified("tau_eps").map(|tau| tau.value));
         LiveRow {
             nodes,
@@ -37,12 +38,12 @@ pub(super) fn rows(paths: &Paths) -> Result<Vec<LiveRow>, String> {
 
 pub(super) fn jobs<'a>(rows: &[LiveRow], paths: &Paths) -> Result<Vec<Job<'a>>, String> {
     let recording = fit::recording(0, 0.0, paths)?;
-    let job = |_: &LiveRow| {
-        let samples = recording.clone();
+    let job = |row: &LiveRow| {
+        let (nodes, samples) = (row.nodes, recording.clone());
         Job {
             per_call: samples.len() as f64,
             call: Box::new(move || {
-                black_box(pushed(black_box(&samples)));
+                black_box(pushed(nodes, black_box(&samples)));
             }),
         }
     };

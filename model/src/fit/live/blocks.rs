@@ -4,7 +4,7 @@
 //! node, whatever path the probe took. When there are too many blocks every second mark goes,
 //! which doubles the block and loses nothing else: memory stays bounded however long the run.
 
-use super::bank::{Bank, FILTERED, NODES};
+use super::bank::{Bank, FILTERED};
 
 /// Blocks kept at most.
 pub(super) const BLOCKS_MAX: usize = 512;
@@ -19,7 +19,7 @@ pub(super) struct Mark {
     /// Sums of weight and of weight times force.
     pub shared: [f64; 2],
     /// Weighted sums of the filtered columns at every node.
-    pub sums: [[f64; NODES]; FILTERED],
+    pub sums: Vec<[f64; FILTERED]>,
 }
 
 /// The marks so far.
@@ -33,11 +33,12 @@ pub(super) struct Blocks {
 }
 
 impl Blocks {
-    pub fn new() -> Self {
+    /// No block yet of a bank with so many nodes.
+    pub fn new(nodes: usize) -> Self {
         let start = Mark {
             t: 0.0,
             shared: [0.0; 2],
-            sums: [[0.0; NODES]; FILTERED],
+            sums: vec![[0.0; FILTERED]; nodes],
         };
         Self {
             marks: vec![start],
@@ -73,12 +74,14 @@ impl Blocks {
 
 #[cfg(test)]
 mod tests {
+    use super::super::bank::Grid;
     use super::*;
 
     #[test]
     fn memory_is_bounded_and_blocks_stay_equal() {
-        let mut bank = Bank::new();
-        let mut blocks = Blocks::new();
+        let grid = Grid::of(16).unwrap();
+        let mut bank = Bank::new(grid);
+        let mut blocks = Blocks::new(grid.nodes);
         for i in 0..200_000u32 {
             let t = f64::from(i);
             if i > 0 {

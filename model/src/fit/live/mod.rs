@@ -18,7 +18,7 @@ use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU
 use super::report::{Parameter, student_t975};
 use super::system::linear_units;
 use crate::units::{Depth, Newtons, Seconds};
-use bank::{Bank, COLUMNS, NODES, spacing, tau_at};
+use bank::{Bank, COLUMNS, Grid, NODES};
 use blocks::Blocks;
 use node::{Solution, Used};
 use path::Path;
@@ -97,10 +97,21 @@ impl LiveFit {
     /// For indentations down to about `depth_max`, which scales the columns.
     #[must_use]
     pub fn new(depth_max: Depth) -> Self {
+        Self::on(depth_max, Grid { nodes: NODES })
+    }
+
+    /// The same with another number of relaxation times in the bank: a multiple of eight from 16 to
+    /// 512, or there is none. `palpate trade` measures what they buy.
+    #[must_use]
+    pub fn with_relaxation_times(depth_max: Depth, count: usize) -> Option<Self> {
+        Grid::of(count).map(|grid| Self::on(depth_max, grid))
+    }
+
+    fn on(depth_max: Depth, grid: Grid) -> Self {
         Self {
             depth_max: if depth_max.0 > 0.0 { depth_max.0 } else { 1.0 },
-            bank: Bank::new(),
-            blocks: Blocks::new(),
+            bank: Bank::new(grid),
+            blocks: Blocks::new(grid.nodes),
             path: Path::default(),
             last: None,
             measured_until: f64::NEG_INFINITY,
@@ -141,7 +152,7 @@ impl LiveFit {
         }
         let mut bank = self.bank.clone();
         bank.flush();
-        let grams: Vec<_> = (0..NODES).map(|node| bank.gram(node)).collect();
+        let grams: Vec<_> = (0..bank.grid().nodes).map(|node| bank.gram(node)).collect();
         // What the probe did while no force counted identifies nothing.
         let corners = path::until(self.path.corners(), self.measured_until);
         let judge = |minimum: &Minimum| {
@@ -149,7 +160,7 @@ impl LiveFit {
             let values = self.maps().map(|map| minimum.value(&jet, &map));
             let units = linear_units(self.depth_max);
             let scaled = std::array::from_fn(|k| values[k] * units[k]);
-            Blind::of(&corners, tau_at(minimum.place), &scaled)
+            Blind::of(&corners, bank.grid().tau_at(minimum.place), &scaled)
         };
         let minimum = Minimum::find(&grams, [true; COLUMNS])?;
         let blind = judge(&minimum);
@@ -183,10 +194,11 @@ impl LiveFit {
         let residual = stencil.value(&jet, |node| at(node).residual).max(0.0);
         let curvature = stencil.curvature(&jet, |node| at(node).residual);
         let variance = residual / freedom;
-        let tau = tau_at(*place);
+        let grid = self.bank.grid();
+        let tau = grid.tau_at(*place);
         // Half the curvature of the residual sum is the information, per node spacing.
         let place_error = (2.0 * variance / curvature).sqrt();
-        let mut values = vec![(tau, tau * spacing() * place_error)];
+        let mut values = vec![(tau, tau * grid.spacing() * place_error)];
         for map in self.maps() {
             let of = |node: usize| at(node).value(&map);
             let through_tau = stencil.slope(&jet, of) * place_error;
@@ -310,7 +322,7 @@ impl Minimum {
             low -= 1;
         }
         let mut high = best;
-        while high < NODES - 1 && high - best < STENCIL_MAX && solve(high + 1).is_some() {
+        while high < grams.len() - 1 && high - best < STENCIL_MAX && solve(high + 1).is_some() {
             high += 1;
         }
         let stencil = Stencil::around(best, (low, high))?;

@@ -2,7 +2,7 @@
 //! memory of the noise is.
 
 use super::LiveFit;
-use super::bank::{FILTERED, NODES, place_of, spacing};
+use super::bank::FILTERED;
 use super::blocks::Mark;
 use super::stencil::{Jet, Stencil};
 use crate::units::Seconds;
@@ -29,11 +29,12 @@ impl LiveFit {
     /// interpolation in log tau (1e-8); `None` for a tau outside the bank.
     #[must_use]
     pub fn residual_blocks(&self, tau: Seconds, linear: &[f64; 6]) -> Option<ResidualBlocks> {
-        let place = place_of(tau.0);
-        if !(1.0..=(NODES - 2) as f64).contains(&place) {
+        let grid = self.bank.grid();
+        let place = grid.place_of(tau.0);
+        if !(1.0..=(grid.nodes - 2) as f64).contains(&place) {
             return None;
         }
-        let stencil = Stencil::around(place.round() as usize, (0, NODES - 1))?;
+        let stencil = Stencil::around(place.round() as usize, (0, grid.nodes - 1))?;
         let jet = stencil.jet(place);
         let marks = &self.blocks.marks;
         let count = marks.len() - 1;
@@ -56,7 +57,7 @@ impl LiveFit {
             let mut modelled = 0.0;
             for (k, (value, by_place)) in means.into_iter().enumerate() {
                 row[1 + k] = value;
-                row[0] += linear[k] * by_place / (spacing() * tau.0);
+                row[0] += linear[k] * by_place / (grid.spacing() * tau.0);
                 modelled += linear[k] * value;
             }
             blocks.residuals.push(force - modelled);
@@ -76,7 +77,7 @@ impl LiveFit {
         over_weight: f64,
     ) -> [(f64, f64); 6] {
         let q: [(f64, f64); FILTERED] = std::array::from_fn(|k| {
-            let of = |node: usize| (pair[1].sums[k][node] - pair[0].sums[k][node]) * over_weight;
+            let of = |node: usize| (pair[1].sums[node][k] - pair[0].sums[node][k]) * over_weight;
             (stencil.value(jet, of), stencil.slope(jet, of))
         });
         let x = self.depth_max;

@@ -105,7 +105,7 @@ impl Stencil {
             };
             let step = (next - place).abs();
             place = next;
-            if step < 1e-13 * NODES_ACROSS {
+            if step < 1e-13 * PLACES {
                 break;
             }
         }
@@ -113,5 +113,5 @@ impl Stencil {
     }
 }
 
-/// Places are counted up to this; their last digit ends the search.
-const NODES_ACROSS: f64 = super::bank::NODES as f64;
+/// Places are counted up to about this; their last digit ends the search.
+const PLACES: f64 = super::bank::NODES as f64;
