@@ -5,7 +5,7 @@
 mod support;
 
 use palpate_model::fit::{FitOptions, FitSample, LiveEstimate, LiveFit, fit};
-use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons, Seconds};
 use support::{noisy, ramp_hold, respond};
 
@@ -283,13 +283,8 @@ fn a_bank_may_have_more_or_fewer_relaxation_times() {
     let mut before = f64::INFINITY;
     for count in [16, 32, 64] {
         let mut live = LiveFit::with_relaxation_times(deep, count).unwrap();
-        let mut state = KelvinState::at_rest();
-        for i in 0..9000u32 {
-            let t = f64::from(i) * 0.01;
-            let depth = Depth((0.75 * t).min(30.0));
-            let dt = Seconds(if i == 0 { 0.0 } else { 0.01 });
-            let force = state.step(&ModifiedKelvin::THESIS, depth, dt);
-            live.push(Seconds(t), depth, force, Newtons(0.02));
+        for sample in respond(&ModifiedKelvin::THESIS, &ramp_hold(0.75, 50.0, 0.01)) {
+            live.push(sample.t, sample.depth, sample.force, Newtons(0.02));
         }
         let tau = live
             .estimate()

@@ -8,6 +8,7 @@ use clap::Args;
 use palpate_model::families::by_key;
 use palpate_model::fit::FitSample;
 use palpate_model::select::{SelectError, SelectOptions, Selection, select};
+use palpate_protocols::analysis::Stretch;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -34,6 +35,9 @@ pub struct SelectArgs {
     /// Names of the columns of tables that have no header, as in t_s,x_mm,F_N
     #[arg(long, value_name = "NAMES")]
     columns: Option<String>,
+    /// Compare the way back too, where it was recorded
+    #[arg(long)]
+    unload: bool,
     /// Draw error over cost as a new SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -62,7 +66,11 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
         )));
     }
     let found = sources::find(&args.sources)?;
-    let records = sources::read(&found, columns.as_ref(), output)?;
+    let stretch = match args.unload {
+        true => Stretch::WithUnload,
+        false => Stretch::RampHold,
+    };
+    let records = sources::read(&found, columns.as_ref(), stretch, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = records
         .iter()
         .map(|(name, samples)| (name.as_str(), samples.as_slice()))

@@ -2,7 +2,7 @@
 
 use palpate_model::fit::FitSample;
 use palpate_model::select::{SelectError, SelectOptions, Selection, select};
-use palpate_protocols::analysis::{self, SourceError};
+use palpate_protocols::analysis::{self, SourceError, Stretch};
 use std::fmt;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -48,12 +48,13 @@ impl fmt::Display for SelectFailure {
 /// Reads every source and compares models on all of them together.
 pub fn select_sources(
     paths: &[PathBuf],
+    stretch: Stretch,
     options: &SelectOptions,
     progress: &dyn Fn(usize, usize, &str) -> ControlFlow<()>,
 ) -> Result<Selected, SelectFailure> {
     let sources = paths
         .iter()
-        .map(|path| read(path))
+        .map(|path| read(path, stretch))
         .collect::<Result<Vec<SelectSource>, _>>()?;
     let records: Vec<(&str, &[FitSample])> = sources
         .iter()
@@ -75,8 +76,8 @@ pub fn select_sources(
     })
 }
 
-fn read(path: &Path) -> Result<SelectSource, SelectFailure> {
-    let source = analysis::read(path)
+fn read(path: &Path, stretch: Stretch) -> Result<SelectSource, SelectFailure> {
+    let source = analysis::read_stretch(path, None, stretch)
         .map_err(|reason| SelectFailure::Source(path.to_path_buf(), Box::new(reason)))?;
     let name = path.file_stem().map_or_else(
         || path.display().to_string(),

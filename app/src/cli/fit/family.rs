@@ -1,13 +1,13 @@
 //! `palpate fit --family KEY`: any model family, one body for all sources.
 
-use super::super::{Failure, output::Output, source_failure};
+use super::super::{Failure, output::Output};
 use super::{FitArgs, sources};
 use crate::report::family::{self, FittedRecord};
 use palpate_model::families::by_key;
 use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
-use palpate_protocols::analysis::{self, Stretch};
+use palpate_protocols::analysis::Stretch;
 use palpate_protocols::runner::Stopwatch;
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
@@ -71,15 +71,7 @@ pub(super) fn run(
         true => Stretch::WithUnload,
         false => Stretch::RampHold,
     };
-    let mut named: Vec<(String, Vec<FitSample>)> = Vec::with_capacity(found.len());
-    for path in &found {
-        let source = analysis::read_stretch(path, columns, stretch).map_err(source_failure)?;
-        let name = path.display().to_string();
-        for note in &source.notes {
-            output.note(&format!("{name}: {note}"));
-        }
-        named.push((name, source.samples));
-    }
+    let named = sources::read(&found, columns, stretch, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = named
         .iter()
         .map(|(name, samples)| (name.as_str(), samples.as_slice()))

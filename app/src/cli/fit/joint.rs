@@ -4,6 +4,7 @@ use super::super::{Failure, output::Output};
 use super::{Recipe, sources};
 use crate::report::text;
 use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
+use palpate_protocols::analysis::Stretch;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -33,7 +34,7 @@ pub(super) fn run(
         ));
     }
     let shared = names(shared);
-    let records = sources::read(&found, recipe.columns.as_ref(), output)?;
+    let records = sources::read(&found, recipe.columns.as_ref(), Stretch::RampHold, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = records
         .iter()
         .map(|(name, samples)| (name.as_str(), samples.as_slice()))

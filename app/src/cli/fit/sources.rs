@@ -4,7 +4,7 @@ use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
 use palpate_model::fit::FitSample;
-use palpate_protocols::analysis;
+use palpate_protocols::analysis::{self, Stretch};
 use palpate_sessions::import::ColumnNames;
 use palpate_sessions::log::ReadError;
 use std::fs;
@@ -78,6 +78,7 @@ pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 pub(in crate::cli) fn read(
     found: &[PathBuf],
     columns: Option<&ColumnNames>,
+    stretch: Stretch,
     output: &Output,
 ) -> Result<Vec<(String, Vec<FitSample>)>, Failure> {
     let mut real: Vec<PathBuf> = found
@@ -92,7 +93,7 @@ pub(in crate::cli) fn read(
         )));
     }
     let one = |path: &PathBuf| {
-        let source = analysis::read_named(path, columns).map_err(source_failure)?;
+        let source = analysis::read_stretch(path, columns, stretch).map_err(source_failure)?;
         let name = path.display().to_string();
         for note in &source.notes {
             output.note(&format!("{name}: {note}"));

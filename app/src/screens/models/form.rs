@@ -7,6 +7,7 @@ use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, ComboBox, Label, RichText, TextEdit, Ui};
 use palpate_model::select::{HoldOut, SelectOptions};
 use palpate_model::tolerance::{BadTolerance, Tolerance};
+use palpate_protocols::analysis::Stretch;
 use std::path::{Path, PathBuf};
 
 /// More recordings than this compared by hand are a job for the command line.
@@ -28,6 +29,7 @@ pub struct ModelsForm {
     typed: String,
     tolerance: String,
     hold_out: HoldOut,
+    with_unload: bool,
 }
 
 impl Default for ModelsForm {
@@ -37,6 +39,7 @@ impl Default for ModelsForm {
             typed: String::new(),
             tolerance: "2%".into(),
             hold_out: HoldOut::Auto,
+            with_unload: false,
         }
     }
 }
@@ -46,6 +49,8 @@ impl Default for ModelsForm {
 pub struct Request {
     /// Sessions and tables.
     pub paths: Vec<PathBuf>,
+    /// What of them is compared.
+    pub stretch: Stretch,
     /// How they are compared.
     pub options: SelectOptions,
 }
@@ -65,6 +70,11 @@ impl ModelsForm {
         }
         Ok(Request {
             paths: self.sources.clone(),
+            stretch: if self.with_unload {
+                Stretch::WithUnload
+            } else {
+                Stretch::RampHold
+            },
             options: SelectOptions {
                 tolerance: self.tolerance()?,
                 hold_out: self.hold_out,
@@ -192,6 +202,7 @@ impl ModelsForm {
                 .response
                 .labelled_by(label.id);
         });
+        ui.checkbox(&mut self.with_unload, "the way back too, where recorded");
     }
 }
 
