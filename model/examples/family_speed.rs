@@ -5,7 +5,8 @@
 #![expect(
     clippy::print_stdout,
     clippy::unwrap_used,
-    reason = "a measurement prints and may fail"
+    clippy::disallowed_methods,
+    reason = "a measurement prints, reads a clock and may fail"
 )]
 
 use palpate_model::families;

@@ -1,5 +1,4 @@
 //! Flows through the window by accessible name: no display, no graphics card, no pixels.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use eframe::egui::{Key, ViewportCommand, ViewportEvent, ViewportId};
 use egui_kittest::Harness;

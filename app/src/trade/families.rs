@@ -62,7 +62,7 @@ const TARGETS: [Target; 4] = [
             "fractional-1",
             "fractional-2",
             "fractional-4",
-            "fractional",
+            "fractional-6",
             "fractional-8",
             "fractional-10",
             "fractional-12",

@@ -172,7 +172,11 @@ fn wrong_use_is_told_in_one_sentence() {
             2,
             "error: no speed can be held out, because the 1 record(s) have one speed only; add records of another, or hold out 'auto'\n",
         ),
-        (&["empty.csv"], 2, "error: "),
+        (
+            &["empty.csv"],
+            2,
+            "error: empty.csv: the table has no rows to fit\n",
+        ),
         (
             &["flat.csv"],
             1,

@@ -251,11 +251,11 @@ fn curves_that_were_changed_are_noticed() {
             "trapezoid at 0.001 s in f64",
         ),
         (
-            |curves| curves.families[1].error_n *= 0.99999,
+            |curves| curves.families[1].error_n *= 0.999,
             "series-2 for a body",
         ),
         (
-            |curves| curves.fit[1].tau_error *= 1.00001,
+            |curves| curves.fit[1].tau_error *= 1.001,
             "the fit at 10 Hz",
         ),
         (

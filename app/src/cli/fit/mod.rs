@@ -45,7 +45,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "KEY", conflicts_with_all = ["share", "profile", "bootstrap", "fixed", "free", "jobs"])]
     family: Option<String>,
     /// With --family: take the recorded unloading of sessions as well
-    #[arg(long, requires = "family")]
+    #[arg(long)]
     unload: bool,
     /// Add 95 % intervals from the profile likelihood
     #[arg(long)]
@@ -92,6 +92,11 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     intervals::check(args)?;
     if let Some(key) = &args.family {
         return family::run(key, args, columns.as_ref(), output);
+    }
+    if args.unload {
+        return Err(Failure::usage(
+            "--unload is for --family: this force model knows no unloading; add --family unloading-3",
+        ));
     }
     let recipe = Recipe {
         options: options(args)?,
