@@ -69,7 +69,12 @@ fn poke(depth: f64) -> PathCase {
         group: "test",
         case: "poke".into(),
         start: 0.0,
-        steps: vec![(0.1, 0.5 * depth), (0.1, depth), (1.0, depth)],
+        steps: vec![
+            (0.1, 0.5 * depth),
+            (0.1, depth),
+            (1.0, depth),
+            (1.0, 0.6 * depth),
+        ],
     }
 }
 
@@ -110,7 +115,7 @@ fn a_broken_step_is_judged_wrong() {
     // A refusal of what has an answer, an answer to what has none, a refusal without a reason.
     assert_eq!(verdict(|_| Err("no".into()), &good), Verdict::Wrong);
     let bad = poke(f64::NAN);
-    assert_eq!(verdict(|_| Ok(vec![0.0; 3]), &bad), Verdict::Wrong);
+    assert_eq!(verdict(|_| Ok(vec![0.0; 4]), &bad), Verdict::Wrong);
     assert_eq!(verdict(|_| Err(String::new()), &bad), Verdict::Wrong);
     assert_eq!(verdict(|forces| forces, &bad), Verdict::Refused);
 }

@@ -345,12 +345,9 @@ impl Relaxing {
                     c[k] += x0 * c[k + 1];
                 }
             }
-            let (mut sum, mut power) = (c[0] * self.psi[0], 1.0);
-            for (c, psi) in c[1..=degree].iter().zip(&self.psi[1..]) {
-                power *= d;
-                sum += c * power * psi;
-            }
-            sum
+            // Nested, for a power of the move alone may be beyond all numbers where the force is not.
+            let weighted = c[..=degree].iter().zip(&self.psi).rev();
+            weighted.fold(0.0, |sum, (c, psi)| sum * d + c * psi)
         };
         if self.term.elastic.exponential.is_some() || self.term.rate.exponential.is_some() {
             sum += self.exponential(piece, speed);

@@ -24,9 +24,6 @@ const EXPONENT_MAX: f64 = 1e5;
 /// What the reference does not know.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 pub enum ReferenceError {
-    /// A term whose drive depends on the greatest depth.
-    #[error("the reference knows no terms that soften with the greatest depth")]
-    Softens,
     /// Too few or too many digits.
     #[error("a reference has 20 to 1000 digits, not {0}")]
     Digits(usize),
@@ -46,6 +43,8 @@ pub struct Reference {
     digits: Digits,
     terms: Vec<Term>,
     depth: Big,
+    /// Greatest depth so far, where a drive depends on it.
+    softened_to: Option<Big>,
 }
 
 /// A term with its coefficients and its value.
@@ -65,6 +64,8 @@ struct Term {
 #[derive(Clone, Debug)]
 struct Function {
     powers: Vec<Big>,
+    /// Coefficients of `x^j (1 - x / x_max)`, `j` from 1 on.
+    softening: Vec<Big>,
     exponential: Option<(Big, Big)>,
 }
 
@@ -87,6 +88,9 @@ impl Reference {
             return Err(ReferenceError::Term);
         }
         let digits = Digits::decimal(digits);
+        let softens = terms
+            .iter()
+            .any(|term| term.elastic.softens() || term.rate.softens());
         let terms: Result<Vec<Term>, ReferenceError> = terms
             .iter()
             .map(|term| Term::new(digits, term, depth))
@@ -95,6 +99,7 @@ impl Reference {
             digits,
             terms: terms?,
             depth: digits.exact(depth.0),
+            softened_to: softens.then(|| digits.exact(depth.0.max(0.0))),
         })
     }
 
@@ -120,7 +125,11 @@ impl Reference {
         let zero = self.digits.zero();
         if is_zero(&span) {
             let ends = [from.clone().max(zero.clone()), to.max(zero)];
-            let driven = |term: &Term| is_zero(&term.tau) && !is_zero(&term.impulse(&ends));
+            let before = self.softened_to.clone();
+            let after = before.clone().map(|deepest| deepest.max(ends[1].clone()));
+            let deepest = [before.as_ref(), after.as_ref()];
+            let driven =
+                |term: &Term| is_zero(&term.tau) && !is_zero(&term.impulse(&ends, deepest));
             if self.terms.iter().any(driven) {
                 let from_depth = nearest(&from);
                 self.depth = from;
@@ -129,19 +138,22 @@ impl Reference {
                     to: depth.0,
                 });
             }
-            self.terms.iter_mut().for_each(|term| term.jump(&ends));
+            self.terms
+                .iter_mut()
+                .for_each(|term| term.jump(&ends, deepest));
+            self.softened_to = after;
             return self.finite_force(nearest(&from), dt);
         }
         let from_depth = nearest(&from);
         // The path is cut where it crosses the surface; outside depth counts as zero.
         if is_negative(&from) == is_negative(&to) {
-            self.piece(&from.max(zero.clone()), &to.max(zero), &span);
+            self.in_contact(&from.max(zero.clone()), &to.max(zero), &span);
         } else {
             let before = &span * (&from / (&from - &to));
             let after = &span - &before;
             for (a, b, part) in [(&from, &zero, before), (&zero, &to, after)] {
                 if !is_zero(&part) {
-                    self.piece(
+                    self.in_contact(
                         &a.clone().max(zero.clone()),
                         &b.clone().max(zero.clone()),
                         &part,
@@ -179,9 +191,29 @@ impl Reference {
         self.terms.iter().fold(zero, |sum, term| sum + &term.value)
     }
 
-    fn piece(&mut self, x0: &Big, x1: &Big, dt: &Big) {
+    /// A straight move in contact, cut where it becomes deeper than ever before if that matters.
+    fn in_contact(&mut self, x0: &Big, x1: &Big, dt: &Big) {
+        match self.softened_to.clone() {
+            None => self.piece([x0, x1], dt, None),
+            Some(deepest) if *x0 < deepest && deepest < *x1 => {
+                let known = dt * (&deepest - x0) / (x1 - x0);
+                let new = dt * (x1 - &deepest) / (x1 - x0);
+                self.piece([x0, &deepest], &known, Some(&deepest));
+                self.piece([&deepest, x1], &new, None);
+                self.softened_to = Some(x1.clone());
+            }
+            // Deeper than ever: the depth is the greatest depth, nothing has softened.
+            Some(deepest) if x1 > x0 && *x0 >= deepest => {
+                self.piece([x0, x1], dt, None);
+                self.softened_to = Some(x1.clone());
+            }
+            Some(deepest) => self.piece([x0, x1], dt, Some(&deepest)),
+        }
+    }
+
+    fn piece(&mut self, [x0, x1]: [&Big; 2], dt: &Big, deepest: Option<&Big>) {
         for term in &mut self.terms {
-            term.advance(self.digits, x0, &(x1 - x0), dt);
+            term.advance(self.digits, [x0, &(x1 - x0)], dt, deepest);
         }
     }
 }
@@ -189,12 +221,10 @@ impl Reference {
 impl Term {
     fn new(digits: Digits, term: &Relaxation, depth: Depth) -> Result<Self, ReferenceError> {
         let Relaxation { tau, elastic, rate } = term;
-        if elastic.softens() || rate.softens() {
-            return Err(ReferenceError::Softens);
-        }
         let numbers = [elastic, rate].into_iter().flat_map(|drive| {
             let (amplitude, b) = drive.exponential.unwrap_or_default();
-            drive.powers.into_iter().chain([amplitude, b])
+            let powers = drive.powers.into_iter().chain(drive.softening);
+            powers.chain([amplitude, b])
         });
         if !(*tau >= 0.0 && tau.is_finite()) || numbers.into_iter().any(|one| !one.is_finite()) {
             return Err(ReferenceError::Term);
@@ -210,7 +240,7 @@ impl Term {
         Ok(Self {
             degree,
             tau: digits.exact(*tau),
-            value: elastic.at(&start),
+            value: elastic.at(&start, None),
             elastic,
             rate,
             weights: None,
@@ -222,19 +252,19 @@ impl Term {
     }
 
     /// What a move in no time adds to `tau` times the value.
-    fn impulse(&self, [x0, x1]: &[Big; 2]) -> Big {
-        self.rate.at(x1) - self.rate.at(x0)
+    fn impulse(&self, [x0, x1]: &[Big; 2], [m0, m1]: [Option<&Big>; 2]) -> Big {
+        self.rate.at(x1, m1) - self.rate.at(x0, m0)
     }
 
-    fn jump(&mut self, ends: &[Big; 2]) {
+    fn jump(&mut self, ends: &[Big; 2], deepest: [Option<&Big>; 2]) {
         if is_zero(&self.tau) {
-            self.value = self.elastic.at(&ends[1]);
+            self.value = self.elastic.at(&ends[1], deepest[1]);
         } else {
-            self.value = &self.value + self.impulse(ends) / &self.tau;
+            self.value = &self.value + self.impulse(ends, deepest) / &self.tau;
         }
     }
 
-    fn advance(&mut self, digits: Digits, x0: &Big, d: &Big, dt: &Big) {
+    fn advance(&mut self, digits: Digits, [x0, d]: [&Big; 2], dt: &Big, deepest: Option<&Big>) {
         let weights = match self.weights.take() {
             Some((last, weights)) if last == *dt => weights,
             _ => Weights::new(digits, dt, &self.tau, self.degree + 1),
@@ -244,12 +274,14 @@ impl Term {
         // The drive by power of depth, then about x0 by binomials, then by powers of d.
         let zero = digits.zero();
         let mut c = vec![zero; self.degree + 1];
+        let elastic = self.elastic.powers_after(deepest);
+        let rate = self.rate.powers_after(deepest);
         for (k, c) in c.iter_mut().enumerate() {
             if k > 0 {
-                *c += &self.elastic.powers[k - 1];
+                *c += &elastic[k - 1];
             }
             if k < POWER_MAX {
-                *c += digits.whole(k + 1) * &self.rate.powers[k] * &speed;
+                *c += digits.whole(k + 1) * &rate[k] * &speed;
             }
         }
         let mut d_power = digits.whole(1);
@@ -300,14 +332,28 @@ impl Function {
         let exponential = drive.exponential;
         Self {
             powers: powers.collect(),
+            softening: drive.softening.map(|value| digits.exact(value)).to_vec(),
             exponential: exponential
                 .map(|(amplitude, b)| (digits.exact(amplitude), digits.exact(b))),
         }
     }
 
     fn degree(&self) -> usize {
-        let last = self.powers.iter().rposition(|c| !is_zero(c));
-        last.map_or(0, |k| k + 1)
+        let last = |all: &[Big]| all.iter().rposition(|c| !is_zero(c));
+        let powers = last(&self.powers).map_or(0, |k| k + 1);
+        powers.max(last(&self.softening).map_or(0, |j| j + 2))
+    }
+
+    /// Coefficients by power of depth after a greatest depth, `None` on first loading.
+    fn powers_after(&self, deepest: Option<&Big>) -> Vec<Big> {
+        let mut powers = self.powers.clone();
+        if let Some(deepest) = deepest.filter(|deepest| !is_zero(deepest)) {
+            for (j, softening) in self.softening.iter().enumerate() {
+                powers[j] += softening;
+                powers[j + 1] -= softening / deepest;
+            }
+        }
+        powers
     }
 
     /// Whether its exponential is beyond any double by so much that even many digits end.
@@ -317,9 +363,9 @@ impl Function {
         exponential.is_some_and(|(_, b)| exponent(b) > EXPONENT_MAX)
     }
 
-    fn at(&self, x: &Big) -> Big {
-        let zero = Big::ZERO;
-        let sum = self.powers.iter().rev().fold(zero, |sum, c| (sum + c) * x);
+    fn at(&self, x: &Big, deepest: Option<&Big>) -> Big {
+        let powers = self.powers_after(deepest);
+        let sum = powers.iter().rev().fold(Big::ZERO, |sum, c| (sum + c) * x);
         match &self.exponential {
             Some((amplitude, b)) => sum + amplitude * (b * x).exp_m1(),
             None => sum,
