@@ -347,7 +347,8 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
     assert!(drawn.contains("depth (mm)") && drawn.contains("softer after greater depth"));
     assert!(!drawn.contains("NaN"));
     // Text says the same; two sources are two records of one body.
-    let output = palpate(at, &["fit", "loop", "loop", "--family", "maxwell"]);
+    succeeded(&palpate(at, &["export", "loop", "--format", "csv"]));
+    let output = palpate(at, &["fit", "loop", "loop.csv", "--family", "maxwell"]);
     succeeded(&output);
     let text = stdout(&output);
     assert!(
