@@ -211,16 +211,22 @@ impl WorkbenchApp {
                         self.refusal = Some(format!("the dialog cannot be opened: {err}"));
                     }
                 }
-                Command::CompareModels => self.models.start(ctx),
-                Command::CancelComparison => self.models.cancel(),
-                Command::MeasureTrade => {
-                    if self.measure_verdict().is_ok() {
-                        self.trade.start(ctx);
+                Command::Work => match self.screen {
+                    Screen::Run => {}
+                    Screen::Models => self.models.start(ctx),
+                    Screen::Trade => {
+                        if self.measure_verdict().is_ok() {
+                            self.trade.start(ctx);
+                        }
                     }
-                }
-                Command::CancelTrade => self.trade.cancel(),
-                Command::TestExtremes => self.extremes.start(ctx),
-                Command::CancelExtremes => self.extremes.cancel(),
+                    Screen::Extremes => self.extremes.start(ctx),
+                },
+                Command::CancelWork => match self.screen {
+                    Screen::Run => {}
+                    Screen::Models => self.models.cancel(),
+                    Screen::Trade => self.trade.cancel(),
+                    Screen::Extremes => self.extremes.cancel(),
+                },
                 Command::Show(screen) => self.screen = screen,
                 Command::SwitchTheme => ctx.set_theme(match ctx.theme() {
                     Theme::Dark => Theme::Light,

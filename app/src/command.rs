@@ -18,18 +18,10 @@ pub enum Command {
     ListPorts,
     /// Choose a folder or a file in a dialog of its own.
     Choose(Ask),
-    /// Compare the models of the form.
-    CompareModels,
-    /// End the comparison under way.
-    CancelComparison,
-    /// Measure error against time.
-    MeasureTrade,
-    /// End the measurement under way.
-    CancelTrade,
-    /// Test the extremes.
-    TestExtremes,
-    /// End the test under way.
-    CancelExtremes,
+    /// Begin the work of the screen shown: compare models, measure, test.
+    Work,
+    /// End the work of the screen shown.
+    CancelWork,
     /// Change between the light and the dark theme.
     SwitchTheme,
     /// Show a screen. What goes on goes on, and the stop control stays.

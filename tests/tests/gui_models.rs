@@ -38,7 +38,7 @@ fn screen(flow: &mut Flow, key: Key) {
 fn models_are_compared_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
     screen(&mut flow, Key::Num2);
-    assert!(!flow.is_enabled("Compare models"));
+    assert!(!flow.is_enabled("Compare models  F6"));
     assert!(flow.says("add a recording first"));
     for (name, speed) in [("slow.csv", 0.8), ("fast.csv", 4.0)] {
         let path = flow.folder.path().join(name);
@@ -48,10 +48,10 @@ fn models_are_compared_in_the_window() {
     }
     flow.type_into("tolerance", "much");
     assert!(flow.says("'much' is not a tolerance"));
-    assert!(!flow.is_enabled("Compare models"));
+    assert!(!flow.is_enabled("Compare models  F6"));
     flow.type_into("tolerance", "1%");
     flow.window.check_accessibility();
-    flow.click("Compare models");
+    flow.click("Compare models  F6");
     let has_answer = |window: &Window| window.state().comparison().is_some();
     flow.wait("the comparison", has_answer);
     flow.window.run_steps(3);
@@ -73,7 +73,7 @@ fn models_are_compared_in_the_window() {
     // A source that is gone is named, and the window stays usable.
     flow.type_into("path", "/nowhere/at-all");
     flow.click("Add");
-    flow.click("Compare models");
+    flow.click("Compare models  F6");
     flow.wait("the refusal", |window| {
         window.state().comparison().is_some_and(Result::is_err)
     });
@@ -103,7 +103,7 @@ fn the_trade_is_measured_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
     screen(&mut flow, Key::Num3);
     flow.click("few rows, rough times");
-    flow.click("Measure here");
+    flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
         window.state().trade_curves().is_some()
     });
@@ -123,7 +123,7 @@ fn the_trade_is_measured_in_the_window() {
 fn the_extremes_are_tested_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
     screen(&mut flow, Key::Num4);
-    flow.click("Test the extremes");
+    flow.click("Test the extremes  F6");
     flow.wait("progress", |window| {
         window.state().extremes_rows().is_none()
     });

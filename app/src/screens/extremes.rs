@@ -109,9 +109,9 @@ impl ExtremesScreen {
                 .labelled_by(label.id);
         });
         ui.add_space(8.0);
-        match task_ui(ui, "Test the extremes", &self.task, &Ok(())) {
-            Some(Pressed::Start) => commands.push(Command::TestExtremes),
-            Some(Pressed::Cancel) => commands.push(Command::CancelExtremes),
+        match task_ui(ui, "Test the extremes  F6", &self.task, &Ok(())) {
+            Some(Pressed::Start) => commands.push(Command::Work),
+            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
             None => {}
         }
         if let Some(Ok(found)) = self.task.answer() {

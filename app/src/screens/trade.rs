@@ -178,9 +178,9 @@ impl TradeScreen {
         section_ui(ui, "Measure");
         ui.checkbox(&mut self.is_quick, "few rows, rough times");
         ui.add_space(4.0);
-        match task_ui(ui, "Measure here", &self.task, verdict) {
-            Some(Pressed::Start) => commands.push(Command::MeasureTrade),
-            Some(Pressed::Cancel) => commands.push(Command::CancelTrade),
+        match task_ui(ui, "Measure here  F6", &self.task, verdict) {
+            Some(Pressed::Start) => commands.push(Command::Work),
+            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
             None => {}
         }
         let Some(Ok(known)) = self.task.answer() else {

@@ -5,10 +5,11 @@ use crate::command::{Command, Commands};
 use eframe::egui::{Context, InputState, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
-pub const KEYS: [(Key, Command); 4] = [
+pub const KEYS: [(Key, Command); 5] = [
     (Key::F12, Command::Stop),
     (Key::Escape, Command::Stop),
     (Key::F5, Command::Start),
+    (Key::F6, Command::Work),
     (Key::F8, Command::Retract),
 ];
 

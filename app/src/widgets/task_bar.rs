@@ -23,7 +23,7 @@ pub fn task_ui<T: Send + 'static>(
     verdict: &Result<(), String>,
 ) -> Option<Pressed> {
     let Some(standing) = task.standing() else {
-        let is_pressed = reason_button(ui, start, vec2(150.0, 34.0), verdict);
+        let is_pressed = reason_button(ui, start, vec2(170.0, 34.0), verdict);
         return is_pressed.then_some(Pressed::Start);
     };
     let tokens = Tokens::of(ui.visuals().dark_mode);

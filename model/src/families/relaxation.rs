@@ -268,6 +268,10 @@ fn psi_through(degree: usize, r: f64) -> [f64; POWER_MAX + 1] {
     all
 }
 
+/// Of a step shorter than this share of the relaxation time the mean is that of its ends: what relaxes in
+/// between is a smaller share still, and the difference of both ends has no digits to divide by.
+const SLOW: f64 = 1e-8;
+
 /// A straight piece of depth in contact.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Piece {
@@ -410,6 +414,9 @@ impl Relaxing {
     /// no more than both ends.
     pub fn mean(&self, before: f64, piece: &Piece) -> f64 {
         let Relaxation { tau, elastic, rate } = &self.term;
+        if piece.dt < SLOW * tau {
+            return 0.5 * (before + self.value());
+        }
         let x_max = (!piece.primary).then_some(piece.x_max);
         let (x0, x1) = (piece.x0, piece.x0 + piece.d);
         let driven = rate.at(x1, piece.x_max.max(x1)) - rate.at(x0, piece.x_max.max(x0));

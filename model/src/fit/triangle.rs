@@ -155,6 +155,16 @@ impl Factor {
             .sum()
     }
 
+    /// Sum of squares that any `solution` of all columns but the last leaves of the last.
+    pub fn left_by(&self, solution: &[f64]) -> f64 {
+        let left = |i: usize| {
+            let row = self.row(i);
+            let fitted: f64 = row.iter().zip(solution).map(|(a, b)| a * b).sum();
+            row[solution.len()] - fitted
+        };
+        (0..self.width()).map(|i| left(i).powi(2)).sum()
+    }
+
     /// Coefficients of the first `columns` columns that fit the last column best.
     pub fn solve(&self, columns: usize) -> Vec<f64> {
         let mut solution = vec![0.0; columns];

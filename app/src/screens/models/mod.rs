@@ -74,9 +74,9 @@ impl ModelsScreen {
         self.form.choices_ui(ui);
         ui.add_space(8.0);
         let verdict = self.form.request().map(|_| ());
-        match task_ui(ui, "Compare models", &self.task, &verdict) {
-            Some(Pressed::Start) => commands.push(Command::CompareModels),
-            Some(Pressed::Cancel) => commands.push(Command::CancelComparison),
+        match task_ui(ui, "Compare models  F6", &self.task, &verdict) {
+            Some(Pressed::Start) => commands.push(Command::Work),
+            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
             None => {}
         }
     }

@@ -2,6 +2,7 @@
 //! projected out.
 
 use super::super::triangle::{Factor, Triangle};
+use super::nonnegative::non_negative;
 use super::problem::{Problem, Rows};
 
 /// Longest single step in search coordinates, a factor of e.
@@ -30,12 +31,24 @@ pub(super) struct Place {
     pub is_converged: bool,
 }
 
-/// The place at `z`; `None` where the body has no finite force.
+/// The place at `z`, its coefficients within the family's bounds; `None` where the body has no finite
+/// force.
 pub(super) fn place(problem: &Problem<'_>, z: &[f64], rows: Rows) -> Option<Place> {
     let factor = problem.values(z, rows)?;
     let linear = problem.linear();
-    let solution = factor.solve(linear);
-    let sum = factor.residual_sum(linear);
+    let is_bound = |k: usize| k < problem.coefficients && problem.family.is_non_negative(k);
+    let mut solution = factor.solve(linear);
+    let mut sum = factor.residual_sum(linear);
+    // Few places need it, and those that do are no better than the bounds allow.
+    if solution
+        .iter()
+        .enumerate()
+        .any(|(k, &value)| value < 0.0 && is_bound(k))
+    {
+        let bounds: Vec<bool> = (0..linear).map(is_bound).collect();
+        solution = non_negative(&factor, &bounds);
+        sum = factor.left_by(&solution);
+    }
     let is_finite = sum.is_finite() && solution.iter().all(|value| value.is_finite());
     is_finite.then(|| Place {
         z: z.to_vec(),

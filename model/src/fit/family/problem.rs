@@ -41,8 +41,6 @@ pub(super) struct Problem<'a> {
     pub family: &'a dyn Family,
     pub records: Vec<Record<'a>>,
     pub options: FamilyOptions,
-    /// Greatest depth, in mm.
-    pub depth_mm: f64,
     sigma_scale: f64,
     /// Searched range of every outer parameter, in search coordinates.
     pub ranges: Vec<(f64, f64)>,
@@ -84,7 +82,6 @@ impl<'a> Problem<'a> {
             fades: options.initial && family.fading(&fading).is_some(),
             family,
             options,
-            depth_mm,
             sigma_scale,
             ranges: outer
                 .iter()

@@ -102,7 +102,7 @@ fn valley(problem: &Problem<'_>) -> Option<Place> {
 fn deepest(problem: &Problem<'_>, starts: impl Iterator<Item = Place>) -> Option<Place> {
     let is_refused = |place: &Place| {
         let mut coefficients = place.solution[..problem.coefficients].iter().enumerate();
-        coefficients.any(|(k, &value)| value < 0.0 && problem.family.is_non_negative(k))
+        coefficients.any(|(k, &value)| value <= 0.0 && problem.family.is_non_negative(k))
     };
     starts
         .map(|start| descend(problem, start, Rows::Thin, GAIN_VALLEY))
