@@ -2,7 +2,7 @@
 
 use super::style::quiet;
 use crate::theme::Tokens;
-use eframe::egui::Ui;
+use eframe::egui::{Ui, vec2};
 use egui_plot::{
     GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points,
 };
@@ -23,8 +23,8 @@ pub struct Scatter<'a> {
     pub axes: [&'a str; 2],
     /// All points.
     pub marks: &'a [Mark],
-    /// Those no other undercuts in both, from left to right: indices.
-    pub front: &'a [usize],
+    /// Whether those that no other undercuts in both are joined: only where all stand for the same.
+    pub has_front: bool,
     /// The one recommended.
     pub chosen: Option<usize>,
     /// A level not to exceed.
@@ -49,7 +49,10 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
             .collect()
     };
     let all = of(&mut (0..scatter.marks.len()));
-    let front = of(&mut scatter.front.iter().copied());
+    let front = match scatter.has_front {
+        true => of(&mut front(scatter.marks).into_iter()),
+        false => Vec::new(),
+    };
     let chosen = of(&mut scatter.chosen.into_iter());
     let names: Vec<(PlotPoint, String)> = scatter
         .marks
@@ -63,6 +66,8 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
         .y_grid_spacer(decades)
         .x_axis_formatter(|mark, _| decade_text(mark))
         .y_axis_formatter(|mark, _| decade_text(mark))
+        // The ring around the recommended point needs room at every edge.
+        .set_margin_fraction(vec2(0.04, 0.08))
         .label_formatter(move |hover| match hover {
             HoverPosition::NearDataPoint { position, .. } => names
                 .iter()
@@ -74,8 +79,9 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
         if let Some(level) = scatter.level.filter(|level| *level > 0.0) {
             plot_ui.hline(HLine::new("tolerance", level.log10()).color(tokens.limit));
         }
-        if front.len() > 1 {
-            let line = Line::new("best for its cost", PlotPoints::Owned(front));
+        // Piece by piece: one line would draw the sharp turns of a front as wedges.
+        for ends in front.windows(2) {
+            let line = Line::new("best for its cost", PlotPoints::Owned(ends.to_vec()));
             plot_ui.line(line.color(tokens.text_quiet).allow_hover(false));
         }
         plot_ui.points(
@@ -91,6 +97,22 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
                 .allow_hover(false),
         );
     });
+}
+
+/// Points that no other undercuts in both, by cost.
+fn front(marks: &[Mark]) -> Vec<usize> {
+    let mut order: Vec<usize> = (0..marks.len()).collect();
+    order.sort_by(|&a, &b| {
+        let ([ax, ay], [bx, by]) = (marks[a].at, marks[b].at);
+        ax.total_cmp(&bx).then(ay.total_cmp(&by))
+    });
+    let mut least = f64::INFINITY;
+    order.retain(|&index| {
+        let is_lower = marks[index].at[1] < least;
+        least = least.min(marks[index].at[1]);
+        is_lower
+    });
+    order
 }
 
 /// Marks at powers of ten, as many as there is room for.
@@ -159,5 +181,21 @@ mod tests {
     #[test]
     fn nothing_is_drawn_at_infinity() {
         assert!(place([0.0, -1.0]).x.is_finite() && place([0.0, -1.0]).y.is_finite());
+    }
+
+    #[test]
+    fn the_front_holds_what_nothing_undercuts() {
+        let mark = |x: f64, y: f64| Mark {
+            at: [x, y],
+            name: String::new(),
+        };
+        let marks = [
+            mark(4.0, 1.0),
+            mark(1.0, 9.0),
+            mark(2.0, 9.5),
+            mark(3.0, 2.0),
+            mark(4.0, 0.5),
+        ];
+        assert_eq!(front(&marks), [1, 3, 4]);
     }
 }

@@ -153,12 +153,12 @@ impl ExtremesScreen {
         let title = format!("Cases, {} of {}", rows.len(), found.rows.len());
         ui.label(RichText::new(title).heading().strong());
         let columns = [
-            Column::words("group", 150.0),
-            Column::words("subject", 128.0),
-            Column::words("case", 230.0),
-            Column::words("verdict", 60.0),
-            Column::numbers("error", 62.0),
-            Column::numbers("tolerance", 66.0),
+            Column::words("subject", 130.0),
+            Column::words("case", 240.0),
+            Column::words("verdict", 52.0),
+            Column::numbers("error", 56.0),
+            Column::numbers("tolerance", 60.0),
+            Column::words("group", 220.0),
         ];
         table_ui(ui, "extremes_table", &columns, &rows);
     }
@@ -221,13 +221,13 @@ fn choice_ui<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choice
 fn table_row(row: &Row) -> TableRow {
     TableRow {
         cells: vec![
-            row.group.to_owned(),
             row.subject.clone(),
             row.case.clone(),
             row.verdict.word().to_owned(),
             row.relative_error
                 .map_or_else(|| "-".to_owned(), |error| format!("{error:.1e}")),
             format!("{:.0e}", row.tolerance),
+            row.group.to_owned(),
         ],
         look: match row.verdict {
             Verdict::Wrong => RowLook::Alarm,

@@ -4,7 +4,7 @@
 use crate::command::{Command, Commands};
 use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
 use crate::theme::Tokens;
-use crate::trade::text::{advice, percent, plain, terms, time};
+use crate::trade::text::{advice, digits, percent, plain, terms, time};
 use crate::trade::{self, Extent};
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
@@ -249,7 +249,7 @@ impl TradeScreen {
             let scatter = Scatter {
                 axes: shown.axes,
                 marks: &shown.marks,
-                front: &shown.front,
+                has_front: self.view != View::Families,
                 chosen: None,
                 level,
             };
@@ -306,7 +306,6 @@ fn doubts(curves: &TradeCurves) -> Vec<String> {
 struct Shown {
     axes: [&'static str; 2],
     marks: Vec<Mark>,
-    front: Vec<usize>,
     columns: Vec<Column>,
     rows: Vec<Row>,
 }
@@ -320,7 +319,6 @@ impl Shown {
         Self {
             axes,
             marks: Vec::new(),
-            front: Vec::new(),
             columns: heads.iter().enumerate().map(column).collect(),
             rows: Vec::new(),
         }
@@ -335,9 +333,6 @@ impl Shown {
         hint: Option<String>,
     ) {
         if let [Some(cost), Some(error)] = at {
-            if is_front {
-                self.front.push(self.marks.len());
-            }
             self.marks.push(Mark {
                 at: [cost, error],
                 name: cells.join("\n"),
@@ -351,10 +346,9 @@ impl Shown {
         self.rows.push(Row { cells, look, hint });
     }
 
-    /// The front from the cheapest on.
+    /// With the front's rows first.
     fn finished(mut self) -> Self {
-        let Self { front, marks, .. } = &mut self;
-        front.sort_by(|&a, &b| marks[a].at[0].total_cmp(&marks[b].at[0]));
+        self.rows.sort_by_key(|row| row.look != RowLook::Marked);
         self
     }
 }
@@ -370,7 +364,7 @@ fn integrators(curves: &TradeCurves) -> Shown {
             format!("{}, {}", row.scheme.name(), row.precision.name()),
             plain(1e3 * row.step_s),
             time(row.cost.ns),
-            error.map_or("unstable".into(), |error| format!("{error:.2e}")),
+            error.map_or("unstable".into(), digits),
         ];
         shown.add(
             [Some(row.second_ns), error],
@@ -392,7 +386,7 @@ fn families(curves: &TradeCurves) -> Shown {
         let cells = vec![
             format!("{}, {}", row.family, row.target),
             time(row.cost.ns),
-            format!("{error:.2e}"),
+            digits(error),
         ];
         // Fronts belong to one target each and would cross in one picture.
         shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
@@ -413,7 +407,7 @@ fn fits(curves: &TradeCurves) -> Shown {
         let cells = vec![
             format!("{} Hz, {} samples", plain(row.rate_hz), row.samples),
             time(row.cost.ns),
-            format!("{error:.2e}"),
+            digits(error),
         ];
         shown.add([Some(row.cost.ns), Some(error)], row.front, cells, None);
     }
@@ -422,7 +416,7 @@ fn fits(curves: &TradeCurves) -> Shown {
         let cells = vec![
             format!("live, {} relaxation times, a sample", row.nodes),
             time(row.cost.ns),
-            error.map_or("no answer".into(), |error| format!("{error:.2e}")),
+            error.map_or("no answer".into(), digits),
         ];
         // A sample of the live fit is no fit: it has a row and no point.
         shown.add([None, error], row.front, cells, None);

@@ -30,12 +30,12 @@ impl Keys {
         }
         ctx.input(|input| {
             for (key, command) in KEYS {
-                if is_pressed(input, key) {
+                if is_pressed(input, key, false) {
                     commands.push(command);
                 }
             }
             for screen in Screen::ALL {
-                if input.modifiers.command && is_pressed(input, screen.key()) {
+                if is_pressed(input, screen.key(), true) {
                     commands.push(Command::Show(screen));
                 }
             }
@@ -43,10 +43,12 @@ impl Keys {
     }
 }
 
-/// Whether a key went down, not counting the repeats of a key held.
-fn is_pressed(input: &InputState, wanted: Key) -> bool {
+/// Whether a key went down, not counting the repeats of a key held; with Ctrl where that is asked for. The
+/// modifiers are the event's own: those of the frame may have been let go already.
+fn is_pressed(input: &InputState, wanted: Key, with_command: bool) -> bool {
     use eframe::egui::Event;
     input.events.iter().any(|event| {
-        matches!(event, Event::Key { key, pressed: true, repeat: false, .. } if *key == wanted)
+        matches!(event, Event::Key { key, pressed: true, repeat: false, modifiers, .. }
+            if *key == wanted && (modifiers.command || !with_command))
     })
 }

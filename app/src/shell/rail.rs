@@ -4,7 +4,7 @@ use crate::command::{Command, Commands};
 use eframe::egui::{Button, Key, Ui, vec2};
 
 /// Width of the rail in points.
-pub const WIDTH: f32 = 88.0;
+pub const WIDTH: f32 = 100.0;
 
 /// What stands between the top bar and the event log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -40,7 +40,7 @@ pub(crate) fn plain(value: f64) -> String {
 }
 
 /// Two digits, in powers of ten where they are small or large.
-fn digits(value: f64) -> String {
+pub(crate) fn digits(value: f64) -> String {
     if value == 0.0 {
         "0".into()
     } else if (1e-3..1e4).contains(&value.abs()) {

@@ -131,9 +131,9 @@ fn row_ui(
         } else {
             Layout::left_to_right(Align::Center)
         };
-        ui.scope_builder(UiBuilder::new().max_rect(cell).layout(layout), |ui| {
-            cell_ui(ui, index, column);
-        });
+        // A child of its own: the row has its space already, whatever the cell takes of it.
+        let mut cell = ui.new_child(UiBuilder::new().max_rect(cell).layout(layout));
+        cell_ui(&mut cell, index, column);
         left += column.width + GAP;
     }
     rect

@@ -5,6 +5,7 @@ use crate::report::selection;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::uncertain::plain;
 use crate::workers::select::Selected;
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_model::select::{Candidate, Selection};
@@ -12,15 +13,20 @@ use palpate_model::select::{Candidate, Selection};
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.46;
 
-/// Widths of the columns of [`selection::table`] by their heads, in points.
-const WIDTHS: [(&str, f32); 4] = [
-    ("family", 100.0),
-    ("predicted mN", 110.0),
-    ("free", 40.0),
-    ("within", 50.0),
+/// Columns of [`selection::table`] by their heads, what decides first, with widths in points.
+const COLUMNS: [(&str, f32); 11] = [
+    ("family", 92.0),
+    ("predicted mN", 100.0),
+    ("ops", 44.0),
+    ("within", 46.0),
+    ("rms mN", 60.0),
+    ("dBIC", 78.0),
+    ("free", 36.0),
+    ("worst mN", 68.0),
+    ("states", 46.0),
+    ("scaled mN", 72.0),
+    ("dAICc", 78.0),
 ];
-/// Width of the others.
-const WIDTH: f32 = 72.0;
 
 /// The error that decides: of prediction where something was held out.
 fn error(selection: &Selection, one: &Candidate) -> Option<f64> {
@@ -60,7 +66,7 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
     let scatter = Scatter {
         axes: ["operations an evaluation", "error, rms (mN)"],
         marks: &marks,
-        front: &front(&marks),
+        has_front: true,
         chosen: drawn
             .iter()
             .position(|(one, _)| Some(&one.family) == chosen),
@@ -74,13 +80,23 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
     ui.label(RichText::new("Families").heading().strong());
     let mut table = selection::table(selection).into_iter();
     let heads = table.next().unwrap_or_default();
-    let columns: Vec<Column> = heads.into_iter().map(column).collect();
+    let places: Vec<(usize, f32)> = COLUMNS
+        .iter()
+        .filter_map(|(head, width)| Some((heads.iter().position(|known| known == head)?, *width)))
+        .collect();
+    let columns: Vec<Column> = places
+        .iter()
+        .map(|&(place, width)| column(&heads[place], width))
+        .collect();
     let mut rows: Vec<Row> = selection
         .candidates
         .iter()
         .zip(table)
         .map(|(one, cells)| Row {
-            cells,
+            cells: places
+                .iter()
+                .map(|&(place, _)| cells[place].clone())
+                .collect(),
             look: look(selection, one),
             hint: Some(hint(one)),
         })
@@ -93,28 +109,10 @@ pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
     table_ui(ui, "families_table", &columns, &rows);
 }
 
-/// Points that no other undercuts in both, by cost.
-fn front(marks: &[Mark]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..marks.len()).collect();
-    order.sort_by(|&a, &b| {
-        let ([ax, ay], [bx, by]) = (marks[a].at, marks[b].at);
-        ax.total_cmp(&bx).then(ay.total_cmp(&by))
-    });
-    let mut least = f64::INFINITY;
-    order.retain(|&index| {
-        let is_lower = marks[index].at[1] < least;
-        least = least.min(marks[index].at[1]);
-        is_lower
-    });
-    order
-}
-
-fn column(head: String) -> Column {
-    let width = WIDTHS.iter().find(|(known, _)| *known == head);
-    Column {
-        is_number: head != "family" && head != "within",
-        width: width.map_or(WIDTH, |(_, width)| *width),
-        head,
+fn column(head: &str, width: f32) -> Column {
+    match head {
+        "family" | "within" => Column::words(head, width),
+        _ => Column::numbers(head, width),
     }
 }
 
@@ -156,7 +154,7 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
     {
         section_ui(ui, "Parameters");
         for parameter in parameters {
-            let value = format!("{:.5} {}", parameter.value, parameter.unit);
+            let value = format!("{} {}", plain(parameter.value), parameter.unit);
             fact_ui(ui, &parameter.name, value.trim().to_owned());
         }
     }
@@ -183,26 +181,5 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
     }
     for note in &selected.notes {
         ui.add(Label::new(RichText::new(note).color(tokens.text_quiet).small()).wrap());
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_front_holds_what_nothing_undercuts() {
-        let mark = |x: f64, y: f64| Mark {
-            at: [x, y],
-            name: String::new(),
-        };
-        let marks = [
-            mark(4.0, 1.0),
-            mark(1.0, 9.0),
-            mark(2.0, 9.5),
-            mark(3.0, 2.0),
-            mark(4.0, 0.5),
-        ];
-        assert_eq!(front(&marks), [1, 3, 4]);
     }
 }
