@@ -228,8 +228,10 @@ fn the_family_that_made_the_records_is_picked() {
             by_aicc[0],
             by_aicc[1] - by_aicc[0],
         );
-        if (by_bic[1] as f64) < PICKED_SHARE * seeds as f64 {
-            failed.push(format!("{key}: {} of {seeds}; {misses:?}", by_bic[1]));
+        // The lowest criterion, and what the command would say.
+        let picked = by_bic[1].min(by_verdict);
+        if (picked as f64) < PICKED_SHARE * seeds as f64 {
+            failed.push(format!("{key}: {picked} of {seeds}; {misses:?}"));
         }
     }
     assert!(failed.is_empty(), "{failed:#?}");

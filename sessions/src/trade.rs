@@ -78,6 +78,12 @@ pub fn trade_file(library: &Path, machine: &Machine) -> PathBuf {
     folder(library).join(format!("{}.json", machine.file_stem()))
 }
 
+/// The file of its quick curves, which never take the place of full ones.
+#[must_use]
+pub fn quick_trade_file(library: &Path, machine: &Machine) -> PathBuf {
+    folder(library).join(format!("{}-quick.json", machine.file_stem()))
+}
+
 /// All files of curves in a library, by name; none where there is no such folder.
 #[must_use]
 pub fn trade_files(library: &Path) -> Vec<PathBuf> {
@@ -94,9 +100,12 @@ pub fn trade_files(library: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Stores curves in place of those the machine had. The file is whole whenever it is there.
+/// Stores curves in place of those of their kind, full or quick, that the machine had. The file is whole whenever it is there.
 pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, TradeFileError> {
-    let path = trade_file(library, &curves.machine);
+    let path = match curves.quick {
+        true => quick_trade_file(library, &curves.machine),
+        false => trade_file(library, &curves.machine),
+    };
     let failed = |source| TradeFileError::Io {
         what: "stored",
         path: path.clone(),

@@ -1,14 +1,15 @@
 //! `palpate extremes`: numerical stability where numbers end.
 
 use super::Failure;
+use super::new_file;
 use super::output::Output;
-use crate::report::extremes::{page, text};
+use crate::report::extremes::{PAGE_HEAD, page, text};
 use crate::workers::extremes::survey;
 use clap::Args;
 use palpate_model::extremes::{Extent, Row, Verdict};
 use serde::Serialize;
 use std::ops::ControlFlow;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate extremes`.
 #[derive(Debug, Args)]
@@ -47,6 +48,9 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         (false, true) => (Extent::Soak, "soak"),
         (false, false) => (Extent::Whole, "whole"),
     };
+    if !args.page.as_deref().is_some_and(is_own_page) {
+        new_file::check("page", args.page.as_deref())?;
+    }
     let bar = output.share_bar(0);
     let rows = survey(extent, args.family.as_deref(), &|done, of, what| {
         bar.set_length(of as u64);
@@ -71,14 +75,7 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         },
         || text(&rows),
     );
-    if let Some(file) = &args.page {
-        std::fs::write(file, page(&rows)).map_err(|err| {
-            Failure::failed(format!(
-                "the page could not be written to {}: {err}; choose another place",
-                file.display()
-            ))
-        })?;
-    }
+    new_file::write("page", args.page.as_deref(), || page(&rows))?;
     if wrong > 0 {
         return Err(Failure::failed(format!(
             "{wrong} of {} rows are wrong; they are marked WRONG above, please report them",
@@ -86,4 +83,9 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
         )));
     }
     Ok(())
+}
+
+/// Whether a file is a page that this command wrote: that one may be written anew.
+fn is_own_page(file: &Path) -> bool {
+    std::fs::read_to_string(file).is_ok_and(|text| text.starts_with(PAGE_HEAD))
 }

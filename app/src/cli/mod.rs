@@ -5,6 +5,7 @@ mod extremes;
 mod fit;
 mod info;
 mod last_fit;
+mod new_file;
 mod output;
 mod plan;
 mod replay;

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::fit::sources;
+use super::new_file;
 use super::output::Output;
 use crate::report::{of_selection, selection};
 use clap::Args;
@@ -59,12 +60,7 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
     let options = options(args)?;
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
-    if let Some(to) = args.plot.as_deref().filter(|to| to.exists()) {
-        return Err(Failure::usage(format!(
-            "{} exists already; give the plot another name",
-            to.display()
-        )));
-    }
+    new_file::check("plot", args.plot.as_deref())?;
     let found = sources::find(&args.sources)?;
     let stretch = match args.unload {
         true => Stretch::WithUnload,
@@ -91,21 +87,13 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
         }
         SelectError::Fit(_) | SelectError::Ended => Failure::failed(err),
     })?;
-    if let Some(to) = &args.plot {
-        std::fs::write(to, of_selection(&selection)).map_err(|err| {
-            Failure::failed(format!(
-                "cannot write the plot {} ({err}); choose a folder that may be written",
-                to.display()
-            ))
-        })?;
-    }
     let object = SelectOutput {
         command: "select",
         selection: &selection,
         seconds,
     };
     output.result(&object, || selection::whole(&selection));
-    Ok(())
+    new_file::write("plot", args.plot.as_deref(), || of_selection(&selection))
 }
 
 fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {

@@ -1,13 +1,16 @@
 //! `palpate trade`: error against time on this machine, and what to use.
 
 use super::Failure;
+use super::new_file;
 use super::output::Output;
 use crate::trade::{self, Extent};
 use clap::Args;
 use palpate_model::tolerance::Tolerance;
 use palpate_model::trade::{Recommendation, TradeCurves};
 use palpate_sessions::library_folder;
-use palpate_sessions::trade::{TradeFileError, read_trade, trade_file, trade_files, write_trade};
+use palpate_sessions::trade::{
+    TradeFileError, quick_trade_file, read_trade, trade_file, trade_files, write_trade,
+};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -67,6 +70,7 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
     // A gigahertz is a period of three cycles: nobody waits for that.
     in_range("rate", args.rate, 1e9)?;
     in_range("share", args.share, 100.0)?;
+    new_file::check("plot", args.plot.as_deref())?;
     let library = match &args.store {
         Some(folder) => folder.clone(),
         None => library_folder().map_err(Failure::usage)?,
@@ -87,12 +91,6 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
     if args.check {
         check(&curves, output)?;
     }
-    if let Some(picture) = &args.plot {
-        std::fs::write(picture, trade::svg(&curves)).map_err(|err| {
-            let name = picture.display();
-            Failure::failed(format!("the picture cannot be written: {err}, {name}"))
-        })?;
-    }
     let recommendation = curves.recommend(tolerance, args.rate, args.share / 100.0);
     let report = TradeReport {
         command: "trade",
@@ -103,7 +101,7 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
         curves: &curves,
     };
     output.result(&report, || trade::text(&curves, &report.recommendation));
-    Ok(())
+    new_file::write("plot", args.plot.as_deref(), || trade::svg(&curves))
 }
 
 fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
@@ -134,17 +132,17 @@ fn with_bar(
 
 /// The curves of this machine, or else any there are.
 fn stored(library: &Path) -> Result<(TradeCurves, PathBuf), Failure> {
-    let own = trade_file(library, &trade::this_machine());
-    let file = if own.exists() {
-        own
-    } else {
-        trade_files(library).into_iter().next().ok_or_else(|| {
+    let here = trade::this_machine();
+    let own = [trade_file(library, &here), quick_trade_file(library, &here)];
+    let own = own.into_iter().find(|file| file.exists());
+    let file = own
+        .or_else(|| trade_files(library).into_iter().next())
+        .ok_or_else(|| {
             Failure::usage(format!(
                 "no curves are stored in {}; measure with 'palpate trade'",
                 library.display()
             ))
-        })?
-    };
+        })?;
     let curves = read_trade(&file).map_err(failure)?;
     Ok((curves, file))
 }

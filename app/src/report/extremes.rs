@@ -88,7 +88,7 @@ pub fn text(rows: &[Row]) -> String {
 /// The Markdown page.
 #[must_use]
 pub fn page(rows: &[Row]) -> String {
-    let mut page = INTRODUCTION.to_owned();
+    let mut page = format!("{PAGE_HEAD}{INTRODUCTION}");
     page += "| group | right | refused | flagged | wrong | closest to its tolerance |\n|---|---|---|---|---|---|\n";
     for one in summary(rows) {
         let [right, refused, flagged, wrong] = one.counts;
@@ -106,26 +106,32 @@ pub fn page(rows: &[Row]) -> String {
     page
 }
 
-const INTRODUCTION: &str = "\
+/// How every page begins.
+pub const PAGE_HEAD: &str = "\
 # Extremes
 
 Written by `palpate extremes --page docs/guide/extremes.md`; do not edit.
+";
 
+const INTRODUCTION: &str = "
 What happens where numbers end: relaxation times of a nanosecond and of thirty years, depths of a metre,
 a hundred million samples, records of one sample, NaN. Every family of force models, every integrator and
 every fit is put to the same cases, and each row is
 
 * **right**: the error is within the tolerance. For a force it is relative to the largest force of
   the path, against a reference in 75 digits or more; for the exact step and the families the
-  tolerance is 1e-13, in single precision 3e-6, and for an approximate integrator what its order
-  promises of a path of so many samples. For a fit of a record without noise it is that of the worst
+  tolerance is 1e-13 and in single precision 3e-6. Of an approximate integrator no more is asked than
+  that its force stays a number of the order of the true one (its rows have tolerances up to 2, twice
+  the largest force): how exact it is, the trade says. For a fit of a record without noise it is that of the worst
   parameter, tolerance 1e-6 (1e-3 with an offset of a million times the signal, or times since 1970).
 * **refused**: no number, and one sentence that names the reason and what to do.
 * **flagged**: numbers of a fit with a warning not to rely on them.
 * **wrong**: anything else, NaN, infinity, or a refusal of what has an answer. The command then ends
   with exit code 1.
 
-Forces below 1e-180 N count as none, and forces beyond 1e300 N are refused.
+Forces below 1e-180 N count as none, and forces beyond 1e300 N are refused. The two longest records, 1e8
+samples and 24 h at 1 kHz, are put to the exact step; families take 1e7 samples, those of more than twelve
+terms 1e6, and all of them all with `palpate extremes --soak`.
 
 ";
 

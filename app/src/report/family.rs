@@ -7,7 +7,7 @@ use super::text::typeset;
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
 use crate::widgets::uncertain::{plain, with_error};
-use palpate_model::families::Family;
+use palpate_model::families::{Family, Live};
 use palpate_model::fit::{FamilyFit, FamilyParameter, FitSample};
 use palpate_model::units::Newtons;
 
@@ -83,7 +83,11 @@ pub fn whole(family: &dyn Family, fit: &FamilyFit, records: &[FittedRecord<'_>])
 
 fn sentences(family: &dyn Family, fit: &FamilyFit) -> impl Iterator<Item = String> {
     let limits = format!("it cannot represent {}", family.cannot_represent());
-    fit.warnings.iter().cloned().chain([limits])
+    let live = match family.live() {
+        Live::Yes => "it can be fitted while a run goes on".to_owned(),
+        Live::No(reason) => format!("it cannot be fitted while a run goes on: {reason}"),
+    };
+    fit.warnings.iter().cloned().chain([limits, live])
 }
 
 /// The picture of a fit to one record: force over time, force over depth, parameters and sentences.

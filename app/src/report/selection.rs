@@ -14,6 +14,17 @@ pub fn whole(selection: &Selection) -> String {
     if !refused.is_empty() {
         parts.push(refused.join("\n"));
     }
+    let unpredicted: Vec<String> = selection
+        .candidates
+        .iter()
+        .filter_map(|one| {
+            let reason = one.prediction_refused.as_ref()?;
+            Some(format!("{} predicts nothing: {reason}", one.family))
+        })
+        .collect();
+    if !unpredicted.is_empty() {
+        parts.push(unpredicted.join("\n"));
+    }
     let ladder = ladder(selection);
     if ladder.len() > 1 {
         parts.push(format!(
@@ -150,6 +161,7 @@ pub fn tested(selection: &Selection) -> String {
 /// Three digits or, above a hundred, none behind the point.
 pub(super) fn digits(value: f64) -> String {
     match value.abs() {
+        size if size >= 1e6 => format!("{value:.2e}"),
         size if size >= 99.95 => format!("{value:.0}"),
         size if size >= 9.995 => format!("{value:.1}"),
         size if size >= 0.9995 => format!("{value:.2}"),

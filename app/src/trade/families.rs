@@ -12,6 +12,9 @@ use std::hint::black_box;
 /// Steps of a timed run.
 const RUN: usize = 256;
 
+/// Speed of the thesis protocol in mm/s.
+const THESIS_SPEED: f64 = 0.75;
+
 /// What rows of one target stand for, and how.
 struct Target {
     /// In words.
@@ -20,6 +23,8 @@ struct Target {
     body: (&'static str, &'static [f64], &'static [f64]),
     /// Whether each family is fitted to it or is the same body with fewer terms.
     is_fitted: bool,
+    /// Whether the probe comes back after the hold.
+    comes_back: bool,
     /// Families; the first of them alone with `--quick`.
     families: &'static [&'static str],
     quick: usize,
@@ -27,11 +32,12 @@ struct Target {
 
 /// Pig stomach, equation 3.5 of the thesis; a fractional body of like stiffness that relaxes over
 /// decades; a Fung spectrum of two and a half decades.
-const TARGETS: [Target; 4] = [
+const TARGETS: [Target; 5] = [
     Target {
         name: "thesis body",
         body: ("series-3", &[1.023], &[0.05333, -0.0086, 0.000_434_5, 0.06]),
         is_fitted: true,
+        comes_back: false,
         families: &[
             "series-1",
             "series-2",
@@ -46,9 +52,22 @@ const TARGETS: [Target; 4] = [
         quick: 3,
     },
     Target {
+        name: "softening body that is left again",
+        body: (
+            "unloading-3",
+            &[1.023],
+            &[0.05333, -0.0086, 0.000_434_5, 0.06, -0.02, 0.003, -2e-4],
+        ),
+        is_fitted: true,
+        comes_back: true,
+        families: &["series-3", "unloading-3"],
+        quick: 2,
+    },
+    Target {
         name: "fractional body",
         body: ("fractional-12", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: true,
+        comes_back: false,
         families: &[
             "prony-1", "prony-2", "prony-3", "prony-4", "prony-5", "prony-6",
         ],
@@ -58,6 +77,7 @@ const TARGETS: [Target; 4] = [
         name: "fractional body, digits",
         body: ("fractional-14", &[2.0, 0.5], &[0.1, 0.3]),
         is_fitted: false,
+        comes_back: false,
         families: &[
             "fractional-1",
             "fractional-2",
@@ -73,10 +93,30 @@ const TARGETS: [Target; 4] = [
         name: "Fung spectrum, nodes",
         body: ("fung-64", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
         is_fitted: false,
+        comes_back: false,
         families: &["fung-2", "fung-4", "fung-8", "fung-16", "fung", "fung-32"],
         quick: 2,
     },
 ];
+
+/// Adds the way back to a path, as fast as the thesis went in.
+fn come_back(path: &mut Vec<(Seconds, Depth)>) {
+    let Some(&(start, deepest)) = path.last() else {
+        return;
+    };
+    let interval = 0.1;
+    let moved = |i: u32| THESIS_SPEED * interval * f64::from(i);
+    path.extend(
+        (1..)
+            .map(|i| {
+                (
+                    Seconds(start.0 + interval * f64::from(i)),
+                    Depth(deepest.0 - moved(i)),
+                )
+            })
+            .take_while(|(_, depth)| depth.0 >= 0.0),
+    );
+}
 
 fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
     let family = by_key(key).map_err(|err| err.to_string())?;
@@ -86,7 +126,10 @@ fn model(key: &str, outer: &[f64], linear: &[f64]) -> Result<Model, String> {
 pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<FamilyRow>, String> {
     let mut rows = Vec::new();
     for target in &TARGETS {
-        let path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();
+        let mut path: Vec<(Seconds, Depth)> = paths.ramp_hold.checkpoints().collect();
+        if target.comes_back {
+            come_back(&mut path);
+        }
         let (key, outer, linear) = target.body;
         let exact = along(&model(key, outer, linear)?, &path)?;
         let count = match extent {

@@ -203,7 +203,13 @@ pub(crate) fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
         families.map(|(target, advice)| (format!("family for the {target}"), words(advice)));
     std::iter::once(("integrator".to_owned(), words(&recommendation.integrator)))
         .chain(families)
-        .chain([("recording to fit".to_owned(), words(&recommendation.fit))])
+        .chain([
+            ("recording to fit".to_owned(), words(&recommendation.fit)),
+            (
+                "bank of the live fit".to_owned(),
+                words(&recommendation.live),
+            ),
+        ])
         .collect()
 }
 

@@ -49,7 +49,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
             rows("fit").len(),
             rows("live").len()
         ),
-        (9, 2, 5)
+        (11, 2, 5)
     );
     let is_unstable = |row: &&Value| row["error"].is_null();
     for row in rows("integrators").iter().filter(is_unstable) {

@@ -20,7 +20,7 @@ pub struct RecordFacts {
     pub depth_mm: f64,
     /// Mean speed from a tenth to nine tenths of the way to it, in mm/s.
     pub speed_mm_per_s: f64,
-    /// Largest size of the force in N.
+    /// Largest size of the force in N, above the sensor offset that the best family finds.
     pub peak_n: f64,
     /// First sample at the greatest depth.
     #[serde(skip)]
@@ -48,17 +48,23 @@ impl RecordFacts {
         let forces = samples.iter().filter(|one| one.is_measured());
         Self {
             record: name.to_owned(),
-            samples: forces.clone().count(),
+            samples: forces.count(),
             depth_mm: deepest,
             speed_mm_per_s: if took > 0.0 {
                 (samples[high].depth.0 - samples[low].depth.0) / took
             } else {
                 0.0
             },
-            peak_n: forces.fold(0.0, |all, one| all.max(one.force.0.abs())),
+            peak_n: peak(samples, 0.0),
             arrival: first(deepest - AT_PEAK * stroke),
         }
     }
+}
+
+/// Largest size of the measured force above `offset`, in N.
+pub(super) fn peak(samples: &[FitSample], offset: f64) -> f64 {
+    let forces = samples.iter().filter(|one| one.is_measured());
+    forces.fold(0.0, |all, one| all.max((one.force.0 - offset).abs()))
 }
 
 /// Whether two depths or two speeds are not meant to be the same.

@@ -5,7 +5,12 @@ use super::run::Candidate;
 use serde::Serialize;
 
 /// Families and the ones that add something to them.
-const RUNGS: [(&str, &str, &str); 14] = [
+const RUNGS: [(&str, &str, &str); 16] = [
+    (
+        "voigt",
+        "kelvin",
+        "relaxation of the spring beside the dashpot",
+    ),
     ("maxwell", "kelvin", "a spring that holds"),
     ("kelvin", "prony-2", "a second relaxation time"),
     ("prony-2", "prony-3", "a third relaxation time"),
@@ -21,6 +26,7 @@ const RUNGS: [(&str, &str, &str); 14] = [
     ("series-2", "series-3", "a cube of depth"),
     ("series-3", "series-4", "a fourth power of depth"),
     ("series-4", "series-5", "a fifth power of depth"),
+    ("series-3", "unloading-3", "softness after greater depth"),
     ("kelvin", "exponential", "stiffness that grows with force"),
     (
         "exponential",

@@ -2,7 +2,7 @@
 
 use super::cost::Cost;
 use super::criteria::criteria;
-use super::facts::RecordFacts;
+use super::facts::{RecordFacts, peak};
 use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
 use super::ladder::{Step, steps};
 use super::verdict::{Counts, Verdict, verdict};
@@ -201,7 +201,7 @@ pub fn select(
         return Err(SelectError::NoFamilies);
     }
     check(records)?;
-    let facts: Vec<RecordFacts> = records
+    let mut facts: Vec<RecordFacts> = records
         .iter()
         .map(|(name, samples)| RecordFacts::of(name, samples))
         .collect();
@@ -256,6 +256,12 @@ pub fn select(
     let samples = fitted.first().map_or(0, |(_, fit, _)| fit.samples);
     let best = fitted.iter().min_by(|a, b| a.1.sum.total_cmp(&b.1.sum));
     let effective = best.map_or(0.0, |(_, fit, _)| fit.effective_samples);
+    // The force of the tissue: a sensor offset is no part of it.
+    if let Some(best) = best {
+        for ((facts, own), (_, samples)) in facts.iter_mut().zip(&best.1.records).zip(records) {
+            facts.peak_n = peak(samples, own.offset);
+        }
+    }
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
         .map(|(family, fit, predicted)| candidate(&**family, fit, predicted, effective))

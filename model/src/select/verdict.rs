@@ -85,16 +85,23 @@ fn by_criterion(candidates: &[Candidate], counts: Counts) -> Verdict {
     let among: Vec<String> = near.iter().map(|one| one.family.clone()).collect();
     let chosen = simplest(&near);
     let (outcome, sentence) = match chosen {
-        Some(one) if counts.is_curve() => (
-            Outcome::NoneAdequate,
-            format!(
-                "no winner: no family describes these records to their noise; what even {} leaves, {} rms, wanders like a curve (its {} residuals are worth {:.0} independent ones), so the lowest criterion proves nothing: state a tolerance, the error that does not matter",
-                one.family,
-                newtons(one.rms_n),
-                counts.samples,
-                counts.effective,
-            ),
-        ),
+        Some(_) if counts.is_curve() => {
+            let closest = candidates.iter().min_by(|a, b| a.rms_n.total_cmp(&b.rms_n));
+            let left = closest.map_or(String::new(), |one| {
+                format!(
+                    "what even {} leaves, {} rms,",
+                    one.family,
+                    newtons(one.rms_n)
+                )
+            });
+            (
+                Outcome::NoneAdequate,
+                format!(
+                    "no winner: no family describes these records to their noise; {left} wanders like a curve (its {} residuals are worth {:.0} independent ones), so the lowest criterion proves nothing: state a tolerance, the error that does not matter",
+                    counts.samples, counts.effective
+                ),
+            )
+        }
         Some(one) if near.len() > 1 => (
             Outcome::NoWinner,
             format!(

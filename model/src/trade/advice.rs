@@ -46,6 +46,9 @@ pub struct Recommendation {
     pub families: Vec<(String, Advice)>,
     /// How far a recording may be thinned before it is fitted.
     pub fit: Advice,
+    /// How many relaxation times the live fit needs: its error of tau, as a share, stands for that of the
+    /// force.
+    pub live: Advice,
 }
 
 impl TradeCurves {
@@ -73,7 +76,24 @@ impl TradeCurves {
             integrator: self.integrator(tolerance, rate_hz, share),
             families: families.collect(),
             fit: self.thinning(tolerance),
+            live: self.bank(tolerance, rate_hz, share),
         }
+    }
+
+    fn bank(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
+        let peak = Newtons(self.peak.ramp_hold_n);
+        let allowed = tolerance.in_newtons(peak).0 / peak.0;
+        let candidates = self.live.iter().filter_map(|row| {
+            let error = row.tau_error?;
+            let choice = Choice {
+                setting: format!("{} relaxation times", row.nodes),
+                error_of_peak: error,
+                share_of_period: Some(row.cost.ns * 1e-9 * rate_hz),
+                cost_ns: row.cost.ns,
+            };
+            Some((choice, error <= allowed))
+        });
+        best(candidates.collect(), tolerance, Some((rate_hz, share)))
     }
 
     fn integrator(&self, tolerance: Tolerance, rate_hz: f64, share: f64) -> Advice {
@@ -142,14 +162,27 @@ fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64
             nearest = Some(choice);
         }
     }
-    // Of those that cost the same as far as times can be told apart, the most exact.
-    let least = exact
+    let least = |choices: &[&Choice]| {
+        let costs = choices.iter().map(|choice| choice.cost_ns);
+        costs.fold(f64::INFINITY, f64::min)
+    };
+    // What keeps pace, or else the cheapest, to say by how much it does not.
+    let in_time: Vec<&Choice> = exact
         .iter()
-        .map(|choice| choice.cost_ns)
-        .fold(f64::INFINITY, f64::min);
-    let cheapest = exact
+        .filter(|choice| {
+            pace.is_none_or(|(_, share)| choice.share_of_period.is_none_or(|used| used <= share))
+        })
+        .copied()
+        .collect();
+    let (known, slack) = match in_time.is_empty() {
+        // Of those that cost the same as far as times can be told apart, the most exact.
+        false => (in_time, REPEATABLE),
+        true => (exact, 0.0),
+    };
+    let limit = least(&known) * (1.0 + slack);
+    let cheapest = known
         .into_iter()
-        .filter(|choice| choice.cost_ns <= least * (1.0 + REPEATABLE))
+        .filter(|choice| choice.cost_ns <= limit)
         .min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
     match (cheapest, nearest, pace) {
         (None, None, Some((rate, _))) => Advice::None(format!(

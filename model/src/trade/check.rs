@@ -180,8 +180,7 @@ impl TradeCurves {
             let stored = self.live.iter().find(|stored| stored.nodes == row.nodes);
             let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
             match (stored.tau_error, row.tau_error) {
-                // Sums of products lose half the digits.
-                (Some(stored), Some(found)) => same(&name, stored, found, 1e4)?,
+                (Some(stored), Some(found)) => alike(&name, stored, found, 1.0)?,
                 (None, None) => {}
                 _ => return Err(CurveError::Contradiction(name)),
             }

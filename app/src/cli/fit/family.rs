@@ -1,6 +1,6 @@
 //! `palpate fit --family KEY`: any model family, one body for all sources.
 
-use super::super::{Failure, output::Output};
+use super::super::{Failure, new_file, output::Output};
 use super::{FitArgs, sources};
 use crate::report::family::{self, FittedRecord};
 use palpate_model::families::by_key;
@@ -61,7 +61,7 @@ pub(super) fn run(
     let family = by_key(key).map_err(Failure::usage)?;
     let found = sources::find(&args.sources)?;
     let to = args.picture.as_deref();
-    super::check_picture(to)?;
+    new_file::check("picture", to)?;
     if to.is_some() && found.len() > 1 {
         return Err(Failure::usage(
             "--picture is for one record; name a single session or table",
@@ -89,7 +89,7 @@ pub(super) fn run(
     if let (Some(to), [record]) = (to, records.as_slice()) {
         let name = found[0].file_name().unwrap_or(found[0].as_os_str());
         let picture = family::picture(&name.to_string_lossy(), &*family, &fit, record);
-        super::write_picture(to, &picture)?;
+        new_file::write("picture", Some(to), || picture)?;
     }
     let object = FamilyOutput {
         command: "fit",

@@ -7,6 +7,7 @@ mod joint;
 pub(super) mod sources;
 
 use super::Failure;
+use super::new_file;
 use super::output::Output;
 use crate::report::{picture, text};
 use crate::workers::fit::{Fitted, fit_source};
@@ -122,7 +123,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
 
 fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
-    check_picture(to)?;
+    new_file::check("picture", to)?;
     let fitted = recipe.fit(source)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
@@ -135,7 +136,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             Ok(report) => picture::of_report(&short, &fitted.samples, report),
             Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
         };
-        write_picture(to, &picture)?;
+        new_file::write("picture", Some(to), || picture)?;
     }
     let report = fitted
         .result
@@ -156,25 +157,6 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
 }
 
 /// A picture is a new file.
-fn check_picture(to: Option<&Path>) -> Result<(), Failure> {
-    match to.filter(|to| to.exists()) {
-        Some(to) => Err(Failure::usage(format!(
-            "{} exists already; give the picture another name",
-            to.display()
-        ))),
-        None => Ok(()),
-    }
-}
-
-fn write_picture(to: &Path, picture: &str) -> Result<(), Failure> {
-    std::fs::write(to, picture).map_err(|err| {
-        Failure::failed(format!(
-            "cannot write the picture {} ({err}); choose a folder that may be written",
-            to.display()
-        ))
-    })
-}
-
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
     let mut options = FitOptions::default();
     let names = args.free.iter().map(|name| name.trim());

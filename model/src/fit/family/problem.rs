@@ -131,7 +131,7 @@ impl<'a> Problem<'a> {
         Err(FitError::Unsupported {
             family: self.family.name(),
             reason: format!(
-                "the probe comes back by {:.0} % of its greatest depth where {:.0} % are needed to tell unloading from loading; give a record with its unloading",
+                "while its force is known the probe comes back by {:.0} % of its greatest depth, and {:.0} % are needed to tell unloading from loading; record the unloading, press deeper, or come back more slowly so that the tissue keeps touching",
                 100.0 * share,
                 100.0 * RETURN_MIN
             ),

@@ -263,11 +263,20 @@ impl Residuals {
                 }
             })
             .collect();
+        // Columns whose freedom the memory is judged net of: all of them for one record. Several records
+        // share the body, so what of it one of them would have otherwise is misfit and stays in sight.
+        let columns: Vec<Vec<usize>> = (0..records.len())
+            .map(|record| match problem.own_slots(record) {
+                _ if records.len() == 1 => (0..free).collect(),
+                (offset, initial) => offset.into_iter().chain(initial).collect(),
+            })
+            .collect();
         let mut blocks: Vec<Blocks> = records
             .iter()
-            .map(|record| Blocks {
+            .zip(&columns)
+            .map(|(record, columns)| Blocks {
                 length: record.samples.div_ceil(BLOCKS) as f64,
-                columns: vec![Vec::new(); free],
+                columns: vec![Vec::new(); columns.len()],
                 ..Blocks::default()
             })
             .collect();
@@ -291,8 +300,8 @@ impl Residuals {
                 let over_root = 1.0 / one.length.sqrt();
                 one.residuals.push(sums[free] * over_root);
                 one.places.push(one.places.len());
-                for (column, sum) in one.columns.iter_mut().zip(&sums) {
-                    column.push(sum * over_root);
+                for (column, &slot) in one.columns.iter_mut().zip(&columns[record]) {
+                    column.push(sums[slot] * over_root);
                 }
                 sums.fill(0.0);
                 taken = 0;

@@ -1,0 +1,42 @@
+//! Files that a command makes beside its answer: never over another, and looked into before hours of work.
+
+use super::Failure;
+use std::path::Path;
+
+/// Refuses a file that exists, or whose folder does not. `what` it is, for the sentence.
+pub(super) fn check(what: &str, to: Option<&Path>) -> Result<(), Failure> {
+    let Some(to) = to else {
+        return Ok(());
+    };
+    if to.exists() {
+        return Err(Failure::usage(format!(
+            "{} exists already; give the {what} another name",
+            to.display()
+        )));
+    }
+    let folder = to.parent().filter(|folder| !folder.as_os_str().is_empty());
+    match folder.filter(|folder| !folder.is_dir()) {
+        Some(folder) => Err(Failure::usage(format!(
+            "there is no folder {} for the {what}; make it or choose another",
+            folder.display()
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// Writes the file if one was asked for.
+pub(super) fn write(
+    what: &str,
+    to: Option<&Path>,
+    content: impl FnOnce() -> String,
+) -> Result<(), Failure> {
+    let Some(to) = to else {
+        return Ok(());
+    };
+    std::fs::write(to, content()).map_err(|err| {
+        Failure::failed(format!(
+            "cannot write the {what} {} ({err}); choose a folder that may be written",
+            to.display()
+        ))
+    })
+}
