@@ -21,6 +21,8 @@ pub struct FitSource {
     pub start: Seconds,
     /// Remarks, such as an interrupted recording.
     pub notes: Vec<String>,
+    /// The specimen pressed, where the source says so.
+    pub specimen: Option<String>,
 }
 
 /// What of an indentation is read.
@@ -94,6 +96,7 @@ pub fn read_stretch(
             samples: samples_of_table(&table, stretch),
             start: Seconds(0.0),
             notes: table.notes,
+            specimen: None,
         });
     }
     let session = Session::open(path)?;
@@ -106,7 +109,9 @@ pub fn read_stretch(
             "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, or the probe had left the tissue"
         ));
     }
+    let specimen = session.manifest.specimen.trim();
     Ok(FitSource {
+        specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
         samples,
         start,
         notes,

@@ -29,6 +29,25 @@ fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
             perturbed += 1;
         }
     }
+    let changes: [fn(&mut TradeCurves); 5] = [
+        |curves| curves.peak.ramp_hold_n *= 1.01,
+        |curves| curves.peak.poke_n *= 1.01,
+        |curves| curves.fit[0].tau_error *= 1.01,
+        |curves| {
+            let error = curves.live[0].tau_error.as_mut().expect("an error");
+            *error *= 1.01;
+        },
+        |curves| {
+            let row = curves.integrators.iter_mut().find(|row| row.step_s == 0.01);
+            let error = row.and_then(|row| row.error.as_mut()).expect("an error");
+            error.poke_n *= 1.01;
+        },
+    ];
+    for (index, change) in changes.into_iter().enumerate() {
+        let mut changed = recorded.clone();
+        change(&mut changed);
+        assert!(changed.agrees_with(&now).is_err(), "change {index}");
+    }
     for index in 0..recorded.families.len() {
         let mut changed = recorded.clone();
         let row = &mut changed.families[index];

@@ -1,7 +1,7 @@
 //! `palpate select`: model families compared on sessions and tables.
 
 use super::Failure;
-use super::fit::sources;
+use super::fit::sources::{self, Recording};
 use super::new_file;
 use super::output::Output;
 use crate::report::{of_selection, selection};
@@ -30,6 +30,9 @@ pub struct SelectArgs {
     /// speed, depth, specimen or none
     #[arg(long, value_name = "WHAT", default_value = "auto")]
     hold_out: String,
+    /// The specimen of each source in turn, as in S1,S1,S2; without it what sessions say of themselves
+    #[arg(long, value_name = "NAMES")]
+    specimens: Option<String>,
     /// Families to compare, as in kelvin,series-3,prony-2; all without it
     #[arg(long, value_name = "NAMES")]
     families: Option<String>,
@@ -57,7 +60,7 @@ struct SelectOutput<'a> {
 }
 
 pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
-    let options = options(args)?;
+    let mut options = options(args)?;
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
     new_file::check("plot", args.plot.as_deref())?;
@@ -67,10 +70,8 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
         false => Stretch::RampHold,
     };
     let records = sources::read(&found, columns.as_ref(), stretch, output)?;
-    let borrowed: Vec<(&str, &[FitSample])> = records
-        .iter()
-        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
-        .collect();
+    options.specimens = specimens(args, &records)?;
+    let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let bar = output.count_bar(0);
     let watch = Stopwatch::start();
     let selection = select(&borrowed, &options, &|news| {
@@ -114,4 +115,23 @@ fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
         options.families = families.map_err(Failure::usage)?;
     }
     Ok(options)
+}
+
+/// The specimen of each record: as given, or as the sources say.
+fn specimens(args: &SelectArgs, records: &[Recording]) -> Result<Vec<Option<String>>, Failure> {
+    let Some(names) = &args.specimens else {
+        return Ok(records.iter().map(|one| one.specimen.clone()).collect());
+    };
+    let names: Vec<&str> = names.split(',').map(str::trim).collect();
+    if names.len() != records.len() || names.contains(&"") {
+        return Err(Failure::usage(format!(
+            "--specimens names {} and there are {} sources; give one name for each",
+            names.iter().filter(|name| !name.is_empty()).count(),
+            records.len()
+        )));
+    }
+    Ok(names
+        .into_iter()
+        .map(|name| Some(name.to_owned()))
+        .collect())
 }

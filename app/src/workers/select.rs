@@ -16,6 +16,8 @@ pub struct SelectSource {
     pub samples: Vec<FitSample>,
     /// What its reader remarked.
     pub notes: Vec<String>,
+    /// The specimen pressed, where the source says so.
+    pub specimen: Option<String>,
 }
 
 /// A comparison and what it was made of.
@@ -49,7 +51,7 @@ impl fmt::Display for SelectFailure {
 pub fn select_sources(
     paths: &[PathBuf],
     stretch: Stretch,
-    options: &SelectOptions,
+    mut options: SelectOptions,
     progress: &dyn Fn(usize, usize, &str) -> ControlFlow<()>,
 ) -> Result<Selected, SelectFailure> {
     let sources = paths
@@ -60,7 +62,11 @@ pub fn select_sources(
         .iter()
         .map(|source| (source.name.as_str(), source.samples.as_slice()))
         .collect();
-    let selection = select(&records, options, &|news| {
+    options.specimens = sources
+        .iter()
+        .map(|source| source.specimen.clone())
+        .collect();
+    let selection = select(&records, &options, &|news| {
         progress(news.done, news.total, &format!("fitting {}", news.family))
     })
     .map_err(SelectFailure::Select)?;
@@ -87,5 +93,6 @@ fn read(path: &Path, stretch: Stretch) -> Result<SelectSource, SelectFailure> {
         name,
         samples: source.samples,
         notes: source.notes,
+        specimen: source.specimen,
     })
 }

@@ -7,6 +7,10 @@ use std::path::Path;
 fn the_extremes_agree_with_the_page_of_the_guide() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
+    std::fs::write(at.join("notes.md"), "mine").unwrap();
+    let refused = palpate(at, &["extremes", "--quick", "--page", "notes.md"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(stderr(&refused).contains("exists already"));
     let run = palpate(at, &["extremes", "--quick", "--json", "--page", "page.md"]);
     succeeded(&run);
     let run = json(&run);
@@ -133,9 +137,9 @@ fn one_family_in_words_and_an_unknown_one() {
             "no/such/page.md",
         ],
     );
-    assert_eq!(run.status.code(), Some(1));
+    assert_eq!(run.status.code(), Some(2));
     assert!(
-        stderr(&run).contains("choose another place"),
+        stderr(&run).contains("there is no folder no/such"),
         "{}",
         stderr(&run)
     );

@@ -135,6 +135,102 @@ fn one_record_is_split_in_time() {
 }
 
 #[test]
+fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let soft = kelvin();
+    let stiff = Model {
+        linear: soft.linear.iter().map(|one| 2.0 * one).collect(),
+        ..soft.clone()
+    };
+    for (name, body) in [("soft", &soft), ("stiff", &stiff)] {
+        table(at, &format!("{name}-slow.csv"), body, [1.0, 10.0]);
+        table(at, &format!("{name}-fast.csv"), body, [5.0, 10.0]);
+    }
+    let args = [
+        "select",
+        "soft-slow.csv",
+        "soft-fast.csv",
+        "stiff-slow.csv",
+        "stiff-fast.csv",
+        "--families",
+        "maxwell,kelvin,series-2",
+        "--json",
+    ];
+    // What two specimens differ by is no noise, whatever each alone would look like.
+    let found = palpate(at, &args);
+    succeeded(&found);
+    let found = json(&found);
+    assert_eq!(found["verdict"]["outcome"], "none-adequate", "{found}");
+    assert!(found["effective_samples"].as_f64().unwrap() < 200.0);
+    let candidates = found["candidates"].as_array().unwrap();
+    let rms = |one: &&Value| one["rms_n"].as_f64().unwrap();
+    let closest = candidates
+        .iter()
+        .min_by(|a, b| rms(a).total_cmp(&rms(b)))
+        .unwrap();
+    let even = format!("what even {} leaves", closest["family"].as_str().unwrap());
+    let said = found["verdict"]["sentences"][0].as_str().unwrap();
+    assert!(said.contains(&even), "{said}");
+
+    let specimen = ["--hold-out", "specimen"];
+    let nameless = palpate(at, &[&args[..], &specimen].concat());
+    assert_eq!(nameless.status.code(), Some(2));
+    assert!(stdout(&nameless).contains("does not say which it is of"));
+    let few = [&args[..], &specimen, &["--specimens", "A,B"]].concat();
+    assert_eq!(palpate(at, &few).status.code(), Some(2));
+    let named = [&args[..], &specimen, &["--specimens", "A,A,B,B"]].concat();
+    let held = palpate(at, &named);
+    succeeded(&held);
+    let held = json(&held);
+    // The other specimen is half or twice as stiff, and one factor makes up for it.
+    let prediction = &candidate(&held, "kelvin")["prediction"];
+    for record in prediction["records"].as_array().unwrap() {
+        let scale = record["scale"].as_f64().unwrap();
+        let wanted = if record["record"].as_str().unwrap().starts_with("soft") {
+            0.5
+        } else {
+            2.0
+        };
+        assert!((scale / wanted - 1.0).abs() < 0.05, "{record}");
+    }
+    assert!(prediction["scaled_rms_n"].as_f64().unwrap() < 0.03);
+}
+
+#[test]
+fn a_sensor_offset_is_no_part_of_the_peak() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "plain.csv", &kelvin(), [1.0, 10.0]);
+    let text = std::fs::read_to_string(at.join("plain.csv")).unwrap();
+    let mut raised = String::new();
+    for line in text.lines() {
+        let mut cells: Vec<String> = line.split(',').map(str::to_owned).collect();
+        if let Ok(force) = cells[2].parse::<f64>() {
+            cells[2] = (force + 5.0).to_string();
+        }
+        let _ = writeln!(raised, "{}", cells.join(","));
+    }
+    std::fs::write(at.join("raised.csv"), raised).unwrap();
+    let tolerance = |name| {
+        let args = [
+            "select",
+            name,
+            "--families",
+            "kelvin",
+            "--tolerance",
+            "1%",
+            "--json",
+        ];
+        let found = palpate(at, &args);
+        succeeded(&found);
+        json(&found)["tolerance_n"].as_f64().unwrap()
+    };
+    let (plain, raised) = (tolerance("plain.csv"), tolerance("raised.csv"));
+    assert!((raised / plain - 1.0).abs() < 0.02, "{plain} {raised}");
+}
+
+#[test]
 fn wrong_use_is_told_in_one_sentence() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

@@ -74,7 +74,15 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
             "{advice}"
         );
     }
-    assert_eq!(advice["families"].as_array().unwrap().len(), 4);
+    assert_eq!(advice["families"].as_array().unwrap().len(), 5);
+    assert!(advice["live"]["use"]["setting"].is_string(), "{advice}");
+    // A picture never takes the place of another file, and quick curves never that of full ones.
+    std::fs::write(at.join("recording.csv"), "t,x,F").unwrap();
+    for to in ["recording.csv", "no-folder/trade.svg"] {
+        let refused = palpate(at, &["trade", "--quick", "--plot", to]);
+        assert_eq!(refused.status.code(), Some(2), "{to}");
+    }
+    assert!(stored(at).to_string_lossy().ends_with("-quick.json"));
 
     let picture = std::fs::read_to_string(at.join("trade.svg")).unwrap();
     assert!(picture.starts_with("<svg") && picture.ends_with("</svg>\n"));

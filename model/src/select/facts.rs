@@ -14,6 +14,8 @@ const AT_PEAK: f64 = 0.005;
 pub struct RecordFacts {
     /// Its name.
     pub record: String,
+    /// The specimen pressed, where it is known.
+    pub specimen: Option<String>,
     /// Samples whose force counts.
     pub samples: usize,
     /// Greatest depth in mm.
@@ -48,6 +50,7 @@ impl RecordFacts {
         let forces = samples.iter().filter(|one| one.is_measured());
         Self {
             record: name.to_owned(),
+            specimen: None,
             samples: forces.count(),
             depth_mm: deepest,
             speed_mm_per_s: if took > 0.0 {

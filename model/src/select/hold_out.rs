@@ -48,6 +48,14 @@ pub enum HoldOutError {
         /// Records given.
         records: usize,
     },
+    /// Nobody knows whose a record is.
+    #[error(
+        "no specimen can be held out, because {record} does not say which it is of; name one for each source (--specimens A,A,B), or hold out 'auto'"
+    )]
+    NoSpecimen {
+        /// The record.
+        record: String,
+    },
 }
 
 impl FromStr for HoldOut {
@@ -162,7 +170,7 @@ pub(super) fn folds(
                 .collect());
         }
         HoldOut::Auto => return Ok(each()),
-        HoldOut::Specimen => (each(), "specimen"),
+        HoldOut::Specimen => (by_specimen(facts)?, "specimen"),
         HoldOut::Speed => (
             alike(facts.iter().map(|one| one.speed_mm_per_s).collect()),
             "speed",
@@ -179,6 +187,29 @@ pub(super) fn folds(
         });
     }
     Ok(groups)
+}
+
+/// Records of one specimen, together.
+fn by_specimen(facts: &[RecordFacts]) -> Result<Vec<Fold>, HoldOutError> {
+    let mut groups: Vec<(&str, Fold)> = Vec::new();
+    for (index, one) in facts.iter().enumerate() {
+        let Some(specimen) = &one.specimen else {
+            return Err(HoldOutError::NoSpecimen {
+                record: one.record.clone(),
+            });
+        };
+        match groups.iter_mut().find(|(known, _)| known == specimen) {
+            Some((_, group)) => group.test.push(index),
+            None => groups.push((
+                specimen,
+                Fold {
+                    test: vec![index],
+                    cut: None,
+                },
+            )),
+        }
+    }
+    Ok(groups.into_iter().map(|(_, group)| group).collect())
 }
 
 /// Records whose numbers are alike, together.
@@ -315,17 +346,21 @@ mod tests {
             speed_mm_per_s: speed,
             peak_n: 1.0,
             arrival: 0,
+            specimen: None,
         }
     }
 
     #[test]
     fn what_is_new_in_a_record() {
-        let facts = [
+        let mut facts = [
             facts(1.0, 10.0),
             facts(1.02, 20.0),
             facts(5.0, 20.5),
             facts(1.0, 20.0),
         ];
+        for (one, specimen) in facts.iter_mut().zip(["A", "B", "A", "B"]) {
+            one.specimen = Some(specimen.into());
+        }
         assert_eq!(unseen(&facts, 0, &[0]), Unseen::Depth);
         assert_eq!(unseen(&facts, 1, &[1]), Unseen::Specimen);
         assert_eq!(unseen(&facts, 2, &[2]), Unseen::Speed);
@@ -337,6 +372,11 @@ mod tests {
         assert_eq!(tests(HoldOut::Depth), [vec![0], vec![1, 3, 2]]);
         assert_eq!(tests(HoldOut::Auto).len(), 4);
         assert!(tests(HoldOut::None).is_empty());
+        assert_eq!(tests(HoldOut::Specimen), [vec![0, 2], vec![1, 3]]);
+        let mut nameless = facts.clone();
+        nameless[1].specimen = None;
+        let refused = folds(HoldOut::Specimen, &nameless, &[&[] as &[FitSample]; 4]).unwrap_err();
+        assert!(refused.to_string().contains("does not say which it is of"));
         let alone = folds(HoldOut::Speed, &facts[..2], &[&[] as &[FitSample]; 2]).unwrap_err();
         assert!(alone.to_string().starts_with("no speed can be held out"));
     }

@@ -26,6 +26,8 @@ pub struct SelectOptions {
     /// What each record has of its own; by default an offset alone. An initial force that fades is not
     /// defined for families of several relaxation times, and would make the others look costlier.
     pub fit: FamilyOptions,
+    /// The specimen of each record, in their order; fewer where the others are not known.
+    pub specimens: Vec<Option<String>>,
 }
 
 impl Default for SelectOptions {
@@ -38,6 +40,7 @@ impl Default for SelectOptions {
                 offset: true,
                 initial: false,
             },
+            specimens: Vec::new(),
         }
     }
 }
@@ -205,6 +208,9 @@ pub fn select(
         .iter()
         .map(|(name, samples)| RecordFacts::of(name, samples))
         .collect();
+    for (facts, specimen) in facts.iter_mut().zip(&options.specimens) {
+        facts.specimen.clone_from(specimen);
+    }
     let samples: Vec<&[FitSample]> = records.iter().map(|record| record.1).collect();
     let folds = folds(options.hold_out, &facts, &samples)?;
     let total = options.families.len() * (1 + folds.len());

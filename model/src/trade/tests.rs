@@ -155,6 +155,12 @@ fn the_cheapest_that_does_is_recommended() {
     alike.families[3] = family("series-4", "a body", 1e-12, 52.0);
     let alike = alike.recommend(percent(0.01), 1000.0, 0.1);
     assert_eq!(used(&alike.families[0].1), "series-4");
+    // The more exact one is no use where only the cheaper keeps pace.
+    let mut tight = curves.clone();
+    tight.families[3] = family("series-4", "a body", 1e-12, 52.0);
+    let share = 51.0e-9 * 1e6;
+    let tight = tight.recommend(percent(0.01), 1e6, share);
+    assert_eq!(used(&tight.families[0].1), "series-3");
     let Advice::Use(choice) = &loose.integrator else {
         panic!("{loose:?}");
     };

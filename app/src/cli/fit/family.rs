@@ -1,7 +1,8 @@
 //! `palpate fit --family KEY`: any model family, one body for all sources.
 
 use super::super::{Failure, new_file, output::Output};
-use super::{FitArgs, sources};
+use super::FitArgs;
+use super::sources::{self, Recording};
 use crate::report::family::{self, FittedRecord};
 use palpate_model::families::by_key;
 use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
@@ -72,10 +73,7 @@ pub(super) fn run(
         false => Stretch::RampHold,
     };
     let named = sources::read(&found, columns, stretch, output)?;
-    let borrowed: Vec<(&str, &[FitSample])> = named
-        .iter()
-        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
-        .collect();
+    let borrowed: Vec<(&str, &[FitSample])> = named.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let fit = fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
     let seconds = watch.seconds();

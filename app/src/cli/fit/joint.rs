@@ -1,7 +1,8 @@
 //! Several sources fitted together, with some parameters the same in all.
 
 use super::super::{Failure, output::Output};
-use super::{Recipe, sources};
+use super::Recipe;
+use super::sources::{self, Recording};
 use crate::report::text;
 use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
 use palpate_protocols::analysis::Stretch;
@@ -35,10 +36,7 @@ pub(super) fn run(
     }
     let shared = names(shared);
     let records = sources::read(&found, recipe.columns.as_ref(), Stretch::RampHold, output)?;
-    let borrowed: Vec<(&str, &[FitSample])> = records
-        .iter()
-        .map(|(name, samples)| (name.as_str(), samples.as_slice()))
-        .collect();
+    let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {
         use palpate_model::fit::FitError::{NotShareable, UnknownParameter};

@@ -74,13 +74,30 @@ pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(found)
 }
 
-/// Reads sources that are looked at together, each once, by name.
+/// A source that is looked at together with others.
+pub(in crate::cli) struct Recording {
+    /// Its path, as given.
+    pub name: String,
+    /// What is fitted.
+    pub samples: Vec<FitSample>,
+    /// The specimen pressed, where the source says so.
+    pub specimen: Option<String>,
+}
+
+impl Recording {
+    /// As fits take it.
+    pub fn borrowed(&self) -> (&str, &[FitSample]) {
+        (&self.name, &self.samples)
+    }
+}
+
+/// Reads sources that are looked at together, each once.
 pub(in crate::cli) fn read(
     found: &[PathBuf],
     columns: Option<&ColumnNames>,
     stretch: Stretch,
     output: &Output,
-) -> Result<Vec<(String, Vec<FitSample>)>, Failure> {
+) -> Result<Vec<Recording>, Failure> {
     let mut real: Vec<PathBuf> = found
         .iter()
         .map(|path| path.canonicalize().unwrap_or_else(|_| path.clone()))
@@ -98,7 +115,11 @@ pub(in crate::cli) fn read(
         for note in &source.notes {
             output.note(&format!("{name}: {note}"));
         }
-        Ok((name, source.samples))
+        Ok(Recording {
+            name,
+            samples: source.samples,
+            specimen: source.specimen,
+        })
     };
     found.iter().map(one).collect()
 }
