@@ -45,7 +45,7 @@ fn csv_holds_every_digit_and_reads_back() {
     assert_eq!(text.lines().count(), 3001);
 
     let table = read_table(&path, None).unwrap();
-    let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold);
+    let is_measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold | Phase::Unload);
     let kept: Vec<usize> = (0..session.rows.len())
         .filter(|&i| is_measured(session.rows[i].phase))
         .collect();
@@ -54,12 +54,13 @@ fn csv_holds_every_digit_and_reads_back() {
         assert_eq!(table.t[k], time_of(&session, i));
         assert_eq!(Some(table.force[k]), session.rows[i].force);
         assert_eq!(Some(table.depth[k]), session.rows[i].depth);
+        assert_eq!(table.is_unload[k], session.rows[i].phase == Phase::Unload);
     }
     let left_out = session.rows.len() - kept.len();
     assert_eq!(
         table.notes,
         [format!(
-            "{left_out} rows outside ramp and hold are left out"
+            "{left_out} rows outside ramp, hold and unload are left out"
         )]
     );
 }
