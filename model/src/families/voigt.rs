@@ -48,3 +48,29 @@ impl Family for Voigt {
         ]
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::units::{Depth, Seconds};
+
+    #[test]
+    fn spring_and_dashpot_have_no_memory_at_any_step() {
+        let family: &dyn Family = &Voigt;
+        let model = family.model(&[], &[0.2, 0.15]).unwrap();
+        for dt in [1e-6, 1e-3, 1.0] {
+            let mut body = model.at_rest_from(Depth(0.0)).unwrap();
+            let mut before = 0.0;
+            for depth in [0.5, 2.0, 2.0, 1.0, 4.0] {
+                let force = body.step(Depth(depth), Seconds(dt)).unwrap().0;
+                let exact = 0.2 * depth + 0.15 * (depth - before) / dt;
+                // A few roundings of the largest term.
+                assert!(
+                    (force - exact).abs() <= 1e-15 * (1.0 + 1.0 / dt),
+                    "{dt} {depth}"
+                );
+                before = depth;
+            }
+        }
+    }
+}
