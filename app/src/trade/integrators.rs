@@ -3,8 +3,8 @@
 use super::paths::{Path, Paths, TICKS, body};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
-use palpate_model::integrators::{IntegratorError, Real, Scheme};
-use palpate_model::trade::{ForceError, IntegratorRow, Precision};
+use palpate_model::integrators::{IntegratorError, Precision, Real, Scheme};
+use palpate_model::trade::{ForceError, IntegratorRow};
 use std::hint::black_box;
 
 /// Steps in ticks of 0.1 ms, up to where the conditionally stable ones have long stopped being so.
@@ -16,7 +16,6 @@ const STEPS_QUICK: [u64; 4] = [10, 100, 1_000, 50_000];
 const RUN: usize = 1024;
 /// One job for every integrator and precision: a step costs the same whatever its length.
 pub(super) const JOBS: usize = 2 * Scheme::ALL.len();
-const PRECISIONS: [Precision; 2] = [Precision::F64, Precision::F32];
 
 pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<IntegratorRow>, String> {
     let steps = match extent {
@@ -25,7 +24,7 @@ pub(super) fn rows(extent: Extent, paths: &Paths) -> Result<Vec<IntegratorRow>, 
     };
     let mut rows = Vec::new();
     for scheme in Scheme::ALL {
-        for precision in PRECISIONS {
+        for precision in Precision::ALL {
             for &step in steps {
                 let error = match precision {
                     Precision::F64 => error::<f64>(scheme, step, paths),
@@ -73,8 +72,8 @@ pub(super) fn jobs<'a>() -> Vec<Job<'a>> {
 /// Which of the jobs times a row.
 pub(super) fn job_of(row: &IntegratorRow) -> usize {
     let scheme = Scheme::ALL.iter().position(|one| *one == row.scheme);
-    let precision = PRECISIONS.iter().position(|one| *one == row.precision);
-    scheme.unwrap_or(0) * PRECISIONS.len() + precision.unwrap_or(0)
+    let precision = Precision::ALL.iter().position(|one| *one == row.precision);
+    scheme.unwrap_or(0) * Precision::ALL.len() + precision.unwrap_or(0)
 }
 
 fn job<'a, R: Real + 'a>(scheme: Scheme) -> Job<'a> {

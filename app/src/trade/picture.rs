@@ -4,8 +4,8 @@ use super::text::plain;
 use crate::report::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
 use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
-use palpate_model::integrators::Scheme;
-use palpate_model::trade::{FamilyRow, FitRow, Precision, TradeCurves};
+use palpate_model::integrators::{Precision, Scheme};
+use palpate_model::trade::{FamilyRow, FitRow, TradeCurves};
 
 /// Size of the picture and of the space around a panel, in px.
 const WIDTH: f64 = 1080.0;

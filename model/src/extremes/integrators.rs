@@ -1,10 +1,10 @@
 //! Every integrator of the modified Kelvin body, in double and single precision.
 
 use super::judge::{PathCase, Row};
-use super::subjects::{Precision, SchemeBody};
+use super::subjects::SchemeBody;
 use super::tau_step::decades;
 use super::{Extent, Part};
-use crate::integrators::{Scheme, SeriesBody};
+use crate::integrators::{Precision, Scheme, SeriesBody};
 use crate::viscoelastic::ModifiedKelvin;
 
 /// Name of the group of relaxation times against steps.

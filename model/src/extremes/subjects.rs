@@ -2,7 +2,7 @@
 
 use super::judge::{PathCase, Subject, TOLERANCE};
 use crate::families::{Model, Relaxation};
-use crate::integrators::{Real, Scheme, SeriesBody};
+use crate::integrators::{Precision, Real, Scheme, SeriesBody};
 use crate::units::{Depth, Seconds};
 
 /// A member of a family, stepped by its own exact step.
@@ -43,29 +43,6 @@ pub struct SchemeBody {
     pub body: SeriesBody<3>,
 }
 
-/// Numbers an integrator computes with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Precision {
-    /// 32 bits.
-    Single,
-    /// 64 bits.
-    Double,
-}
-
-impl Precision {
-    /// Both.
-    pub const ALL: [Self; 2] = [Self::Double, Self::Single];
-
-    /// Its name in Rust.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Single => "f32",
-            Self::Double => "f64",
-        }
-    }
-}
-
 /// An error of single precision, relative to the peak force: some ten roundings of 6e-8, and the
 /// depths themselves are rounded.
 const TOLERANCE_SINGLE: f64 = 3e-6;
@@ -97,16 +74,16 @@ impl Subject for SchemeBody {
 
     fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String> {
         match self.precision {
-            Precision::Single => self.run::<f32>(path),
-            Precision::Double => self.run::<f64>(path),
+            Precision::F32 => self.run::<f32>(path),
+            Precision::F64 => self.run::<f64>(path),
         }
     }
 
     /// Rounding, and for all but the exact step what its order says of a path of so many samples.
     fn tolerance(&self, path: &PathCase) -> f64 {
         let rounding = match self.precision {
-            Precision::Single => TOLERANCE_SINGLE,
-            Precision::Double => TOLERANCE,
+            Precision::F32 => TOLERANCE_SINGLE,
+            Precision::F64 => TOLERANCE,
         };
         let Some(order) = self.scheme.order() else {
             return rounding;

@@ -1,43 +1,22 @@
 //! The exact decay with the forcing straight between the edges (first-order hold):
 //! `F(+) = e^-h F + psi_0 u(left) + psi_1 (u(right) - u(left))`.
 
-use super::body::SeriesBody;
-use super::drive::Drive;
-use super::real::{Real, Running};
-use super::{Integrator, Start, finished};
-use crate::families::StepError;
+use super::rule::{Rule, Weights};
 use crate::viscoelastic::psi;
 
 /// Amplifies by `e^-h`: stable at any step. Second order, since the powers of a straight depth are not
 /// straight.
 #[derive(Clone, Copy, Debug)]
-pub struct ExponentialFirstOrder<R, const N: usize> {
-    drive: Drive<R, N>,
-    force: Running<R>,
-    psi_0: R,
-    psi_1: R,
-}
+pub struct ExponentialFirstOrder;
 
-impl<R: Real, const N: usize> Integrator<R, N> for ExponentialFirstOrder<R, N> {
-    fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self {
-        let h = dt / body.tau_eps;
-        let drive = Drive::new(body, dt, start.depth);
-        Self {
-            force: Running::new(start.force.unwrap_or(drive.settled())),
-            drive,
-            psi_0: R::of(psi(0, h)),
-            psi_1: R::of(psi(1, h)),
+impl Rule for ExponentialFirstOrder {
+    const USES: [bool; 3] = [true, false, true];
+
+    fn weights(h: f64) -> Weights {
+        let (psi_0, psi_1) = (psi(0, h), psi(1, h));
+        Weights {
+            forcing: [psi_0 - psi_1, 0.0, psi_1],
+            share: psi_0,
         }
-    }
-
-    #[inline]
-    fn step(&mut self, depth: R) -> Result<R, StepError> {
-        let forcing = self.drive.forcing(depth);
-        let change = forcing.right - forcing.left;
-        let weighted = self.psi_0 * forcing.left + self.psi_1 * change;
-        let force = self.force.relaxed(weighted, self.psi_0);
-        self.force = finished(force, [self.drive.depth(), depth], self.drive.dt())?;
-        self.drive.arrive(&forcing);
-        Ok(force.value)
     }
 }

@@ -3,7 +3,8 @@
 //! The exact one is what palpate uses. The others are what programs without it use, and what the
 //! measured trade compares: error against time. All have the form `F(+) = F - a F + w`, their
 //! coefficients made once for a step length, the sum compensated; they differ in `a` and in what they
-//! make of the depth between two samples. With `h = dt / tau` the textbook properties are (Hairer &
+//! make of the depth between two samples. The approximate ones are no more than their weights
+//! ([`Rule`]). With `h = dt / tau` the textbook properties are (Hairer &
 //! Wanner, "Solving Ordinary Differential Equations II", chapter IV; Hochbruck & Ostermann, Acta
 //! Numerica 19 (2010) 209-286):
 //!
@@ -28,6 +29,7 @@ mod exponential_first_order;
 mod exponential_left;
 mod implicit_euler;
 mod real;
+mod rule;
 mod runge_kutta;
 mod trapezoid;
 
@@ -38,6 +40,7 @@ pub use exponential_first_order::ExponentialFirstOrder;
 pub use exponential_left::ExponentialLeft;
 pub use implicit_euler::ImplicitEuler;
 pub use real::Real;
+pub use rule::{Rule, Stepped, Weights};
 pub use runge_kutta::RungeKutta;
 pub use trapezoid::Trapezoid;
 
@@ -63,6 +66,30 @@ pub struct Start<R> {
     pub depth: R,
     /// Force in N; `None` for a body relaxed at that depth.
     pub force: Option<R>,
+}
+
+/// Width of the numbers an integrator computes with.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Precision {
+    /// 53 binary digits.
+    F64,
+    /// 24 binary digits.
+    F32,
+}
+
+impl Precision {
+    /// Both.
+    pub const ALL: [Self; 2] = [Self::F64, Self::F32];
+
+    /// Its name.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::F64 => "f64",
+            Self::F32 => "f32",
+        }
+    }
 }
 
 /// The integrators by name.
@@ -198,15 +225,21 @@ impl Scheme {
         self.check(body, dt)?;
         forces.clear();
         match self {
-            Self::ExplicitEuler => run::<R, N, ExplicitEuler<R, N>>(body, dt, depths, forces),
-            Self::ImplicitEuler => run::<R, N, ImplicitEuler<R, N>>(body, dt, depths, forces),
-            Self::Trapezoid => run::<R, N, Trapezoid<R, N>>(body, dt, depths, forces),
-            Self::ExponentialLeft => run::<R, N, ExponentialLeft<R, N>>(body, dt, depths, forces),
+            Self::ExplicitEuler => {
+                run::<R, N, Stepped<R, N, ExplicitEuler>>(body, dt, depths, forces)
+            }
+            Self::ImplicitEuler => {
+                run::<R, N, Stepped<R, N, ImplicitEuler>>(body, dt, depths, forces)
+            }
+            Self::Trapezoid => run::<R, N, Stepped<R, N, Trapezoid>>(body, dt, depths, forces),
+            Self::ExponentialLeft => {
+                run::<R, N, Stepped<R, N, ExponentialLeft>>(body, dt, depths, forces)
+            }
             Self::ExponentialFirstOrder => {
-                run::<R, N, ExponentialFirstOrder<R, N>>(body, dt, depths, forces)
+                run::<R, N, Stepped<R, N, ExponentialFirstOrder>>(body, dt, depths, forces)
             }
             Self::Exact => run::<R, N, Exact<R, N>>(body, dt, depths, forces),
-            Self::RungeKutta => run::<R, N, RungeKutta<R, N>>(body, dt, depths, forces),
+            Self::RungeKutta => run::<R, N, Stepped<R, N, RungeKutta>>(body, dt, depths, forces),
         }
     }
 }

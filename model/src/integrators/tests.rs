@@ -31,13 +31,15 @@ fn one_step<R: Real, const N: usize>(
     }
     let ends = (force, from, to);
     match scheme {
-        Scheme::ExplicitEuler => step::<R, N, ExplicitEuler<R, N>>(body, dt, ends),
-        Scheme::ImplicitEuler => step::<R, N, ImplicitEuler<R, N>>(body, dt, ends),
-        Scheme::Trapezoid => step::<R, N, Trapezoid<R, N>>(body, dt, ends),
-        Scheme::ExponentialLeft => step::<R, N, ExponentialLeft<R, N>>(body, dt, ends),
-        Scheme::ExponentialFirstOrder => step::<R, N, ExponentialFirstOrder<R, N>>(body, dt, ends),
+        Scheme::ExplicitEuler => step::<R, N, Stepped<R, N, ExplicitEuler>>(body, dt, ends),
+        Scheme::ImplicitEuler => step::<R, N, Stepped<R, N, ImplicitEuler>>(body, dt, ends),
+        Scheme::Trapezoid => step::<R, N, Stepped<R, N, Trapezoid>>(body, dt, ends),
+        Scheme::ExponentialLeft => step::<R, N, Stepped<R, N, ExponentialLeft>>(body, dt, ends),
+        Scheme::ExponentialFirstOrder => {
+            step::<R, N, Stepped<R, N, ExponentialFirstOrder>>(body, dt, ends)
+        }
         Scheme::Exact => step::<R, N, Exact<R, N>>(body, dt, ends),
-        Scheme::RungeKutta => step::<R, N, RungeKutta<R, N>>(body, dt, ends),
+        Scheme::RungeKutta => step::<R, N, Stepped<R, N, RungeKutta>>(body, dt, ends),
     }
 }
 

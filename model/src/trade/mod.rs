@@ -14,33 +14,12 @@ pub use check::CurveError;
 pub use machine::{Machine, STALE_DAYS};
 pub use pareto::pareto;
 
-use crate::integrators::Scheme;
+use crate::integrators::{Precision, Scheme};
 use crate::units::Newtons;
 use serde::{Deserialize, Serialize};
 
 /// Version of the stored form; another one is not read.
 pub const TRADE_FORMAT: u32 = 1;
-
-/// Width of the numbers an integrator computes with.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Precision {
-    /// 53 binary digits.
-    F64,
-    /// 24 binary digits.
-    F32,
-}
-
-impl Precision {
-    /// Its name.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::F64 => "f64",
-            Self::F32 => "f32",
-        }
-    }
-}
 
 /// What something cost, and how sure that is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
