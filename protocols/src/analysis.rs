@@ -35,10 +35,26 @@ pub enum Stretch {
     WithUnload,
 }
 
-/// The probe has left the tissue once a force on the way back is below so many standard deviations: from
-/// there on the cell feels nothing, however the tissue goes on recovering. Of white noise about a force
-/// twice as large, one sample in 700 is that low.
+/// The probe has left the tissue once forces on the way back are below so many standard deviations: from
+/// there on the cell feels nothing, however the tissue goes on recovering.
 const LIFT_OFF: f64 = 3.0;
+/// So many of them in a row: about a force twice as large as that, one sample in 700 is that low by its
+/// noise alone, and ten in a row never are.
+const LIFT_OFF_RUN: usize = 10;
+
+/// The first sample, if any, at which the probe has left the tissue on the way back.
+fn lift_off(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
+    let mut lows = 0;
+    let last = phases.iter().zip(samples).position(|(phase, one)| {
+        let is_low = one.is_measured() && one.force.0 < LIFT_OFF * one.sigma.0;
+        lows = match is_low && *phase == Phase::Unload {
+            true => lows + 1,
+            false => 0,
+        };
+        lows == LIFT_OFF_RUN
+    })?;
+    Some(last + 1 - LIFT_OFF_RUN)
+}
 
 /// Nothing to fit could be read.
 #[derive(Debug, Error)]
@@ -133,16 +149,15 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
     let trusted = trusted_samples(&decisions);
     let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
-    let (mut first_tick, mut is_lifted_off) = (None, false);
-    let samples: Vec<FitSample> = rows
+    let (mut first_tick, mut phases) = (None, Vec::new());
+    let mut samples: Vec<FitSample> = rows
         .filter(|(_, row)| is_fitted(row, stretch))
         .filter_map(|(index, row)| {
             let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
             let first_tick = *first_tick.get_or_insert(row.tick);
-            let sigma = curve.force_sigma(force, noise);
-            is_lifted_off |= row.phase == Phase::Unload && force.0 < LIFT_OFF * sigma.0;
-            let sigma = if is_known(index, row) && !is_lifted_off {
-                sigma
+            phases.push(row.phase);
+            let sigma = if is_known(index, row) {
+                curve.force_sigma(force, noise)
             } else {
                 Newtons(f64::INFINITY)
             };
@@ -154,6 +169,11 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
             })
         })
         .collect();
+    if let Some(from) = lift_off(&phases, &samples) {
+        for sample in &mut samples[from..] {
+            sample.sigma = Newtons(f64::INFINITY);
+        }
+    }
     if samples.is_empty() {
         Err(SourceError::Empty)
     } else {
@@ -274,6 +294,29 @@ mod tests {
             let moved = (one.value - other.value).abs();
             assert!(moved <= error, "{}: {moved} of {error}", one.name);
         }
+    }
+
+    #[test]
+    fn one_low_force_is_no_lift_off_and_ten_in_a_row_are() {
+        let samples = |forces: &[f64]| -> Vec<FitSample> {
+            let sample = |&force: &f64| FitSample {
+                t: Seconds(0.0),
+                depth: Depth(1.0),
+                force: Newtons(force),
+                sigma: Newtons(0.01),
+            };
+            forces.iter().map(sample).collect()
+        };
+        // Nine low ones in a row again and again, then ten.
+        let mut forces: Vec<f64> = (0..100)
+            .map(|i| if i % 10 == 0 { 0.08 } else { 0.02 })
+            .collect();
+        let found = |forces: &[f64], phase| lift_off(&vec![phase; forces.len()], &samples(forces));
+        assert_eq!(found(&forces, Phase::Unload), None);
+        forces.push(0.01);
+        assert_eq!(found(&forces, Phase::Unload), Some(91));
+        // On the way in they come before contact.
+        assert_eq!(found(&forces, Phase::Ramp), None);
     }
 
     #[test]
