@@ -100,7 +100,8 @@ pub fn trade_files(library: &Path) -> Vec<PathBuf> {
     files
 }
 
-/// Stores curves in place of those of their kind, full or quick, that the machine had. The file is whole whenever it is there.
+/// Stores curves in place of those of their kind, full or quick, that the machine had. The file is whole
+/// whenever it is there.
 pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, TradeFileError> {
     let path = match curves.quick {
         true => quick_trade_file(library, &curves.machine),

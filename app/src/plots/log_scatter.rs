@@ -6,6 +6,7 @@ use eframe::egui::{Ui, vec2};
 use egui_plot::{
     GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points,
 };
+use palpate_model::trade::front;
 
 /// One point.
 #[derive(Clone, Debug)]
@@ -50,7 +51,10 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
     };
     let all = of(&mut (0..scatter.marks.len()));
     let front = match scatter.has_front {
-        true => of(&mut front(scatter.marks).into_iter()),
+        true => {
+            let places: Vec<[f64; 2]> = scatter.marks.iter().map(|mark| mark.at).collect();
+            of(&mut front(&places).into_iter())
+        }
         false => Vec::new(),
     };
     let chosen = of(&mut scatter.chosen.into_iter());
@@ -97,22 +101,6 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
                 .allow_hover(false),
         );
     });
-}
-
-/// Points that no other undercuts in both, by cost.
-fn front(marks: &[Mark]) -> Vec<usize> {
-    let mut order: Vec<usize> = (0..marks.len()).collect();
-    order.sort_by(|&a, &b| {
-        let ([ax, ay], [bx, by]) = (marks[a].at, marks[b].at);
-        ax.total_cmp(&bx).then(ay.total_cmp(&by))
-    });
-    let mut least = f64::INFINITY;
-    order.retain(|&index| {
-        let is_lower = marks[index].at[1] < least;
-        least = least.min(marks[index].at[1]);
-        is_lower
-    });
-    order
 }
 
 /// Marks at powers of ten, as many as there is room for.
@@ -181,21 +169,5 @@ mod tests {
     #[test]
     fn nothing_is_drawn_at_infinity() {
         assert!(place([0.0, -1.0]).x.is_finite() && place([0.0, -1.0]).y.is_finite());
-    }
-
-    #[test]
-    fn the_front_holds_what_nothing_undercuts() {
-        let mark = |x: f64, y: f64| Mark {
-            at: [x, y],
-            name: String::new(),
-        };
-        let marks = [
-            mark(4.0, 1.0),
-            mark(1.0, 9.0),
-            mark(2.0, 9.5),
-            mark(3.0, 2.0),
-            mark(4.0, 0.5),
-        ];
-        assert_eq!(front(&marks), [1, 3, 4]);
     }
 }

@@ -1,5 +1,6 @@
 //! The extremes as people read them: a summary by group, and the page with all tables.
 
+use super::text::capital;
 use palpate_model::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
@@ -134,14 +135,6 @@ samples and 24 h at 1 kHz, are put to the exact step; families take 1e7 samples,
 terms 1e6, and all of them all with `palpate extremes --soak`.
 
 ";
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters
-        .next()
-        .map(|letter| letter.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
-}
 
 /// What became of several rows in one short cell: the worst error, or the worst verdict.
 fn cell(rows: &[&Row]) -> String {

@@ -145,7 +145,7 @@ pub(super) fn sentence_lines(svg: &mut Svg, mut y: f64, ink: Ink, sentence: &str
 }
 
 /// Words in lines of at most `letters`; a longer word stands alone.
-fn wrap(text: &str, letters: usize) -> Vec<String> {
+pub(super) fn wrap(text: &str, letters: usize) -> Vec<String> {
     let mut lines: Vec<String> = Vec::new();
     for word in text.split_whitespace() {
         match lines.last_mut() {

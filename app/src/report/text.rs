@@ -95,6 +95,16 @@ pub fn parameter_lines(parameters: &[Parameter]) -> Vec<String> {
     texts.iter().map(line).collect()
 }
 
+/// A text with its first letter large.
+#[must_use]
+pub fn capital(text: &str) -> String {
+    let mut letters = text.chars();
+    let first = letters
+        .next()
+        .map(|letter| letter.to_uppercase().to_string());
+    first.unwrap_or_default() + letters.as_str()
+}
+
 /// Cells in columns as wide as their widest; a sentence at the end of a short line widens none.
 #[must_use]
 pub fn in_columns(lines: &[Vec<String>]) -> String {

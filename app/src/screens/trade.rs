@@ -3,6 +3,7 @@
 
 use crate::command::{Command, Commands};
 use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
+use crate::report::text::capital;
 use crate::theme::Tokens;
 use crate::trade::text::{advice, digits, percent, plain, terms, time};
 use crate::trade::{self, Extent};
@@ -284,14 +285,6 @@ fn in_range(value: f64, high: f64) -> Result<(), String> {
     } else {
         Err(format!("must be above 0 and at most {high}"))
     }
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    let first = letters
-        .next()
-        .map(|letter| letter.to_uppercase().to_string());
-    first.unwrap_or_default() + letters.as_str()
 }
 
 fn doubts(curves: &TradeCurves) -> Vec<String> {

@@ -12,7 +12,7 @@ mod pareto;
 pub use advice::{Advice, Choice, Recommendation};
 pub use check::CurveError;
 pub use machine::{Machine, STALE_DAYS};
-pub use pareto::pareto;
+pub use pareto::{front, pareto};
 
 use crate::integrators::{Precision, Scheme};
 use crate::units::Newtons;

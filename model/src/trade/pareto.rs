@@ -19,3 +19,28 @@ pub fn pareto(points: &[(Option<f64>, f64)]) -> Vec<bool> {
         .map(|&(error, cost)| error.is_some_and(|error| !is_beaten(error, cost)))
         .collect()
 }
+
+/// The front of points of `[cost, error]`: indices of those that nothing beats, the cheapest first.
+#[must_use]
+pub fn front(points: &[[f64; 2]]) -> Vec<usize> {
+    let pairs: Vec<(Option<f64>, f64)> = points
+        .iter()
+        .map(|&[cost, error]| (Some(error), cost))
+        .collect();
+    let on_front = pareto(&pairs);
+    let mut front: Vec<usize> = (0..points.len()).filter(|&index| on_front[index]).collect();
+    front.sort_by(|&a, &b| points[a][0].total_cmp(&points[b][0]));
+    front
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_begins_with_the_cheapest() {
+        let points = [[4.0, 1.0], [1.0, 9.0], [2.0, 9.5], [3.0, 2.0], [4.0, 0.5]];
+        assert_eq!(front(&points), [1, 3, 4]);
+        assert!(front(&[]).is_empty());
+    }
+}
