@@ -121,9 +121,8 @@ every fit is put to the same cases, and each row is
 
 * **right**: the error is within the tolerance. For a force it is relative to the largest force of
   the path, against a reference in 75 digits or more; for the exact step and the families the
-  tolerance is 1e-13 and in single precision 3e-6. Of an approximate integrator no more is asked than
-  that its force stays a number of the order of the true one (its rows have tolerances up to 2, twice
-  the largest force): how exact it is, the trade says. For a fit of a record without noise it is that of the worst
+  tolerance is 1e-13 and in single precision 3e-6. An approximate integrator is held to the same against its
+  own textbook step in as many digits: how near that step is to the exact force, the trade says. For a fit of a record without noise it is that of the worst
   parameter, tolerance 1e-6 (1e-3 with an offset of a million times the signal, or times since 1970).
 * **refused**: no number, and one sentence that names the reason and what to do.
 * **flagged**: numbers of a fit with a warning not to rely on them.

@@ -1,7 +1,7 @@
 //! What right means.
 
-use crate::families::Relaxation;
-use crate::reference::{REFERENCE_DIGITS, Reference};
+use crate::families::{Relaxation, StepError};
+use crate::reference::{REFERENCE_DIGITS, Reference, RuleReference};
 use crate::units::{Depth, Newtons, Seconds};
 use serde::Serialize;
 
@@ -160,6 +160,12 @@ pub trait Subject {
     /// The force in N after every step of a path, or a refusal.
     fn forces(&self, path: &PathCase) -> Result<Vec<f64>, String>;
 
+    /// What it should give from rest at `start`, in so many digits.
+    fn oracle(&self, start: Depth, digits: usize) -> Result<Oracle, String> {
+        let exact = Reference::with_digits(&self.terms()?, start, digits);
+        exact.map(Oracle::Exact).map_err(|err| err.to_string())
+    }
+
     /// Largest error allowed, relative to the peak force of the path.
     fn tolerance(&self, _path: &PathCase) -> f64 {
         TOLERANCE
@@ -168,6 +174,38 @@ pub trait Subject {
     /// Why it may refuse this path although there is an answer, such as a limit of stability.
     fn may_refuse(&self, _path: &PathCase) -> bool {
         false
+    }
+}
+
+/// Forces in many digits.
+#[derive(Clone, Debug)]
+pub enum Oracle {
+    /// The exact response.
+    Exact(Reference),
+    /// What an approximate rule makes of it.
+    Rule(RuleReference),
+}
+
+impl Oracle {
+    fn step(&mut self, depth: Depth, dt: Seconds) -> Result<Newtons, StepError> {
+        match self {
+            Self::Exact(reference) => reference.step(depth, dt),
+            Self::Rule(reference) => reference.step(depth, dt),
+        }
+    }
+
+    fn force(&self) -> Newtons {
+        match self {
+            Self::Exact(reference) => reference.force(),
+            Self::Rule(reference) => reference.force(),
+        }
+    }
+
+    fn error_of(&self, force: Newtons) -> f64 {
+        match self {
+            Self::Exact(reference) => reference.error_of(force),
+            Self::Rule(reference) => reference.error_of(force),
+        }
     }
 }
 
@@ -234,9 +272,7 @@ impl PathCase {
     /// The exact force, as far as forces are given compared with them.
     fn truth(&self, subject: &dyn Subject, forces: &[f64]) -> Result<Truth, String> {
         let terms = subject.terms()?;
-        let words = |err: &dyn std::fmt::Display| err.to_string();
-        let mut reference = Reference::with_digits(&terms, Depth(self.start), self.digits(&terms))
-            .map_err(|err| words(&err))?;
+        let mut reference = subject.oracle(Depth(self.start), self.digits(&terms))?;
         let mut truth = Truth {
             peak: reference.force().0.abs(),
             error: if forces.is_empty() || forces.len() == self.steps.len() {
@@ -248,7 +284,7 @@ impl PathCase {
         for (index, &(dt, depth)) in self.steps.iter().enumerate() {
             let exact = reference
                 .step(Depth(depth), Seconds(dt))
-                .map_err(|err| words(&err))?;
+                .map_err(|err| err.to_string())?;
             truth.peak = truth.peak.max(exact.0.abs());
             if let Some(&force) = forces.get(index) {
                 let miss = reference.error_of(Newtons(force)).abs();

@@ -19,7 +19,7 @@ mod scale;
 mod subjects;
 mod tau_step;
 
-pub use judge::{Answer, Expected, PathCase, Row, Subject, TOLERANCE, Verdict, judge};
+pub use judge::{Answer, Expected, Oracle, PathCase, Row, Subject, TOLERANCE, Verdict, judge};
 pub use members::member;
 pub use subjects::{FamilyBody, SchemeBody};
 

@@ -1,8 +1,9 @@
 //! What is put to the paths: the exact step of every family, and every integrator.
 
-use super::judge::{PathCase, Subject, TOLERANCE};
+use super::judge::{Oracle, PathCase, Subject, TOLERANCE};
 use crate::families::{Model, Relaxation};
 use crate::integrators::{Precision, Real, Scheme, SeriesBody};
+use crate::reference::{Reference, RuleReference};
 use crate::units::{Depth, Seconds};
 
 /// A member of a family, stepped by its own exact step.
@@ -79,20 +80,21 @@ impl Subject for SchemeBody {
         }
     }
 
-    /// Rounding, and for all but the exact step what its order says of a path of so many samples.
-    fn tolerance(&self, path: &PathCase) -> f64 {
-        let rounding = match self.precision {
+    /// The exact response, or what the rule's textbook makes of it.
+    fn oracle(&self, start: Depth, digits: usize) -> Result<Oracle, String> {
+        if let Some(rule) = RuleReference::new(self.scheme, &self.body, start, digits) {
+            return Ok(Oracle::Rule(rule));
+        }
+        let exact = Reference::with_digits(&self.terms()?, start, digits);
+        exact.map(Oracle::Exact).map_err(|err| err.to_string())
+    }
+
+    /// Rounding.
+    fn tolerance(&self, _path: &PathCase) -> f64 {
+        match self.precision {
             Precision::F32 => TOLERANCE_SINGLE,
             Precision::F64 => TOLERANCE,
-        };
-        let Some(order) = self.scheme.order() else {
-            return rounding;
-        };
-        let h = path.steps.first().map_or(0.0, |step| step.0) / self.body.tau_eps;
-        let samples = path.steps.len() as f64;
-        // The path bends every few samples and the force every h: each counts to the order's power.
-        let order = order.min(2) as i32;
-        (10.0 / samples.powi(order) + 2.0 * h.powi(order)).min(2.0) + rounding
+        }
     }
 
     /// Beyond its limit of stability.

@@ -52,7 +52,7 @@ use thiserror::Error;
 
 /// One way to step a body of `N` elastic terms in precision `R`, `dt` apart.
 pub trait Integrator<R: Real, const N: usize>: Sized {
-    /// With its coefficients ready, even where it would be unstable; [`Scheme::start`] refuses that.
+    /// With its coefficients ready, even where it would be unstable; [`Scheme::check`] refuses that.
     fn at_any_step(body: &SeriesBody<N>, dt: f64, start: Start<R>) -> Self;
 
     /// Moves to `depth` mm in the step's time and returns the force in N. On an error nothing moved.

@@ -7,11 +7,13 @@
 
 mod digits;
 mod psi;
+mod rule;
 
 use crate::families::{Drive, POWER_MAX, Relaxation, StepError};
 use crate::units::{Depth, Newtons, Seconds};
 use digits::{Big, Digits, is_negative, is_zero, nearest};
 use psi::Weights;
+pub use rule::RuleReference;
 use thiserror::Error;
 
 /// Decimal digits carried unless asked otherwise: fifty that count, and a guard for the cancellation of

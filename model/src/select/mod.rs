@@ -1,9 +1,9 @@
 //! How much model do records need: families compared, the cheapest one within a tolerance.
 //!
 //! Start at [`select()`]. Every family is fitted to all records together and judged in three ways: by
-//! information criteria on the effective number of samples ([`criteria`]), by how it predicts what its
-//! fit has not seen ([`hold_out`]), and by what one evaluation costs ([`cost`]). [`verdict`] makes a
-//! choice of it, or says that none is deserved; [`ladder`] says what each extra term buys.
+//! information criteria on the effective number of samples (`criteria`), by how it predicts what its
+//! fit has not seen (`hold_out`), and by what one evaluation costs (`cost`). `verdict` makes a
+//! choice of it, or says that none is deserved; `ladder` says what each extra term buys.
 
 mod cost;
 mod criteria;

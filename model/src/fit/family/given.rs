@@ -10,7 +10,7 @@ use crate::families::{Family, Model, ModelError};
 /// must not be negative not below zero. Neither offset nor initial force.
 ///
 /// This is how a generalised Maxwell body is fitted whose relaxation times were laid down beforehand, one
-/// to a decade. Errors as [`fit_family`].
+/// to a decade. Errors as [`fit_family`](super::fit_family).
 pub fn fit_family_at(
     family: &dyn Family,
     outer: &[f64],
