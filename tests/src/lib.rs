@@ -1,6 +1,7 @@
 //! Fixtures shared by the tests that cross crates.
 
 pub mod flow;
+pub mod recorded;
 pub mod simulated;
 
 use std::path::{Path, PathBuf};

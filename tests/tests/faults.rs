@@ -1,64 +1,30 @@
 //! Whatever fails, the run ends with its reason, the axis stopped and the session closed.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
-use palpate_drivers::Rig;
 use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Limits};
+use palpate_model::rig::AxisStatus;
 use palpate_model::units::{Depth, MmPerS, Seconds, Volts};
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::replay::replay;
-use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
 use palpate_sessions::Session;
-use std::path::Path;
-use std::sync::mpsc::sync_channel;
+use palpate_tests::recorded;
 
-fn request(rig: &SimRig, out: &Path) -> RunRequest {
-    let params = RampHold {
+fn params() -> RampHold {
+    RampHold {
         speed: MmPerS(3.0),
         depth: Depth(12.0),
         hold: Seconds(2.0),
         ..RampHold::default()
-    };
-    RunRequest {
-        plan: params.plan(),
-        calibration: rig.calibration(),
-        limits: Limits::for_travel(rig.description().travel),
-        out: Some(out.to_path_buf()),
-        labels: Labels::default(),
-        is_acknowledged: false,
-        after_stop: AfterStop::Close,
     }
 }
 
 /// Runs with one scripted fault and returns the session.
 fn run_with(kind: FaultKind, at: Nanos) -> Session {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("session");
     let rig = SimRig::new(SimSettings::default());
-    let request = request(&rig, &out);
+    let calibration = rig.calibration();
     let faulty = FaultyRig::new(rig, vec![ScriptedFault::from(at, kind)], 5);
-    let (reply, answer) = sync_channel(1);
-    let (wake, woken) = sync_channel(1);
-    let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(Box::new(faulty), TimeScale::Max, Some(first), move || {
-        let _ = wake.try_send(());
-    })
-    .unwrap();
-    answer.recv().unwrap().unwrap();
-    while runner
-        .snapshot()
-        .run
-        .as_ref()
-        .is_none_or(|run| run.outcome.is_none())
-    {
-        woken
-            .recv_timeout(std::time::Duration::from_secs(60))
-            .expect("the run does not end");
-    }
-    drop(runner);
-    Session::open(&out).unwrap()
+    recorded::session(Box::new(faulty), calibration, params())
 }
 
 /// Half a minute into the run the probe is in the contact search, most of the time moving.

@@ -1,23 +1,19 @@
 //! A hold that ends when the live fit knows enough: through the runner, and again in replay.
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
-use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::fit::{FitOptions, LiveFit, fit};
-use palpate_model::rig::{Limits, Phase};
+use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Seconds};
-use palpate_protocols::engine::{EndingKind, Record};
+use palpate_protocols::engine::Record;
 use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_protocols::replay::replay;
-use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
 use palpate_sessions::{EntryKind, Session};
+use palpate_tests::recorded;
 use serde_json::json;
-use std::sync::mpsc::sync_channel;
 
 /// A run with a rule for tau, up to 20 s of hold, and its session.
 fn run_until(relative: f64) -> Session {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("session");
     let rig = SimRig::new(SimSettings::default());
     let params = RampHold {
         speed: MmPerS(3.0),
@@ -26,35 +22,10 @@ fn run_until(relative: f64) -> Session {
         until: Some(HoldUntil::new(BodyParameter::TauEps, relative)),
         ..RampHold::default()
     };
-    let request = RunRequest {
-        plan: params.plan(),
-        calibration: rig.calibration(),
-        limits: Limits::for_travel(rig.description().travel),
-        out: Some(out.clone()),
-        labels: Labels::default(),
-        is_acknowledged: false,
-        after_stop: AfterStop::Close,
-    };
-    let (reply, answer) = sync_channel(1);
-    let (wake, woken) = sync_channel(1);
-    let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(Box::new(rig), TimeScale::Max, Some(first), move || {
-        let _ = wake.try_send(());
-    })
-    .unwrap();
-    answer.recv().unwrap().unwrap();
-    loop {
-        let snapshot = runner.snapshot();
-        if let Some(outcome) = snapshot.run.as_ref().and_then(|run| run.outcome.as_ref()) {
-            assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
-            break;
-        }
-        woken
-            .recv_timeout(std::time::Duration::from_secs(60))
-            .expect("the run does not end");
-    }
-    drop(runner);
-    Session::open(&out).unwrap()
+    let calibration = rig.calibration();
+    let session = recorded::session(Box::new(rig), calibration, params);
+    assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
+    session
 }
 
 fn held_secs(session: &Session) -> f64 {

@@ -1,26 +1,20 @@
 //! Unloading: what the fitted law says of tissue whose own law is another one, and of real tissue.
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
-use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, SimSoftening};
 use palpate_model::families::{Model, by_key};
 use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
-use palpate_model::rig::{Limits, Phase};
+use palpate_model::rig::Phase;
 use palpate_model::signal::work;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::analysis::{Stretch, read_stretch, samples_of};
-use palpate_protocols::engine::EndingKind;
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::replay::replay;
-use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
 use palpate_sessions::Session;
-use palpate_tests::workspace;
-use std::sync::mpsc::sync_channel;
+use palpate_tests::{recorded, workspace};
 
 /// A load-hold-unload of the specimen of seed 7, which loses up to 40 % of its elastic force.
 fn run(speed: f64, depth: f64, unload: f64) -> Session {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("session");
     let rig = SimRig::new(SimSettings {
         profile: SimProfile::Ideal,
         seed: 7,
@@ -34,35 +28,10 @@ fn run(speed: f64, depth: f64, unload: f64) -> Session {
         unload: Some(MmPerS(unload)),
         ..RampHold::default()
     };
-    let request = RunRequest {
-        plan: params.plan(),
-        calibration: rig.calibration(),
-        limits: Limits::for_travel(rig.description().travel),
-        out: Some(out.clone()),
-        labels: Labels::default(),
-        is_acknowledged: false,
-        after_stop: AfterStop::Close,
-    };
-    let (reply, answer) = sync_channel(1);
-    let (wake, woken) = sync_channel(1);
-    let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(Box::new(rig), TimeScale::Max, Some(first), move || {
-        let _ = wake.try_send(());
-    })
-    .unwrap();
-    answer.recv().unwrap().unwrap();
-    loop {
-        let snapshot = runner.snapshot();
-        if let Some(outcome) = snapshot.run.as_ref().and_then(|run| run.outcome.as_ref()) {
-            assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
-            break;
-        }
-        woken
-            .recv_timeout(std::time::Duration::from_secs(60))
-            .expect("the run does not end");
-    }
-    drop(runner);
-    Session::open(&out).unwrap()
+    let calibration = rig.calibration();
+    let session = recorded::session(Box::new(rig), calibration, params);
+    assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
+    session
 }
 
 /// Index from which the probe comes back.

@@ -1,6 +1,7 @@
 //! Whether curves can be what was measured.
 
 use super::{Cost, TRADE_FORMAT, TradeCurves};
+use crate::integrators::Precision;
 use thiserror::Error;
 
 /// Curves that are none.
@@ -50,6 +51,17 @@ const AGREE: f64 = 1e-6;
 const AGREE_FITTED: f64 = 1e-4;
 /// Errors of so small a share of the force are its last digits, and come out differently elsewhere.
 const LAST_DIGITS: f64 = 1e-12;
+/// The same in f32: sixteen last digits of the force, of which an order of additions changes one or two.
+const LAST_DIGITS_F32: f64 = 1e-6;
+
+/// Share of the force below which an error in this precision is rounding.
+#[must_use]
+pub const fn last_digits(precision: Precision) -> f64 {
+    match precision {
+        Precision::F64 => LAST_DIGITS,
+        Precision::F32 => LAST_DIGITS_F32,
+    }
+}
 
 impl TradeCurves {
     /// The curves themselves if they can have been measured: right format, possible numbers, no
@@ -110,8 +122,8 @@ impl TradeCurves {
 
     /// Whether the errors are those of `now`, computed afresh for the same rows.
     pub fn agrees_with(&self, now: &Self) -> Result<(), CurveError> {
-        let within = |share: f64, what: &str, stored: f64, found: f64, size: f64| {
-            let allowed = share * stored.max(found) + LAST_DIGITS * size;
+        let within = |share: f64, what: &str, stored: f64, found: f64, rounding: f64| {
+            let allowed = share * stored.max(found) + rounding;
             let what = what.to_owned();
             ((stored - found).abs() <= allowed)
                 .then_some(())
@@ -121,17 +133,19 @@ impl TradeCurves {
                     found,
                 })
         };
-        let same = |what: &str, stored, found, size| within(AGREE, what, stored, found, size);
-        let alike =
-            |what: &str, stored, found, size| within(AGREE_FITTED, what, stored, found, size);
+        let same =
+            |what: &str, stored, found, rounding| within(AGREE, what, stored, found, rounding);
+        let alike = |what: &str, stored, found, size| {
+            within(AGREE_FITTED, what, stored, found, LAST_DIGITS * size)
+        };
         let peak = self.peak;
         same(
             "the ramp and hold",
             peak.ramp_hold_n,
             now.peak.ramp_hold_n,
-            1.0,
+            LAST_DIGITS,
         )?;
-        same("the poke", peak.poke_n, now.peak.poke_n, 1.0)?;
+        same("the poke", peak.poke_n, now.peak.poke_n, LAST_DIGITS)?;
         for row in &now.integrators {
             let name = format!(
                 "{} at {} s in {}",
@@ -147,13 +161,14 @@ impl TradeCurves {
                 (None, _) => return Err(CurveError::Missing(name)),
                 (Some(None), None) => {}
                 (Some(Some(stored)), Some(found)) => {
+                    let share = last_digits(row.precision);
                     same(
                         &name,
                         stored.ramp_hold_n,
                         found.ramp_hold_n,
-                        peak.ramp_hold_n,
+                        share * peak.ramp_hold_n,
                     )?;
-                    same(&name, stored.poke_n, found.poke_n, peak.poke_n)?;
+                    same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
                 }
                 (Some(_), _) => return Err(CurveError::Contradiction(name)),
             }
@@ -165,7 +180,7 @@ impl TradeCurves {
                 .find(|stored| (&stored.family, &stored.target) == (&row.family, &row.target));
             let name = format!("{} for {}", row.family, row.target);
             let stored = stored.ok_or_else(|| CurveError::Missing(name.clone()))?;
-            same(&name, stored.peak_n, row.peak_n, 1.0)?;
+            same(&name, stored.peak_n, row.peak_n, LAST_DIGITS)?;
             alike(&name, stored.error_n, row.error_n, row.peak_n)?;
         }
         for row in &now.fit {

@@ -10,7 +10,7 @@ mod machine;
 mod pareto;
 
 pub use advice::{Advice, Choice, Recommendation};
-pub use check::CurveError;
+pub use check::{CurveError, last_digits};
 pub use machine::{Machine, STALE_DAYS};
 pub use pareto::{front, pareto};
 

@@ -1,0 +1,52 @@
+//! A ramp and hold through the runner, as a session read back from disk.
+
+use palpate_drivers::Rig;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::Limits;
+use palpate_protocols::plans::RampHold;
+use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
+use palpate_sessions::Session;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+
+/// Runs as fast as the computer can until the run has ended, however it ended.
+///
+/// # Panics
+/// If the run is not started or says nothing for a minute.
+#[must_use]
+pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let request = RunRequest {
+        plan: params.plan(),
+        calibration,
+        limits: Limits::for_travel(rig.description().travel),
+        out: Some(out.clone()),
+        labels: Labels::default(),
+        is_acknowledged: false,
+        after_stop: AfterStop::Close,
+    };
+    let (reply, answer) = sync_channel(1);
+    let (wake, woken) = sync_channel(1);
+    let first = Request::Run(Box::new(request), reply);
+    let runner = Runner::start(rig, TimeScale::Max, Some(first), move || {
+        let _ = wake.try_send(());
+    })
+    .expect("a runner");
+    let started = answer.recv().expect("an answer");
+    started.expect("a start");
+    let has_ended = |runner: &Runner| {
+        let snapshot = runner.snapshot();
+        snapshot
+            .run
+            .as_ref()
+            .is_some_and(|run| run.outcome.is_some())
+    };
+    while !has_ended(&runner) {
+        woken
+            .recv_timeout(Duration::from_secs(60))
+            .expect("the run does not end");
+    }
+    drop(runner);
+    Session::open(&out).expect("the session")
+}
