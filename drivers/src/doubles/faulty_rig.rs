@@ -3,7 +3,7 @@
 use super::script::{FaultKind, Rail, ScriptedFault};
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use crate::sim::{Cause, Random, counts_from_volts, volts_from_counts};
-use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{AxisStatus, Fault, HandAction, Reading, RigCommand, RigDescription};
 use palpate_model::{Nanos, Volts};
 use std::collections::VecDeque;
 
@@ -333,5 +333,9 @@ impl<R: Rig> Rig for FaultyRig<R> {
 
     fn is_virtual(&self) -> bool {
         self.inner.is_virtual()
+    }
+
+    fn by_hand(&mut self, action: HandAction) {
+        self.inner.by_hand(action);
     }
 }

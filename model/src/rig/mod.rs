@@ -3,6 +3,7 @@
 pub mod command;
 pub mod description;
 pub mod event;
+pub mod hand;
 pub mod limits;
 pub mod path;
 pub mod phase;
@@ -12,6 +13,7 @@ pub mod reading;
 pub use command::{MoveTo, RigCommand};
 pub use description::{AdcDescription, RigDescription};
 pub use event::{Ack, Fault};
+pub use hand::HandAction;
 pub use limits::Limits;
 pub use path::{PathError, PathTracker};
 pub use phase::Phase;
