@@ -4,7 +4,7 @@ use super::Failure;
 use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
-use palpate_drivers::sim::{SimClock, SimProfile, SimSettings, SimSoftening};
+use palpate_drivers::sim::{SimClock, SimPreconditioning, SimProfile, SimSettings, SimSoftening};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
@@ -28,6 +28,9 @@ pub struct RigArgs {
     /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
+    /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
+    #[arg(long, default_value = "0", value_name = "PERCENT")]
+    pub preconditioning: SimPreconditioning,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -41,6 +44,7 @@ impl Default for RigArgs {
             seed: 1,
             clock: SimClock::Nominal,
             softening: SimSoftening::default(),
+            preconditioning: SimPreconditioning::default(),
             time_scale: TimeScale::Factor(1.0),
         }
     }
@@ -55,6 +59,7 @@ impl RigArgs {
             seed: self.seed,
             clock: self.clock,
             softening: self.softening,
+            preconditioning: self.preconditioning,
         }
     }
 }

@@ -8,6 +8,7 @@
 
 mod clock;
 mod load_cell;
+mod preconditioning;
 mod random;
 mod settings;
 mod slider;
@@ -15,6 +16,7 @@ mod tissue;
 
 pub use load_cell::calibration;
 pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
+pub use preconditioning::SimPreconditioning;
 pub(crate) use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
 
@@ -52,7 +54,7 @@ pub struct Truth {
     pub tick: u64,
     /// Probe, in mm from the edge of the home switch.
     pub position: Position,
-    /// Tissue surface, in mm from the edge of the home switch.
+    /// Tissue surface, in mm from the edge of the home switch; loading may move it.
     pub surface: Position,
     /// Where the pulse counter reads zero, in mm from the edge of the home switch.
     pub counter_zero: Position,
@@ -113,7 +115,7 @@ impl SimRig {
         let mut machine = Random::new(settings.seed, Cause::Machine);
         let slider = Slider::new(&description, &mut machine);
         let mut specimen = Random::new(settings.seed, Cause::Tissue);
-        let tissue = Tissue::new(&mut specimen, settings.softening);
+        let tissue = Tissue::new(&mut specimen, &settings);
         // The controller was switched on up to a minute and a half before the host looked.
         let tick_count = machine.between(1.0, 1e5) as u64;
         let truth = Truth {
@@ -184,6 +186,7 @@ impl SimRig {
         self.truth = Truth {
             tick,
             position: axis.position,
+            surface: self.tissue.surface(),
             counter_zero: self.slider.counter_zero(),
             force: self.tissue.force(),
             ..self.truth

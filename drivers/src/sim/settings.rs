@@ -1,5 +1,6 @@
 //! What makes one simulated rig differ from another; with these three values it can be rebuilt.
 
+use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -69,6 +70,8 @@ pub struct SimSettings {
     pub clock: SimClock,
     /// What the tissue loses by having been deeper.
     pub softening: SimSoftening,
+    /// How far loading moves the tissue's surface.
+    pub preconditioning: SimPreconditioning,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -84,7 +87,7 @@ pub struct SimSettingError {
 }
 
 impl SimSettingError {
-    fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
+    pub(super) fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
         Self {
             setting,
             value: value.to_owned(),
@@ -94,8 +97,8 @@ impl SimSettingError {
 }
 
 impl SimSettings {
-    /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where the
-    /// tissue softens, `softening` in percent.
+    /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
+    /// are not the usual ones, `softening` and `preconditioning` in percent.
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
@@ -103,9 +106,11 @@ impl SimSettings {
             ("seed".to_owned(), self.seed.to_string()),
             ("clock".to_owned(), self.clock.to_string()),
         ]);
-        if self.softening != SimSoftening::default() {
-            map.insert("softening".to_owned(), self.softening.to_string());
-        }
+        let unusual = [
+            unusual("softening", self.softening),
+            unusual("preconditioning", self.preconditioning),
+        ];
+        map.extend(unusual.into_iter().flatten());
         map
     }
 
@@ -119,12 +124,26 @@ impl SimSettings {
                 .parse()
                 .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
             clock: text("clock").parse()?,
-            softening: match map.get("softening") {
-                Some(text) => text.parse()?,
-                None => SimSoftening::default(),
-            },
+            softening: usual_or(map, "softening")?,
+            preconditioning: usual_or(map, "preconditioning")?,
         })
     }
+}
+
+/// A setting with its name, unless it is the usual one: rigs are described as they always were.
+fn unusual<T: Default + PartialEq + fmt::Display>(
+    name: &str,
+    value: T,
+) -> Option<(String, String)> {
+    (value != T::default()).then(|| (name.to_owned(), value.to_string()))
+}
+
+/// A setting by its name, the usual one where it is not given.
+fn usual_or<T: Default + FromStr<Err = SimSettingError>>(
+    map: &BTreeMap<String, String>,
+    name: &str,
+) -> Result<T, SimSettingError> {
+    map.get(name).map_or(Ok(T::default()), |text| text.parse())
 }
 
 impl fmt::Display for SimProfile {
@@ -195,11 +214,13 @@ mod tests {
                         seed: u64::MAX - 3,
                         clock,
                         softening: SimSoftening::percent(percent).unwrap(),
+                        preconditioning: SimPreconditioning::percent(percent / 4).unwrap(),
                     };
                     let map = settings.to_map();
                     assert_eq!(SimSettings::from_map(&map), Ok(settings));
                     // Rigs whose tissue does not soften are described as they always were.
                     assert_eq!(map.contains_key("softening"), percent > 0);
+                    assert_eq!(map.contains_key("preconditioning"), percent > 0);
                 }
             }
         }
@@ -214,6 +235,11 @@ mod tests {
         );
         let err = "91".parse::<SimSoftening>().unwrap_err();
         assert!(err.to_string().contains("give 0 to 90"));
+        let err = "31".parse::<SimPreconditioning>().unwrap_err();
+        assert!(
+            err.to_string()
+                .contains("preconditioning cannot be '31'; give 0 to 30")
+        );
         let mut map = SimSettings::default().to_map();
         map.insert("seed".to_owned(), "-1".to_owned());
         assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");
