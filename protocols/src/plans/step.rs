@@ -1,7 +1,7 @@
 //! What a plan can ask for, one variant a step.
 
 use super::{HoldRate, HoldUntil};
-use palpate_model::rig::Phase;
+use palpate_model::rig::{HandAction, Phase};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 
@@ -143,6 +143,9 @@ pub struct Prompt {
     /// What follows without one.
     #[serde(default)]
     pub on_timeout: OnTimeout,
+    /// What is done by hand before the answer: a simulated rig does it then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<HandAction>,
 }
 
 /// What follows a question that nobody answered.
