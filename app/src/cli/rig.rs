@@ -5,8 +5,8 @@ use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
-    SimClock, SimCompliance, SimNoise, SimProfile, SimSettings, SimSoftening, SimStiffness,
-    SimThickness,
+    SimClock, SimCompliance, SimNoise, SimPreconditioning, SimProfile, SimSettings, SimSoftening,
+    SimStiffness, SimThickness,
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
@@ -43,6 +43,9 @@ pub struct RigArgs {
     /// Simulated rig: how far the rig itself gives way, in um/N
     #[arg(long, default_value = "0", value_name = "UM_PER_N")]
     pub compliance: SimCompliance,
+    /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
+    #[arg(long, default_value = "0", value_name = "PERCENT")]
+    pub preconditioning: SimPreconditioning,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -60,6 +63,7 @@ impl Default for RigArgs {
             stiffness: SimStiffness::default(),
             thickness: SimThickness::default(),
             compliance: SimCompliance::default(),
+            preconditioning: SimPreconditioning::default(),
             time_scale: TimeScale::Factor(1.0),
         }
     }
@@ -78,6 +82,7 @@ impl RigArgs {
             stiffness: self.stiffness,
             thickness: self.thickness,
             compliance: self.compliance,
+            preconditioning: self.preconditioning,
         }
     }
 }

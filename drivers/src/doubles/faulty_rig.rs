@@ -288,7 +288,8 @@ impl<R: Rig> Rig for FaultyRig<R> {
             return;
         }
         let is_motor_off = self.reset.is_some_and(|reset| {
-            !reset.is_motor_enabled && matches!(command, RigCommand::MoveTo(_))
+            let is_motion = matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_));
+            !reset.is_motor_enabled && is_motion
         });
         if is_motor_off || self.is_active(|kind| kind == FaultKind::RefuseCommands) {
             self.schedule(self.now + REFUSAL_DELAY, Timed::Refusal);

@@ -10,6 +10,7 @@ mod amounts;
 mod bench;
 mod clock;
 mod load_cell;
+mod preconditioning;
 mod random;
 mod settings;
 mod slider;
@@ -18,6 +19,7 @@ mod tissue;
 pub use amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
 pub use load_cell::calibration;
 pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
+pub use preconditioning::SimPreconditioning;
 pub(crate) use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
 
@@ -56,7 +58,8 @@ pub struct Truth {
     /// Tip of the probe, in mm from the edge of the home switch: where the rig gives way, not where the
     /// axis is.
     pub position: Position,
-    /// Tissue surface, in mm from the edge of the home switch; that of the base without a specimen.
+    /// Tissue surface, in mm from the edge of the home switch, which loading may move; that of the base without
+    /// a specimen.
     pub surface: Position,
     /// Front of the stiff base behind the tissue, in mm from the edge of the home switch.
     pub base: Position,
@@ -190,6 +193,7 @@ impl SimRig {
         self.truth = Truth {
             tick,
             position: felt.probe,
+            surface: self.bench.surface(),
             counter_zero: self.slider.counter_zero(),
             force: felt.on_probe,
             ..self.truth

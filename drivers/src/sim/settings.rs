@@ -1,6 +1,7 @@
 //! What makes one simulated rig differ from another; with these values it can be rebuilt.
 
 use super::amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
+use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -78,6 +79,8 @@ pub struct SimSettings {
     pub thickness: SimThickness,
     /// How far the rig itself gives way.
     pub compliance: SimCompliance,
+    /// How far loading moves the tissue's surface.
+    pub preconditioning: SimPreconditioning,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -104,8 +107,8 @@ impl SimSettingError {
 
 impl SimSettings {
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
-    /// are not the usual ones, `softening` (percent), `noise` (mN), `stiffness` (percent),
-    /// `thickness` (mm) and `compliance` (um/N).
+    /// are not the usual ones, `softening` and `preconditioning` (percent), `noise` (mN), `stiffness`
+    /// (percent), `thickness` (mm) and `compliance` (um/N).
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
@@ -119,6 +122,7 @@ impl SimSettings {
             unusual("stiffness", self.stiffness),
             unusual("thickness", self.thickness),
             unusual("compliance", self.compliance),
+            unusual("preconditioning", self.preconditioning),
         ];
         map.extend(unusual.into_iter().flatten());
         map
@@ -139,6 +143,7 @@ impl SimSettings {
             stiffness: usual_or(map, "stiffness")?,
             thickness: usual_or(map, "thickness")?,
             compliance: usual_or(map, "compliance")?,
+            preconditioning: usual_or(map, "preconditioning")?,
         })
     }
 }
@@ -227,12 +232,14 @@ mod tests {
                         seed: u64::MAX - 3,
                         clock,
                         softening: SimSoftening::percent(percent).unwrap(),
+                        preconditioning: SimPreconditioning::percent(percent / 4).unwrap(),
                         ..SimSettings::default()
                     };
                     let map = settings.to_map();
                     assert_eq!(SimSettings::from_map(&map), Ok(settings));
                     // Rigs whose tissue does not soften are described as they always were.
                     assert_eq!(map.contains_key("softening"), percent > 0);
+                    assert_eq!(map.contains_key("preconditioning"), percent > 0);
                 }
             }
         }
@@ -265,6 +272,11 @@ mod tests {
         );
         let err = "91".parse::<SimSoftening>().unwrap_err();
         assert!(err.to_string().contains("give 0 to 90"));
+        let err = "31".parse::<SimPreconditioning>().unwrap_err();
+        assert!(
+            err.to_string()
+                .contains("preconditioning cannot be '31'; give 0 to 30")
+        );
         let mut map = SimSettings::default().to_map();
         map.insert("seed".to_owned(), "-1".to_owned());
         assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");

@@ -1,11 +1,13 @@
 //! The tissue the probe meets: a surface somewhere, and behind it the thesis's viscoelastic body.
 //!
-//! Where it has been deeper the tissue may be softer; the law is [`Softening`]'s, not a fitted family's.
+//! Where it has been deeper the tissue may be softer, and loading may move its surface; the laws are
+//! [`Softening`]'s and [`Set`]'s, not a fitted family's.
 //!
 //! Depth is taken as straight between two ticks, for which the body's step is exact, also in the
 //! tick of first contact. Tissue pushes and cannot pull: where the body's force would be negative
 //! the probe has lifted off and the cell feels nothing, while the body goes on relaxing.
 
+use super::preconditioning::{Set, SimPreconditioning};
 use super::random::Random;
 use super::settings::SimSettings;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -71,6 +73,7 @@ pub struct Tissue {
     body: ModifiedKelvin,
     state: KelvinState,
     softening: Option<Softening>,
+    set: Option<Set>,
     force: Newtons,
 }
 
@@ -100,13 +103,15 @@ impl Tissue {
                 drive: 0.0,
                 lost: 0.0,
             }),
+            set: (settings.preconditioning != SimPreconditioning::default())
+                .then(|| Set::new(settings.preconditioning)),
             force: Newtons(0.0),
         }
     }
 
-    /// True position of the surface.
+    /// True position of the surface, where loading has moved it to.
     pub fn surface(&self) -> Position {
-        self.surface
+        self.surface.moved_by(self.set.map_or(0.0, |set| set.get()))
     }
 
     /// The body's true parameters.
@@ -123,7 +128,10 @@ impl Tissue {
 
     /// The probe has moved straight to a true position in a time step; returns the force there.
     pub fn advance(&mut self, probe: Position, dt: Seconds) -> Newtons {
-        let depth = probe.depth_from(self.surface);
+        let mut depth = probe.depth_from(self.surface);
+        if let Some(set) = &mut self.set {
+            depth = Depth(depth.0 - set.advance(depth.0, self.force.0, dt.0));
+        }
         let mut force = self.state.step(&self.body, depth, dt).0;
         if let Some(softening) = &mut self.softening {
             force += softening.advance(&self.body, depth.0, dt.0);

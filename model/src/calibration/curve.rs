@@ -1,36 +1,54 @@
-//! The monotone curve V(F) through the weight steps, and its inverse.
+//! The monotone curve V(F) through the weight steps, and its inverse. Straight segments and polynomials
+//! are pieces of the same kind.
 //!
 //! Cubic Hermite pieces with the slopes of Fritsch & Carlson, "Monotone piecewise cubic
 //! interpolation", SIAM J. Numer. Anal. 17 (1980) 238-246, in the weighted harmonic form of
 //! Fritsch & Butland, SIAM J. Sci. Stat. Comput. 5 (1984) 300-304: the curve passes through every
 //! step, has a continuous slope and never turns back between steps.
 
+use crate::linalg::Triangle;
 use crate::units::{Newtons, Volts};
 
 /// An end slope is never less than this share of its end secant, so that the straight lines
 /// beyond the ends can be inverted.
 const END_SLOPE_SHARE_MIN: f64 = 0.25;
 
-/// One cubic piece, in the local coordinate `s = (F - newtons) / width`, 0 at its left end:
-/// `V = volts + s*(c1 + s*(c2 + s*c3))`.
+/// Highest power of a polynomial curve.
+pub const DEGREE_MAX: usize = 5;
+/// Places at which a polynomial is looked at; its slope turns four times at most.
+const SLOPE_PLACES: u32 = 2000;
+
+/// One polynomial piece, in the local coordinate `s = (F - newtons) / width`, 0 at its left end:
+/// `V = volts + s*(c[0] + s*(c[1] + s*(c[2] + ...)))`.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Piece {
     newtons: f64,
     width: f64,
     volts: f64,
     rise: f64,
-    c1: f64,
-    c2: f64,
-    c3: f64,
+    c: [f64; DEGREE_MAX],
 }
 
 impl Piece {
+    /// From a cubic's three coefficients.
+    fn cubic(newtons: f64, width: f64, volts: f64, rise: f64, [c1, c2, c3]: [f64; 3]) -> Self {
+        Self {
+            newtons,
+            width,
+            volts,
+            rise,
+            c: [c1, c2, c3, 0.0, 0.0],
+        }
+    }
+
     fn rise_at(&self, s: f64) -> f64 {
-        s * (self.c1 + s * (self.c2 + s * self.c3))
+        self.c.iter().rev().fold(0.0, |sum, c| s * (c + sum))
     }
 
     fn slope_at(&self, s: f64) -> f64 {
-        self.c1 + s * (2.0 * self.c2 + s * 3.0 * self.c3)
+        let [c1, c2, c3, c4, c5] = self.c;
+        // A cubic rounds as it always did: recorded forces are computed again from it.
+        c1 + s * (2.0 * c2 + s * 3.0 * c3 + s * s * (4.0 * c4 + s * 5.0 * c5))
     }
 
     /// The `s` in 0..1 at which the piece has risen by `rise`: Newton's method, kept inside a
@@ -96,24 +114,69 @@ impl Curve {
             .map(|((&(width, secant), &(newtons, volts)), ends)| {
                 let (left, right) = (ends[0] * width, ends[1] * width);
                 let rise = secant * width;
-                Piece {
-                    newtons,
-                    width,
-                    volts,
-                    rise,
-                    c1: left,
-                    c2: 3.0 * rise - 2.0 * left - right,
-                    c3: left + right - 2.0 * rise,
-                }
+                let second = 3.0 * rise - 2.0 * left - right;
+                let third = left + right - 2.0 * rise;
+                Piece::cubic(newtons, width, volts, rise, [left, second, third])
             })
             .collect();
-        let (newtons_last, volts_last) = points[points.len() - 1];
+        let ends = [slopes[0], slopes[slopes.len() - 1]];
+        Self::of_pieces(pieces, ends, points[points.len() - 1])
+    }
+
+    /// Straight lines from point to point; the same conditions.
+    pub(super) fn straight(points: &[(f64, f64)]) -> Self {
+        let pieces: Vec<Piece> = points
+            .windows(2)
+            .map(|pair| {
+                let (width, rise) = (pair[1].0 - pair[0].0, pair[1].1 - pair[0].1);
+                Piece::cubic(pair[0].0, width, pair[0].1, rise, [rise, 0.0, 0.0])
+            })
+            .collect();
+        let slope = |piece: &Piece| piece.rise / piece.width;
+        let ends = [slope(&pieces[0]), slope(&pieces[pieces.len() - 1])];
+        Self::of_pieces(pieces, ends, points[points.len() - 1])
+    }
+
+    /// The polynomial nearest to the points by least squares; `None` where the points do not determine it
+    /// or it does not rise everywhere between the first and the last. Points are in order of N.
+    pub(super) fn polynomial(points: &[(f64, f64)], degree: usize) -> Option<Self> {
+        const COLUMNS: usize = DEGREE_MAX + 2;
+        let (first, last) = (points.first()?.0, points.last()?.0);
+        let width = last - first;
+        let mut triangle = Triangle::<COLUMNS>::default();
+        for &(newtons, volts) in points {
+            let s = (newtons - first) / width;
+            let mut row = [0.0; COLUMNS];
+            row[0] = 1.0;
+            for k in 1..=DEGREE_MAX {
+                row[k] = row[k - 1] * s;
+            }
+            row[COLUMNS - 1] = volts;
+            triangle.push(row);
+        }
+        if points.len() <= degree || degree > DEGREE_MAX {
+            return None;
+        }
+        let found = triangle.solve(degree + 1)?;
+        let mut piece = Piece::cubic(first, width, found[0], 0.0, [0.0; 3]);
+        piece.c[..degree].copy_from_slice(&found[1..=degree]);
+        piece.rise = piece.rise_at(1.0);
+        // A slope far below the mean one is a turn that rounding hides.
+        let slope_min = 1e-6 * piece.rise;
+        let mut places = (0..=SLOPE_PLACES).map(|i| f64::from(i) / f64::from(SLOPE_PLACES));
+        let is_rising = places.all(|s| piece.slope_at(s) > slope_min) && piece.rise > 0.0;
+        let ends = [0.0, 1.0].map(|s| piece.slope_at(s) / width);
+        let end = (last, piece.volts + piece.rise);
+        is_rising.then(|| Self::of_pieces(vec![piece], ends, end))
+    }
+
+    fn of_pieces(pieces: Vec<Piece>, ends: [f64; 2], last: (f64, f64)) -> Self {
         Self {
             pieces,
-            slope_first: slopes[0],
-            slope_last: slopes[slopes.len() - 1],
-            newtons_last,
-            volts_last,
+            slope_first: ends[0],
+            slope_last: ends[1],
+            newtons_last: last.0,
+            volts_last: last.1,
         }
     }
 
@@ -295,6 +358,30 @@ mod tests {
         let span =
             curve.volts_from_newtons(Newtons(20.0)).0 - curve.volts_from_newtons(Newtons(15.0)).0;
         assert!((span - 5.0 * slope).abs() < 1e-12);
+    }
+
+    #[test]
+    fn segments_are_straight_and_a_polynomial_finds_itself_or_is_refused() {
+        let points = [(0.0, 1.0), (1.0, 1.5), (3.0, 1.6), (4.0, 3.0)];
+        let curve = Curve::straight(&points);
+        assert!((curve.volts_from_newtons(Newtons(2.0)).0 - 1.55).abs() < 1e-15);
+        assert!((curve.newtons_from_volts(Volts(2.3)).0 - 3.5).abs() < 1e-14);
+        assert!((curve.sensitivity_at(Newtons(5.0)) - 1.4).abs() < 1e-15);
+        let quintic = |f: f64| 1.0 + 0.3 * f + 0.02 * f * f + 1e-4 * f.powi(5);
+        let points: Vec<(f64, f64)> = (0..9)
+            .map(|i| (f64::from(i), quintic(f64::from(i))))
+            .collect();
+        let curve = Curve::polynomial(&points, 5).unwrap();
+        for newtons in [0.0, 0.7, 3.3, 7.9] {
+            let volts = curve.volts_from_newtons(Newtons(newtons));
+            assert!((volts.0 - quintic(newtons)).abs() < 1e-12, "{newtons}");
+            assert!((curve.newtons_from_volts(volts).0 - newtons).abs() < 1e-12);
+        }
+        // A hump between the ends, and fewer points than coefficients.
+        let hump = [(0.0, 0.0), (1.0, 1.0), (2.0, 0.5), (3.0, 1.5)];
+        assert_eq!(Curve::polynomial(&hump, 3), None);
+        assert_eq!(Curve::polynomial(&hump, 4), None);
+        assert!(Curve::polynomial(&hump, 1).is_some());
     }
 
     #[test]

@@ -1,7 +1,22 @@
-//! Load-cell calibration: weights to volts and back.
+//! Load-cell calibration: weights to volts and back, and what a force read this way is worth.
+//!
+//! Start at [`Calibration`], the document. Its [`Calibration::curve`] turns volts into newtons.
 
 mod curve;
+mod document;
+mod error;
+mod kind;
+mod settle;
+#[cfg(test)]
+mod tests;
 mod weight_steps;
 
-pub use curve::Curve;
-pub use weight_steps::{Calibration, CalibrationError, STANDARD_GRAVITY, WeightStep};
+pub use curve::{Curve, DEGREE_MAX};
+pub use document::{
+    CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, Point, Reading, Series, SeriesStep,
+    VALID_DAYS, VALID_DAYS_HEAVY_USE,
+};
+pub use error::CalibrationError;
+pub use kind::CurveKind;
+pub use settle::{Settle, SettleRule, Settling, Steady, Unsettled};
+pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -14,6 +14,8 @@ pub(super) enum Progress {
     Done,
     /// The step cannot be done; the reason is for the operator.
     Fail(String),
+    /// The run is to stop, whatever the plan says of failures.
+    Stop(String),
 }
 
 /// The state, the time and the effects of one call of `step`.

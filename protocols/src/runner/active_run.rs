@@ -3,6 +3,7 @@
 use super::snapshot::{LogLine, RunView};
 use super::start::AfterStop;
 use crate::engine::{self, Config, Effect, EndingKind, Input, Operator, Outcome, Record, State};
+use crate::plans::Step;
 use crate::preview::Preview;
 use palpate_model::Nanos;
 use palpate_model::fit::LiveFit;
@@ -413,8 +414,9 @@ fn deepest(config: &Config) -> Depth {
         .plan
         .steps
         .iter()
-        .fold(0.0f64, |deepest, step| match step {
-            crate::plans::Step::Ramp { depth, .. } => deepest.max(depth.0),
+        .fold(0.0f64, |deepest, planned| match planned.step {
+            Step::Ramp { depth, .. } => deepest.max(depth.0),
+            Step::LoadTo(load) => deepest.max(load.depth_max.0),
             _ => deepest,
         });
     Depth(if deepest > 0.0 { deepest } else { 1.0 })

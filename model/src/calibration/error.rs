@@ -1,0 +1,106 @@
+//! What prevents a calibration, one sentence each.
+
+use thiserror::Error;
+
+/// A document makes no calibration.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CalibrationError {
+    /// One point or none.
+    #[error(
+        "the calibration has {count} weight step(s); take at least two, the first without a weight"
+    )]
+    TooFewSteps {
+        /// Steps given.
+        count: usize,
+    },
+    /// NaN, infinite, or a negative mass.
+    #[error(
+        "weight step {step} has mass {mass_g} g and signal {volts} V; both must be finite and the mass not negative, take this step again"
+    )]
+    NotANumber {
+        /// Step, counted from 1.
+        step: usize,
+        /// Its mass in g.
+        mass_g: f64,
+        /// Its signal in V.
+        volts: f64,
+    },
+    /// Masses out of order.
+    #[error(
+        "weight step {step} has {mass_g} g after {before_g} g; masses must increase from step to step, remove or reorder it"
+    )]
+    MassNotIncreasing {
+        /// Step, counted from 1.
+        step: usize,
+        /// Its mass in g.
+        mass_g: f64,
+        /// The mass of the step before in g.
+        before_g: f64,
+    },
+    /// More mass did not give more volts.
+    #[error(
+        "weight step {step} reads {volts} V after {before_volts} V; the signal must rise with every weight, check the wiring and take this step again"
+    )]
+    VoltsNotIncreasing {
+        /// Step, counted from 1 in order of mass.
+        step: usize,
+        /// Its signal in V.
+        volts: f64,
+        /// The signal of the step before in V.
+        before_volts: f64,
+    },
+    /// Written by a later version.
+    #[error(
+        "the calibration has form {format}, newer than this program knows; read it with the version that wrote it"
+    )]
+    NewerFormat {
+        /// Its form.
+        format: u32,
+    },
+    /// A step names a weight that the document does not list.
+    #[error(
+        "weight step {step} has the weight \"{name}\" on it, which is not in the list of weights; add it there"
+    )]
+    UnknownWeight {
+        /// Step, counted from 1.
+        step: usize,
+        /// The name.
+        name: String,
+    },
+    /// The mass of a step is not that of its weights.
+    #[error(
+        "weight step {step} has {mass_g} g but its weights add up to {sum_g} g; correct the mass or the weights"
+    )]
+    WeightsDisagree {
+        /// Step, counted from 1.
+        step: usize,
+        /// Its mass in g.
+        mass_g: f64,
+        /// The sum of its weights in g.
+        sum_g: f64,
+    },
+    /// Straight segments through masses that were not taken.
+    #[error(
+        "straight segments through {} do not go from the first to the last weight through weights that were taken; give masses of the table in order", grams(.through_g)
+    )]
+    NoSuchBreak {
+        /// The masses in g.
+        through_g: Vec<f64>,
+    },
+    /// A polynomial that turns back or that the points do not determine.
+    #[error(
+        "a polynomial of degree {degree} through {points} weights does not rise everywhere between them; choose another degree, or the monotone curve"
+    )]
+    NotRising {
+        /// Its degree.
+        degree: usize,
+        /// Masses taken.
+        points: usize,
+    },
+}
+
+fn grams(masses: &[f64]) -> String {
+    let words: Vec<String> = masses.iter().map(|mass| format!("{mass} g")).collect();
+    words.join(", ")
+}
