@@ -2,6 +2,7 @@
 
 pub mod flow;
 pub mod recorded;
+pub mod searching;
 pub mod simulated;
 
 use std::path::{Path, PathBuf};
