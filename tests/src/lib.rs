@@ -3,6 +3,7 @@
 pub mod flow;
 pub mod lab;
 pub mod recorded;
+pub mod searching;
 pub mod simulated;
 
 use std::path::{Path, PathBuf};

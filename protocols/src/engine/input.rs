@@ -112,8 +112,11 @@ pub enum Record {
         volts: Volts,
         /// Filtered force above tare.
         force: Newtons,
+        /// The samples that triggered, unfiltered and above tare, oldest first.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        raw: Vec<Newtons>,
     },
-    /// The contact position was estimated from the slow pass.
+    /// The contact position was estimated.
     ContactFound {
         /// Estimate, from home.
         position: Position,
