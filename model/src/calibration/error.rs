@@ -50,6 +50,11 @@ pub enum CalibrationError {
         /// The signal of the step before in V.
         before_volts: f64,
     },
+    /// Next to no rise between two weights.
+    #[error(
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so no force can be told there; leave one of them out or take the steps again"
+    )]
+    TooFlat,
     /// Written by a later version.
     #[error(
         "the calibration has form {format}, newer than this program knows; read it with the version that wrote it"
