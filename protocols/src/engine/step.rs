@@ -278,7 +278,7 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
         .unacknowledged
         .pop_front()
         .map(|(_, command)| command);
-    if expected != Some(ack.command) {
+    if !expected.is_some_and(|asked| asked.is_answered_by(&ack.command)) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
             None => format!(
