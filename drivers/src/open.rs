@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::rig::{RigCommand, RigDescription};
+use palpate_model::rig::{HandAction, RigCommand, RigDescription};
 
 /// Opens the rig called `name`: `sim`, or `sim:NAME` for a simulated rig that people share by name.
 ///
@@ -41,6 +41,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
+    }
+
+    fn by_hand(&mut self, action: HandAction) {
+        (**self).by_hand(action);
     }
 }
 

@@ -1,7 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{Ack, Fault, HandAction, Reading, RigCommand, RigDescription};
 use thiserror::Error;
 
 /// Something a rig reported, with the time it reached the host.
@@ -53,4 +53,8 @@ pub trait Rig: Send {
 
     /// Whether time is simulated, so that the caller may run it at any pace.
     fn is_virtual(&self) -> bool;
+
+    /// A person has done something at the rig, as an instruction asked. On a rig on wires it is done by
+    /// then and there is nothing to do; a simulated rig does it now.
+    fn by_hand(&mut self, _action: HandAction) {}
 }

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::{answer_to, ideal, move_to, next_reading, run_move, settings};
+use common::{answer_to, ideal, move_to, next_reading, oscillate, run_move, settings};
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};
@@ -25,12 +25,13 @@ impl Choices {
 struct Seen {
     samples: u64,
     moves: u64,
+    oscillations: u64,
     cut_short: u64,
     refusals: u64,
     limits: u64,
 }
 
-/// Random moves, stops, halts and definitions at random times; the tracker must never err.
+/// Random moves, oscillations, stops, halts and definitions at random times; the tracker must never err.
 fn wander(seed: u64, clock: SimClock) -> Seen {
     let mut rig = SimRig::new(settings(SimProfile::Lab, seed, clock));
     let mut choices = Choices(seed * 2 + 1);
@@ -47,6 +48,10 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
                 RigCommand::MoveTo(made) => {
                     seen.moves += 1;
                     tracker.on_move(made);
+                }
+                RigCommand::Oscillate(made) => {
+                    seen.oscillations += 1;
+                    tracker.on_oscillate(made);
                 }
                 RigCommand::DefinePosition { pulses } => tracker.on_define(pulses),
                 RigCommand::Stop | RigCommand::Halt => seen.cut_short += 1,
@@ -88,7 +93,7 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
 
 fn send_one(rig: &mut SimRig, choices: &mut Choices, pulses: i64) {
     let speed = 0.03 * (1 + choices.below(666)) as f64;
-    let command = match choices.below(20) {
+    let command = match choices.below(24) {
         0..=7 => move_to(pulses + choices.below(2001) as i64 - 1000, speed),
         8..=10 => move_to(pulses + choices.below(41) as i64 - 20, speed),
         // As far as the switches and back.
@@ -96,6 +101,12 @@ fn send_one(rig: &mut SimRig, choices: &mut Choices, pulses: i64) {
         12 => move_to(pulses - 20_000, 19.98),
         13..=15 => RigCommand::Stop,
         16..=18 => RigCommand::Halt,
+        // Up to 64 pulses and 4 Hz, so some are too fast; either way first.
+        19..=22 => oscillate(
+            choices.below(129) as i64 - 64,
+            250 + choices.below(900) as u32,
+            1 + choices.below(3) as u32,
+        ),
         _ => RigCommand::DefinePosition {
             pulses: choices.below(20_001) as i64 - 10_000,
         },
@@ -110,6 +121,7 @@ fn the_tracker_follows_random_moves_stops_and_halts() {
         for clock in [SimClock::Nominal, SimClock::Galil] {
             let seen = wander(seed, clock);
             all.moves += seen.moves;
+            all.oscillations += seen.oscillations;
             all.cut_short += seen.cut_short;
             all.refusals += seen.refusals;
             all.limits += seen.limits;
@@ -117,6 +129,7 @@ fn the_tracker_follows_random_moves_stops_and_halts() {
     }
     // The walk has been everywhere it should have been.
     assert!(all.moves > 1000, "{} moves", all.moves);
+    assert!(all.oscillations > 200, "{} oscillations", all.oscillations);
     assert!(all.cut_short > 500, "{} stops and halts", all.cut_short);
     assert!(all.refusals > 100, "{} refusals", all.refusals);
     assert!(
@@ -197,6 +210,68 @@ fn a_halt_rests_at_once() {
 }
 
 #[test]
+fn a_sine_is_the_sine_of_its_command_on_either_clock() {
+    for clock in [SimClock::Nominal, SimClock::Galil] {
+        let mut rig = SimRig::new(settings(SimProfile::Ideal, 14, clock));
+        let start = run_move(&mut rig, 700, 3.0).last().unwrap().pulses;
+        let asked = oscillate(40, 1500, 3);
+        assert_eq!(answer_to(&mut rig, asked), Ok(asked));
+        // The command began at the tick of its acknowledgement, whose sample came right after.
+        let first = loop {
+            let (_, reading) = next_reading(&mut rig);
+            if reading.status.has(AxisStatus::MOVING) {
+                break reading.tick;
+            }
+        };
+        for i in 1..4500_u32 {
+            let (_, reading) = next_reading(&mut rig);
+            assert_eq!(reading.tick, first + u64::from(i));
+            assert!(reading.status.has(AxisStatus::MOVING));
+            let angle = std::f64::consts::TAU * f64::from(i) / 1500.0;
+            let exact = (start as f64 + 40.0 * (1.0 - angle.cos())) * 0.015;
+            let miss = rig.truth().position_counted().0 - exact;
+            assert!(miss.abs() < 1e-9, "{clock} {i}: {miss}");
+        }
+        let (_, rest) = next_reading(&mut rig);
+        assert!(!rest.status.has(AxisStatus::MOVING) && rest.pulses == start);
+        assert_eq!(rest.tick, first + 4500);
+    }
+}
+
+#[test]
+fn a_sine_is_stopped_by_braking_and_halted_at_once() {
+    for (command, is_braking) in [(RigCommand::Stop, true), (RigCommand::Halt, false)] {
+        let mut rig = ideal(15);
+        answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
+        // 1.5 mm in 2 s: 4.7 mm/s on the way, which a quarter of a period later it has.
+        answer_to(&mut rig, oscillate(100, 2000, 50)).unwrap();
+        for _ in 0..500 {
+            next_reading(&mut rig);
+        }
+        let (before, speed) = (rig.truth().position, 0.015 * 100.0 * std::f64::consts::PI);
+        rig.send(command);
+        let last = *common::samples_to_rest(&mut rig).last().unwrap();
+        assert!(!last.status.has(AxisStatus::MOVING));
+        let truth = rig.truth();
+        assert!((truth.position_counted().0 - last.pulses as f64 * 0.015).abs() < 1e-12);
+        // v^2 / 2a or nothing, the way made meanwhile, down to a whole pulse.
+        let way = truth.position.distance_from(before);
+        let braking = if is_braking {
+            speed * speed / (2.0 * 61.44)
+        } else {
+            0.0
+        };
+        assert!(
+            way > braking - 0.02 && way < braking + speed * 0.003,
+            "{way}"
+        );
+        // The axis takes the next motion from there.
+        answer_to(&mut rig, move_to(0, 3.0)).unwrap();
+        assert_eq!(common::samples_to_rest(&mut rig).last().unwrap().pulses, 0);
+    }
+}
+
+#[test]
 fn settings_are_rounded_down_and_read_back() {
     let mut rig = ideal(7);
     answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
@@ -243,8 +318,21 @@ fn refusals_say_why() {
         let define = RigCommand::DefinePosition { pulses: target };
         assert!(why(&mut rig, define).contains("out of range"));
     }
+    for (command, word) in [
+        (oscillate(0, 1000, 1), "none may be zero"),
+        (oscillate(50, 0, 1), "none may be zero"),
+        (oscillate(50, 1000, 0), "none may be zero"),
+        (oscillate(1000, 1000, 1), "mm/s where"),
+        (oscillate(20, 100, 1), "mm/s2 where"),
+        (oscillate(i64::MIN, 1000, 1), "out of range"),
+        (oscillate(-(1 << 30) - 1, u32::MAX, 1), "out of range"),
+    ] {
+        let said = why(&mut rig, command);
+        assert!(said.contains(word), "{command:?}: {said}");
+    }
     answer_to(&mut rig, move_to(100, 1.0)).unwrap();
     assert!(why(&mut rig, move_to(200, 1.0)).contains("while the axis moves"));
+    assert!(why(&mut rig, oscillate(20, 1000, 1)).contains("while the axis moves"));
     let define = RigCommand::DefinePosition { pulses: 0 };
     assert!(why(&mut rig, define).contains("while the axis moves"));
     let last = *common::samples_to_rest(&mut rig).last().unwrap();

@@ -4,7 +4,10 @@ use super::Failure;
 use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
-use palpate_drivers::sim::{SimClock, SimProfile, SimSettings, SimSoftening};
+use palpate_drivers::sim::{
+    SimClock, SimCompliance, SimNoise, SimPreconditioning, SimProfile, SimSettings, SimSoftening,
+    SimStiffness, SimThickness,
+};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
@@ -28,6 +31,21 @@ pub struct RigArgs {
     /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
+    /// Simulated rig: white noise of the ideal load cell, rms, in mN
+    #[arg(long, default_value = "20", value_name = "MN")]
+    pub noise: SimNoise,
+    /// Simulated rig: stiffness of the tissue, in percent of the usual
+    #[arg(long, default_value = "100", value_name = "PERCENT")]
+    pub stiffness: SimStiffness,
+    /// Simulated rig: from the surface of its specimen to a stiff base behind it, in mm
+    #[arg(long, default_value = "100", value_name = "MM")]
+    pub thickness: SimThickness,
+    /// Simulated rig: how far the rig itself gives way, in um/N
+    #[arg(long, default_value = "0", value_name = "UM_PER_N")]
+    pub compliance: SimCompliance,
+    /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
+    #[arg(long, default_value = "0", value_name = "PERCENT")]
+    pub preconditioning: SimPreconditioning,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -41,6 +59,11 @@ impl Default for RigArgs {
             seed: 1,
             clock: SimClock::Nominal,
             softening: SimSoftening::default(),
+            noise: SimNoise::default(),
+            stiffness: SimStiffness::default(),
+            thickness: SimThickness::default(),
+            compliance: SimCompliance::default(),
+            preconditioning: SimPreconditioning::default(),
             time_scale: TimeScale::Factor(1.0),
         }
     }
@@ -55,6 +78,11 @@ impl RigArgs {
             seed: self.seed,
             clock: self.clock,
             softening: self.softening,
+            noise: self.noise,
+            stiffness: self.stiffness,
+            thickness: self.thickness,
+            compliance: self.compliance,
+            preconditioning: self.preconditioning,
         }
     }
 }

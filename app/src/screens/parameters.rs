@@ -142,12 +142,19 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
         | Phase::Home
         | Phase::Tare
         | Phase::Contact
+        | Phase::Prompt
+        | Phase::Weigh
+        | Phase::CheckHome
         | Phase::Rest => "the probe has not indented",
         Phase::Ramp => "more of the ramp is needed",
         Phase::Hold => "more of the hold is needed",
-        Phase::Unload | Phase::Retract | Phase::Stopped | Phase::Ended | Phase::Jog => {
-            "the ramp and hold were too short"
-        }
+        Phase::Creep | Phase::Sine => "the live fit follows ramps and holds",
+        Phase::Unload
+        | Phase::Retract
+        | Phase::Stopped
+        | Phase::Ended
+        | Phase::Paused
+        | Phase::Jog => "the ramp and hold were too short",
     };
     Some(format!("{names}: {why}"))
 }

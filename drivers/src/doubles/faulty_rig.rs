@@ -3,7 +3,7 @@
 use super::script::{FaultKind, Rail, ScriptedFault};
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use crate::sim::{Cause, Random, counts_from_volts, volts_from_counts};
-use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{AxisStatus, Fault, HandAction, Reading, RigCommand, RigDescription};
 use palpate_model::{Nanos, Volts};
 use std::collections::VecDeque;
 
@@ -288,7 +288,8 @@ impl<R: Rig> Rig for FaultyRig<R> {
             return;
         }
         let is_motor_off = self.reset.is_some_and(|reset| {
-            !reset.is_motor_enabled && matches!(command, RigCommand::MoveTo(_))
+            let is_motion = matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_));
+            !reset.is_motor_enabled && is_motion
         });
         if is_motor_off || self.is_active(|kind| kind == FaultKind::RefuseCommands) {
             self.schedule(self.now + REFUSAL_DELAY, Timed::Refusal);
@@ -333,5 +334,9 @@ impl<R: Rig> Rig for FaultyRig<R> {
 
     fn is_virtual(&self) -> bool {
         self.inner.is_virtual()
+    }
+
+    fn by_hand(&mut self, action: HandAction) {
+        self.inner.by_hand(action);
     }
 }

@@ -14,8 +14,6 @@ const DRIFT_RATE_MAX: f64 = 0.2e-3 / 60.0;
 const WANDER_PER_SQRT_MINUTE: f64 = 0.05e-3;
 /// Ticks between two steps of the wandering; each step is far below one converter count.
 const WANDER_TICKS: u64 = 64;
-/// White noise of the ideal cell in force, rms.
-const IDEAL_NOISE: Newtons = Newtons(0.02);
 /// The ideal cell's signal without load; the thesis's cell has the same.
 const IDEAL_VOLTS_AT_ZERO: Volts = Volts(1.28);
 /// Slope of the ideal cell in V/N: 9 N give 2.63 V, below the 2.80 V at which every run stops.
@@ -51,11 +49,11 @@ pub fn adc(profile: SimProfile) -> Option<AdcDescription> {
     }
 }
 
-/// White noise of this profile's signal at rest, rms.
-pub fn noise_expected(profile: SimProfile) -> Volts {
-    match profile {
+/// White noise of the signal at rest, rms.
+pub fn noise_expected(settings: &SimSettings) -> Volts {
+    match settings.profile {
         SimProfile::Lab => LAB_NOISE,
-        SimProfile::Ideal => Volts(IDEAL_NOISE.0 * IDEAL_VOLTS_PER_NEWTON),
+        SimProfile::Ideal => Volts(settings.noise.newtons().0 * IDEAL_VOLTS_PER_NEWTON),
     }
 }
 
@@ -76,7 +74,9 @@ enum CellError {
         wander: f64,
         ticks: u64,
     },
-    Ideal,
+    Ideal {
+        noise: Newtons,
+    },
 }
 
 impl LoadCell {
@@ -98,7 +98,9 @@ impl LoadCell {
                     ticks: 0,
                 }
             }
-            SimProfile::Ideal => CellError::Ideal,
+            SimProfile::Ideal => CellError::Ideal {
+                noise: settings.noise.newtons(),
+            },
         };
         Self {
             curve,
@@ -111,8 +113,8 @@ impl LoadCell {
     pub fn read(&mut self, force: Newtons) -> (Option<i32>, Volts) {
         let noise = self.noise.normal();
         match &mut self.error {
-            CellError::Ideal => {
-                let felt = Newtons(force.0 + IDEAL_NOISE.0 * noise);
+            CellError::Ideal { noise: rms } => {
+                let felt = Newtons(force.0 + rms.0 * noise);
                 (None, self.curve.volts_from_newtons(felt))
             }
             CellError::Lab {

@@ -6,28 +6,33 @@
 //! is simulated beyond the event that is handed out, so an answer to that event acts when it
 //! would on wires. Equal settings and equal commands at equal events give equal events, bit for bit.
 
+mod amounts;
+mod bench;
 mod clock;
 mod load_cell;
+mod preconditioning;
 mod random;
 mod settings;
 mod slider;
 mod tissue;
 
+pub use amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
 pub use load_cell::calibration;
 pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
+pub use preconditioning::SimPreconditioning;
 pub(crate) use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
+use bench::Bench;
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
 use load_cell::LoadCell;
 use palpate_model::calibration::Calibration;
-use palpate_model::rig::{Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{Fault, HandAction, Reading, RigCommand, RigDescription};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{MmPerS, MmPerS2, Nanos, Newtons, Position, Seconds};
 use slider::{ACCELERATION_QUANTUM, Slider};
 use std::collections::VecDeque;
-use tissue::Tissue;
 
 /// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
 const MM_PER_PULSE: f64 = 0.015;
@@ -50,13 +55,17 @@ const SIMULATOR_VERSION: u32 = 1;
 pub struct Truth {
     /// Tick the other values belong to.
     pub tick: u64,
-    /// Probe, in mm from the edge of the home switch.
+    /// Tip of the probe, in mm from the edge of the home switch: where the rig gives way, not where the
+    /// axis is.
     pub position: Position,
-    /// Tissue surface, in mm from the edge of the home switch.
+    /// Tissue surface, in mm from the edge of the home switch, which loading may move; that of the base without
+    /// a specimen.
     pub surface: Position,
+    /// Front of the stiff base behind the tissue, in mm from the edge of the home switch.
+    pub base: Position,
     /// Where the pulse counter reads zero, in mm from the edge of the home switch.
     pub counter_zero: Position,
-    /// The specimen.
+    /// The specimen clipped in last.
     pub body: ModifiedKelvin,
     /// Force on the probe.
     pub force: Newtons,
@@ -85,7 +94,7 @@ pub struct SimRig {
     clock: TickClock,
     link: ReportLink,
     slider: Slider,
-    tissue: Tissue,
+    bench: Bench,
     load_cell: LoadCell,
     truth: Truth,
     /// Time of the newest event handed out: the host's present.
@@ -112,16 +121,16 @@ impl SimRig {
         let tick = description.tick();
         let mut machine = Random::new(settings.seed, Cause::Machine);
         let slider = Slider::new(&description, &mut machine);
-        let mut specimen = Random::new(settings.seed, Cause::Tissue);
-        let tissue = Tissue::new(&mut specimen, settings.softening);
+        let bench = Bench::new(&settings, slider.counter_zero());
         // The controller was switched on up to a minute and a half before the host looked.
         let tick_count = machine.between(1.0, 1e5) as u64;
         let truth = Truth {
             tick: tick_count,
             position: slider.counter_zero(),
-            surface: tissue.surface(),
+            surface: bench.surface(),
+            base: bench.base(),
             counter_zero: slider.counter_zero(),
-            body: tissue.body(),
+            body: bench.body(),
             force: Newtons(0.0),
         };
         Self {
@@ -130,7 +139,7 @@ impl SimRig {
             link: ReportLink::new(settings.seed),
             load_cell: LoadCell::new(&settings, tick),
             slider,
-            tissue,
+            bench,
             truth,
             description,
             settings,
@@ -179,13 +188,14 @@ impl SimRig {
             self.report(at, answer);
         }
         let axis = self.slider.end_tick(tick);
-        let force = self.tissue.advance(axis.position, self.tick);
-        let (counts, volts) = self.load_cell.read(force);
+        let felt = self.bench.advance(axis.position, self.tick);
+        let (counts, volts) = self.load_cell.read(felt.on_cell);
         self.truth = Truth {
             tick,
-            position: axis.position,
+            position: felt.probe,
+            surface: self.bench.surface(),
             counter_zero: self.slider.counter_zero(),
-            force: self.tissue.force(),
+            force: felt.on_probe,
             ..self.truth
         };
         let reading = Reading {
@@ -236,6 +246,13 @@ impl Rig for SimRig {
     fn is_virtual(&self) -> bool {
         true
     }
+
+    /// Acts at the next tick.
+    fn by_hand(&mut self, action: HandAction) {
+        self.bench.by_hand(action);
+        self.truth.surface = self.bench.surface();
+        self.truth.body = self.bench.body();
+    }
 }
 
 fn describe(name: &str, settings: &SimSettings) -> RigDescription {
@@ -253,6 +270,6 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         speed_max: SPEED_MAX,
         acceleration: ACCELERATION,
         adc: load_cell::adc(settings.profile),
-        noise_expected: load_cell::noise_expected(settings.profile),
+        noise_expected: load_cell::noise_expected(settings),
     }
 }

@@ -39,6 +39,14 @@ impl Random {
         ))
     }
 
+    /// The generator that draws the specimen with a number; number 0 is the rig's own.
+    pub fn of_specimen(seed: u64, specimen: u64) -> Self {
+        match specimen {
+            0 => Self::new(seed, Cause::Tissue),
+            _ => Self::new(seed ^ scrambled(specimen), Cause::Tissue),
+        }
+    }
+
     /// Uniform in 0..1, 1 excluded.
     pub fn unit(&mut self) -> f64 {
         StandardUniform.sample(&mut self.0)

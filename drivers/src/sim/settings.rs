@@ -1,5 +1,7 @@
-//! What makes one simulated rig differ from another; with these three values it can be rebuilt.
+//! What makes one simulated rig differ from another; with these values it can be rebuilt.
 
+use super::amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
+use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -11,7 +13,7 @@ pub enum SimProfile {
     /// The thesis's nonlinear cell with noise, drift and a 16-bit converter.
     #[default]
     Lab,
-    /// A straight cell without drift or converter, and 0.02 N rms of white noise.
+    /// A straight cell without drift or converter, and white noise: 0.02 N rms unless set otherwise.
     Ideal,
 }
 
@@ -69,6 +71,16 @@ pub struct SimSettings {
     pub clock: SimClock,
     /// What the tissue loses by having been deeper.
     pub softening: SimSoftening,
+    /// White noise of the ideal load cell.
+    pub noise: SimNoise,
+    /// How stiff the tissue is.
+    pub stiffness: SimStiffness,
+    /// How far behind the surface a stiff base stands.
+    pub thickness: SimThickness,
+    /// How far the rig itself gives way.
+    pub compliance: SimCompliance,
+    /// How far loading moves the tissue's surface.
+    pub preconditioning: SimPreconditioning,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -84,7 +96,7 @@ pub struct SimSettingError {
 }
 
 impl SimSettingError {
-    fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
+    pub(super) fn new(setting: &'static str, value: &str, choices: &'static str) -> Self {
         Self {
             setting,
             value: value.to_owned(),
@@ -94,8 +106,9 @@ impl SimSettingError {
 }
 
 impl SimSettings {
-    /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where the
-    /// tissue softens, `softening` in percent.
+    /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
+    /// are not the usual ones, `softening` and `preconditioning` (percent), `noise` (mN), `stiffness`
+    /// (percent), `thickness` (mm) and `compliance` (um/N).
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
@@ -103,9 +116,15 @@ impl SimSettings {
             ("seed".to_owned(), self.seed.to_string()),
             ("clock".to_owned(), self.clock.to_string()),
         ]);
-        if self.softening != SimSoftening::default() {
-            map.insert("softening".to_owned(), self.softening.to_string());
-        }
+        let unusual = [
+            unusual("softening", self.softening),
+            unusual("noise", self.noise),
+            unusual("stiffness", self.stiffness),
+            unusual("thickness", self.thickness),
+            unusual("compliance", self.compliance),
+            unusual("preconditioning", self.preconditioning),
+        ];
+        map.extend(unusual.into_iter().flatten());
         map
     }
 
@@ -119,12 +138,30 @@ impl SimSettings {
                 .parse()
                 .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
             clock: text("clock").parse()?,
-            softening: match map.get("softening") {
-                Some(text) => text.parse()?,
-                None => SimSoftening::default(),
-            },
+            softening: usual_or(map, "softening")?,
+            noise: usual_or(map, "noise")?,
+            stiffness: usual_or(map, "stiffness")?,
+            thickness: usual_or(map, "thickness")?,
+            compliance: usual_or(map, "compliance")?,
+            preconditioning: usual_or(map, "preconditioning")?,
         })
     }
+}
+
+/// A setting with its name, unless it is the usual one: rigs are described as they always were.
+fn unusual<T: Default + PartialEq + fmt::Display>(
+    name: &str,
+    value: T,
+) -> Option<(String, String)> {
+    (value != T::default()).then(|| (name.to_owned(), value.to_string()))
+}
+
+/// A setting by its name, the usual one where it is not given.
+fn usual_or<T: Default + FromStr<Err = SimSettingError>>(
+    map: &BTreeMap<String, String>,
+    name: &str,
+) -> Result<T, SimSettingError> {
+    map.get(name).map_or(Ok(T::default()), |text| text.parse())
 }
 
 impl fmt::Display for SimProfile {
@@ -195,14 +232,35 @@ mod tests {
                         seed: u64::MAX - 3,
                         clock,
                         softening: SimSoftening::percent(percent).unwrap(),
+                        preconditioning: SimPreconditioning::percent(percent / 4).unwrap(),
+                        ..SimSettings::default()
                     };
                     let map = settings.to_map();
                     assert_eq!(SimSettings::from_map(&map), Ok(settings));
                     // Rigs whose tissue does not soften are described as they always were.
                     assert_eq!(map.contains_key("softening"), percent > 0);
+                    assert_eq!(map.contains_key("preconditioning"), percent > 0);
                 }
             }
         }
+    }
+
+    #[test]
+    fn amounts_survive_their_map_and_usual_ones_are_not_in_it() {
+        let settings = SimSettings {
+            noise: "5".parse().unwrap(),
+            stiffness: "200".parse().unwrap(),
+            thickness: "12.5".parse().unwrap(),
+            compliance: "40".parse().unwrap(),
+            ..SimSettings::default()
+        };
+        let map = settings.to_map();
+        assert_eq!(SimSettings::from_map(&map), Ok(settings));
+        assert_eq!(
+            (map["noise"].as_str(), map["thickness"].as_str()),
+            ("5", "12.5")
+        );
+        assert_eq!(SimSettings::default().to_map().len(), 3);
     }
 
     #[test]
@@ -214,6 +272,11 @@ mod tests {
         );
         let err = "91".parse::<SimSoftening>().unwrap_err();
         assert!(err.to_string().contains("give 0 to 90"));
+        let err = "31".parse::<SimPreconditioning>().unwrap_err();
+        assert!(
+            err.to_string()
+                .contains("preconditioning cannot be '31'; give 0 to 30")
+        );
         let mut map = SimSettings::default().to_map();
         map.insert("seed".to_owned(), "-1".to_owned());
         assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");

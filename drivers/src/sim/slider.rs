@@ -10,7 +10,9 @@
 
 use super::random::Random;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_model::rig::{Ack, AxisStatus, Fault, MoveTo, Profile, RigCommand, RigDescription};
+use palpate_model::rig::{
+    Ack, AxisStatus, Course, Fault, MoveTo, Oscillation, Profile, RigCommand, RigDescription, Sine,
+};
 use palpate_model::{MmPerS, MmPerS2, Position, Seconds};
 
 /// Accelerations are whole multiples of this: 1024 counts/s^2 of 0.015 mm, the resolution of `AC`
@@ -24,12 +26,12 @@ pub const SWITCH_MARGIN_MM: f64 = 2.0;
 /// Targets and counts fit the controller's 32-bit position register.
 const PULSES_MAX: u64 = 1 << 31;
 
-/// A profile under way.
+/// A motion under way.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
-    profile: Profile,
+    course: Course,
     start_tick: u64,
-    /// Pulse at which the move ends, or `None` when it ends early.
+    /// Pulse at which the motion ends, or `None` when it ends early.
     target_pulses: Option<i64>,
     /// At least one sample has shown this motion.
     is_reported: bool,
@@ -91,15 +93,15 @@ impl Slider {
         self.counter_zero
     }
 
-    /// Starts a tick: a profile that is over leaves the axis at rest. Commands come after this.
+    /// Starts a tick: a motion that is over leaves the axis at rest. Commands come after this.
     pub fn begin_tick(&mut self, tick: u64) {
         self.is_just_halted = false;
         self.is_just_ended = false;
         let Some(motion) = self.motion else { return };
-        if self.since(motion, tick).0 >= motion.profile.duration().0 {
+        if self.since(motion, tick).0 >= motion.course.duration().0 {
             self.position = match motion.target_pulses {
                 Some(target) => position_from_pulses(target, self.mm_per_pulse),
-                None => self.whole_pulse_at(motion.profile.end()),
+                None => self.whole_pulse_at(motion.course.end()),
             };
             self.motion = None;
             self.is_just_ended = true;
@@ -114,6 +116,9 @@ impl Slider {
                 command
             }
             RigCommand::MoveTo(wanted) => RigCommand::MoveTo(self.start_move(tick, wanted)?),
+            RigCommand::Oscillate(wanted) => {
+                RigCommand::Oscillate(self.start_oscillation(tick, wanted)?)
+            }
             RigCommand::Stop => {
                 self.stop(tick);
                 command
@@ -138,8 +143,8 @@ impl Slider {
                 ..motion
             });
             let since = self.since(motion, tick);
-            self.position = motion.profile.position(since);
-            let speed = motion.profile.velocity(since).0;
+            self.position = motion.course.position(since);
+            let speed = motion.course.velocity(since).0;
             let closing = (speed > 0.0 && self.is_forward_limit_closed())
                 || (speed < 0.0 && self.is_reverse_limit_closed());
             if closing {
@@ -153,7 +158,8 @@ impl Slider {
         }
     }
 
-    fn start_move(&mut self, tick: u64, wanted: MoveTo) -> Result<MoveTo, Fault> {
+    /// Whether a motion may begin, or why it may not.
+    fn check_begin(&self) -> Result<(), Fault> {
         if !self.is_motor_on {
             return Err(refused(
                 "begin not valid with the motor off, enable it first",
@@ -164,6 +170,22 @@ impl Slider {
                 "begin not valid while the axis moves, wait until it reports rest",
             ));
         }
+        Ok(())
+    }
+
+    fn check_direction(&self, way: f64) -> Result<(), Fault> {
+        if (way > 0.0 && self.is_forward_limit_closed())
+            || (way < 0.0 && self.is_reverse_limit_closed())
+        {
+            return Err(refused(
+                "begin not possible towards a closed limit switch, move the other way",
+            ));
+        }
+        Ok(())
+    }
+
+    fn start_move(&mut self, tick: u64, wanted: MoveTo) -> Result<MoveTo, Fault> {
+        self.check_begin()?;
         if wanted.target_pulses.unsigned_abs() > PULSES_MAX {
             return Err(refused(&format!(
                 "target {} pulses is out of range, stay within {PULSES_MAX}",
@@ -177,29 +199,17 @@ impl Slider {
                 wanted.speed, self.speed_quantum, self.speed_max
             )));
         }
-        let acceleration = rounded_down(wanted.acceleration.0, ACCELERATION_QUANTUM.0);
-        if !(acceleration > 0.0 && acceleration.is_finite()) {
-            return Err(refused(&format!(
-                "acceleration {} is out of range, choose at least {ACCELERATION_QUANTUM}",
-                wanted.acceleration
-            )));
-        }
+        let acceleration = acceleration_made(wanted.acceleration)?;
+        let speed = MmPerS(speed);
         let target = position_from_pulses(wanted.target_pulses, self.mm_per_pulse);
-        let way = target.distance_from(self.position);
-        if (way > 0.0 && self.is_forward_limit_closed())
-            || (way < 0.0 && self.is_reverse_limit_closed())
-        {
-            return Err(refused(
-                "begin not possible towards a closed limit switch, move the other way",
-            ));
-        }
+        self.check_direction(target.distance_from(self.position))?;
         let made = MoveTo {
             target_pulses: wanted.target_pulses,
-            speed: MmPerS(speed),
-            acceleration: MmPerS2(acceleration),
+            speed,
+            acceleration,
         };
         self.motion = Some(Motion {
-            profile: Profile::to_rest(self.position, target, made.speed, made.acceleration),
+            course: Course::Move(Profile::to_rest(self.position, target, speed, acceleration)),
             start_tick: tick,
             target_pulses: Some(wanted.target_pulses),
             is_reported: false,
@@ -207,12 +217,39 @@ impl Slider {
         Ok(made)
     }
 
-    /// Replaces the profile by its deceleration; a move already ending early goes on as it is.
+    fn start_oscillation(&mut self, tick: u64, wanted: Oscillation) -> Result<Oscillation, Fault> {
+        self.check_begin()?;
+        let made = Oscillation {
+            acceleration: acceleration_made(wanted.acceleration)?,
+            ..wanted
+        };
+        let start = self.pulses_at(self.position);
+        let far = made.amplitude_pulses.saturating_mul(2);
+        if start.saturating_add(far).unsigned_abs() > PULSES_MAX {
+            return Err(refused(&format!(
+                "an amplitude of {} pulses from {start} is out of range, stay within {PULSES_MAX}",
+                made.amplitude_pulses
+            )));
+        }
+        let sine = Sine::new(self.position, &made, self.mm_per_pulse, self.tick);
+        sine.check(MmPerS(self.speed_max), made.acceleration)
+            .map_err(|why| refused(&why))?;
+        self.check_direction(made.amplitude_pulses as f64)?;
+        self.motion = Some(Motion {
+            course: Course::Sine(sine),
+            start_tick: tick,
+            target_pulses: Some(start),
+            is_reported: false,
+        });
+        Ok(made)
+    }
+
+    /// Replaces the motion by its deceleration; a move already ending early goes on as it is.
     fn stop(&mut self, tick: u64) {
         let Some(motion) = self.motion else { return };
         if motion.target_pulses.is_some() {
             self.motion = Some(Motion {
-                profile: motion.profile.stopped_at(self.since(motion, tick)),
+                course: motion.course.stopped_at(self.since(motion, tick)),
                 start_tick: tick,
                 target_pulses: None,
                 is_reported: motion.is_reported,
@@ -229,7 +266,7 @@ impl Slider {
             self.stop(tick);
             return;
         }
-        let here = motion.profile.position(self.since(motion, tick));
+        let here = motion.course.position(self.since(motion, tick));
         self.position = self.whole_pulse_at(here);
         self.motion = None;
         self.is_just_ended = true;
@@ -293,6 +330,18 @@ impl Slider {
 
     fn whole_pulse_at(&self, position: Position) -> Position {
         position_from_pulses(self.pulses_at(position), self.mm_per_pulse)
+    }
+}
+
+/// The acceleration that the controller sets for a wish.
+fn acceleration_made(wanted: MmPerS2) -> Result<MmPerS2, Fault> {
+    let made = rounded_down(wanted.0, ACCELERATION_QUANTUM.0);
+    if made > 0.0 && made.is_finite() {
+        Ok(MmPerS2(made))
+    } else {
+        Err(refused(&format!(
+            "acceleration {wanted} is out of range, choose at least {ACCELERATION_QUANTUM}"
+        )))
     }
 }
 

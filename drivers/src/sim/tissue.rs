@@ -1,13 +1,15 @@
 //! The tissue the probe meets: a surface somewhere, and behind it the thesis's viscoelastic body.
 //!
-//! Where it has been deeper the tissue may be softer; the law is [`Softening`]'s, not a fitted family's.
+//! Where it has been deeper the tissue may be softer, and loading may move its surface; the laws are
+//! [`Softening`]'s and [`Set`]'s, not a fitted family's.
 //!
 //! Depth is taken as straight between two ticks, for which the body's step is exact, also in the
 //! tick of first contact. Tissue pushes and cannot pull: where the body's force would be negative
 //! the probe has lifted off and the cell feels nothing, while the body goes on relaxing.
 
+use super::preconditioning::{Set, SimPreconditioning};
 use super::random::Random;
-use super::settings::SimSoftening;
+use super::settings::SimSettings;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Position, Seconds};
 
@@ -71,14 +73,15 @@ pub struct Tissue {
     body: ModifiedKelvin,
     state: KelvinState,
     softening: Option<Softening>,
+    set: Option<Set>,
     force: Newtons,
 }
 
 impl Tissue {
-    /// A specimen drawn around the thesis's identified body (its equation 3.5).
-    pub fn new(random: &mut Random, softening: SimSoftening) -> Self {
+    /// A specimen drawn around the thesis's identified body (its equation 3.5), as stiff as the settings say.
+    pub fn new(random: &mut Random, settings: &SimSettings) -> Self {
         let surface = SURFACE_MM + random.between(-SURFACE_SPREAD_MM, SURFACE_SPREAD_MM);
-        let stiffness = random.around_one(STIFFNESS_SPREAD);
+        let stiffness = random.around_one(STIFFNESS_SPREAD) * settings.stiffness.share();
         let (relaxation, viscosity) = (
             random.around_one(TIME_SPREAD),
             random.around_one(TIME_SPREAD),
@@ -94,19 +97,21 @@ impl Tissue {
             },
             // The probe powers up far outside; the first step places it.
             state: KelvinState::at_rest_from(Depth(-SURFACE_MM)),
-            softening: (softening != SimSoftening::default()).then(|| Softening {
-                share: softening.share(),
+            softening: (settings.softening.share() > 0.0).then(|| Softening {
+                share: settings.softening.share(),
                 depth_max: 0.0,
                 drive: 0.0,
                 lost: 0.0,
             }),
+            set: (settings.preconditioning != SimPreconditioning::default())
+                .then(|| Set::new(settings.preconditioning)),
             force: Newtons(0.0),
         }
     }
 
-    /// True position of the surface.
+    /// True position of the surface, where loading has moved it to.
     pub fn surface(&self) -> Position {
-        self.surface
+        self.surface.moved_by(self.set.map_or(0.0, |set| set.get()))
     }
 
     /// The body's true parameters.
@@ -114,14 +119,19 @@ impl Tissue {
         self.body
     }
 
-    /// Force on the probe at the newest tick; never negative.
-    pub fn force(&self) -> Newtons {
-        self.force
+    /// A fresh specimen is clipped in while the probe stands at a true position; nothing has pressed it.
+    pub fn clipped_before(mut self, probe: Position) -> Self {
+        let depth = probe.depth_from(self.surface).0.min(0.0);
+        self.state = KelvinState::at_rest_from(Depth(depth));
+        self
     }
 
     /// The probe has moved straight to a true position in a time step; returns the force there.
     pub fn advance(&mut self, probe: Position, dt: Seconds) -> Newtons {
-        let depth = probe.depth_from(self.surface);
+        let mut depth = probe.depth_from(self.surface);
+        if let Some(set) = &mut self.set {
+            depth = Depth(depth.0 - set.advance(depth.0, self.force.0, dt.0));
+        }
         let mut force = self.state.step(&self.body, depth, dt).0;
         if let Some(softening) = &mut self.softening {
             force += softening.advance(&self.body, depth.0, dt.0);
@@ -134,11 +144,15 @@ impl Tissue {
 #[cfg(test)]
 mod tests {
     use super::super::random::Cause;
+    use super::super::settings::SimSoftening;
     use super::*;
 
     fn specimen(seed: u64, percent: u8) -> Tissue {
-        let softening = SimSoftening::percent(percent).unwrap();
-        Tissue::new(&mut Random::new(seed, Cause::Tissue), softening)
+        let settings = SimSettings {
+            softening: SimSoftening::percent(percent).unwrap(),
+            ..SimSettings::default()
+        };
+        Tissue::new(&mut Random::new(seed, Cause::Tissue), &settings)
     }
 
     /// Force at every millisecond on the way through depths in mm, at `speed` in mm/s.
@@ -220,7 +234,7 @@ mod tests {
             let returned = (stored(turn) - stored(at)) / (1.0 + stored(turn));
             let eta = 1.0 - 0.5 * returned.tanh();
             let wanted = eta * body.elastic(Depth(at)).0;
-            let miss = (tissue.force().0 - wanted).abs();
+            let miss = (tissue.force.0 - wanted).abs();
             assert!(miss < 1e-9, "{turn} {at}: {miss:e}");
         }
     }

@@ -5,7 +5,7 @@
 
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
-use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, Oscillation, Reading, RigCommand};
 use palpate_model::{MmPerS, MmPerS2, Nanos};
 
 /// No event of a test comes later.
@@ -28,6 +28,16 @@ pub fn move_to(target_pulses: i64, speed: f64) -> RigCommand {
     RigCommand::MoveTo(MoveTo {
         target_pulses,
         speed: MmPerS(speed),
+        acceleration: MmPerS2(61.44),
+    })
+}
+
+/// A sine of so many pulses of amplitude and ticks of period.
+pub fn oscillate(amplitude_pulses: i64, period_ticks: u32, cycles: u32) -> RigCommand {
+    RigCommand::Oscillate(Oscillation {
+        amplitude_pulses,
+        period_ticks,
+        cycles,
         acceleration: MmPerS2(61.44),
     })
 }

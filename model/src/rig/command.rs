@@ -14,6 +14,20 @@ pub struct MoveTo {
     pub acceleration: MmPerS2,
 }
 
+/// Whole cycles of a sine from where the axis rests, which is one of its turning points:
+/// `x(t) = x(0) + amplitude (1 - cos(2 pi t / period))`. [`super::Sine`] is the path it makes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Oscillation {
+    /// Half the way between the turning points, in pulses; negative starts away from the tissue.
+    pub amplitude_pulses: i64,
+    /// Controller ticks of one cycle, so that the frequency is exact on the clock that stamps the samples.
+    pub period_ticks: u32,
+    /// Cycles before the axis rests again where it started.
+    pub cycles: u32,
+    /// Deceleration when it is stopped on the way.
+    pub acceleration: MmPerS2,
+}
+
 /// One command to a rig.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "command", rename_all = "snake_case")]
@@ -22,6 +36,9 @@ pub enum RigCommand {
     EnableMotor,
     /// Move to an absolute position (Galil `PA`, `SP`, `AC`, `BG`).
     MoveTo(MoveTo),
+    /// Go in and out on a sine, by itself (Galil contour mode: `CM`, then `DT` and `CD` for increments over
+    /// 2^n samples, between which the controller interpolates, from its program; DMC-1700/1800 user manual, chapter 6).
+    Oscillate(Oscillation),
     /// Decelerate to rest and hold (Galil `ST`).
     Stop,
     /// Cut the motion at once (Galil `AB`).

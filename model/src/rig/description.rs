@@ -1,5 +1,7 @@
 //! What a rig is: the facts it reports about itself when it is connected.
 
+use super::command::Oscillation;
+use super::oscillation::Sine;
 use crate::units::{MmPerS, MmPerS2, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 
@@ -46,6 +48,13 @@ impl RigDescription {
     #[must_use]
     pub fn tick(&self) -> Seconds {
         Seconds(self.tick_nanos as f64 * 1e-9)
+    }
+
+    /// Checks that the rig can follow an oscillation, and explains a refusal.
+    pub fn check_oscillation(&self, command: &Oscillation) -> Result<(), String> {
+        Sine::new(Position(0.0), command, self.mm_per_pulse, self.tick())
+            .check(self.speed_max, self.acceleration)
+            .map_err(|why| format!("rig {} cannot do this: {why}", self.name))
     }
 
     /// Checks a speed against range and quantum, and explains a refusal.

@@ -1,18 +1,24 @@
 //! The words every crate shares about a rig: what it is, what it is told, what it reports.
 
 pub mod command;
+pub mod course;
 pub mod description;
 pub mod event;
+pub mod hand;
 pub mod limits;
+pub mod oscillation;
 pub mod path;
 pub mod phase;
 pub mod profile;
 pub mod reading;
 
-pub use command::{MoveTo, RigCommand};
+pub use command::{MoveTo, Oscillation, RigCommand};
+pub use course::Course;
 pub use description::{AdcDescription, RigDescription};
 pub use event::{Ack, Fault};
+pub use hand::HandAction;
 pub use limits::Limits;
+pub use oscillation::Sine;
 pub use path::{PathError, PathTracker};
 pub use phase::Phase;
 pub use profile::Profile;

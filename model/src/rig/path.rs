@@ -1,11 +1,13 @@
 //! Follows the commanded path sample by sample and checks it against the reported pulses.
 //!
 //! Reported pulses are 15-micrometre stairs; the path between them is known, because every
-//! profile is. The tracker starts a profile at the tick at which the axis first reports motion
+//! course is. The tracker starts a course at the tick at which the axis first reports motion
 //! and refuses the path when it is more than one pulse away from what the controller reports.
 
-use super::command::{MoveTo, position_from_pulses};
+use super::command::{MoveTo, Oscillation, position_from_pulses};
+use super::course::Course;
 use super::description::RigDescription;
+use super::oscillation::Sine;
 use super::profile::Profile;
 use super::reading::{AxisStatus, Reading};
 use crate::units::{MmPerS, Position, Seconds};
@@ -17,7 +19,7 @@ use thiserror::Error;
     "commanded path at {expected_pulses:.2} pulses but the controller reports {reported_pulses}; steps were lost or the axis was moved by hand, home it again"
 )]
 pub struct PathError {
-    /// Where the commanded profile is, in pulses.
+    /// Where the commanded course is, in pulses.
     pub expected_pulses: f64,
     /// What the controller reported.
     pub reported_pulses: i64,
@@ -27,10 +29,17 @@ pub struct PathError {
 enum Motion {
     Rest,
     Moving {
-        profile: Profile,
+        course: Course,
         start_tick: u64,
         is_stopping: bool,
     },
+}
+
+/// A motion that was sent and has not begun.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Pending {
+    Move(MoveTo),
+    Sine(Oscillation),
 }
 
 /// Commanded position as a function of the samples and commands seen so far.
@@ -40,7 +49,7 @@ pub struct PathTracker {
     tick: Seconds,
     position: Option<Position>,
     velocity: MmPerS,
-    pending: Option<MoveTo>,
+    pending: Option<Pending>,
     motion: Motion,
 }
 
@@ -58,9 +67,14 @@ impl PathTracker {
         }
     }
 
-    /// A move was sent; its profile starts when the axis reports motion.
+    /// A move was sent; it starts when the axis reports motion.
     pub fn on_move(&mut self, command: MoveTo) {
-        self.pending = Some(command);
+        self.pending = Some(Pending::Move(command));
+    }
+
+    /// An oscillation was sent; it starts when the axis reports motion.
+    pub fn on_oscillate(&mut self, command: Oscillation) {
+        self.pending = Some(Pending::Sine(command));
     }
 
     /// The present position was given a new count.
@@ -76,7 +90,7 @@ impl PathTracker {
         self.velocity
     }
 
-    /// Whether the axis is at rest with no move under way or awaited.
+    /// Whether the axis is at rest with no motion under way or awaited.
     #[must_use]
     pub fn is_at_rest(&self) -> bool {
         self.pending.is_none() && matches!(self.motion, Motion::Rest)
@@ -89,11 +103,10 @@ impl PathTracker {
         let is_moving = reading.status.has(AxisStatus::MOVING);
         if is_moving
             && matches!(self.motion, Motion::Rest)
-            && let Some(command) = self.pending.take()
+            && let Some(pending) = self.pending.take()
         {
-            let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
             self.motion = Motion::Moving {
-                profile: Profile::to_rest(at_rest, target, command.speed, command.acceleration),
+                course: self.course_from(at_rest, pending),
                 start_tick: reading.tick,
                 is_stopping: false,
             };
@@ -101,20 +114,20 @@ impl PathTracker {
         let position = match &mut self.motion {
             Motion::Rest => at_rest,
             Motion::Moving {
-                profile,
+                course,
                 start_tick,
                 is_stopping,
             } => {
                 let mut since =
                     Seconds(reading.tick.saturating_sub(*start_tick) as f64 * self.tick.0);
                 if reading.status.has(AxisStatus::STOPPING) && !*is_stopping {
-                    *profile = profile.stopped_at(since);
+                    *course = course.stopped_at(since);
                     *start_tick = reading.tick;
                     *is_stopping = true;
                     since = Seconds(0.0);
                 }
-                self.velocity = profile.velocity(since);
-                let here = profile.position(since);
+                self.velocity = course.velocity(since);
+                let here = course.position(since);
                 if is_moving {
                     here
                 } else {
@@ -137,10 +150,23 @@ impl PathTracker {
         Ok(position)
     }
 
-    /// The axis no longer moves: the profile's end, or the whole pulse where it was cut short.
+    fn course_from(&self, from: Position, pending: Pending) -> Course {
+        match pending {
+            Pending::Move(command) => {
+                let target = position_from_pulses(command.target_pulses, self.mm_per_pulse);
+                let (speed, acceleration) = (command.speed, command.acceleration);
+                Course::Move(Profile::to_rest(from, target, speed, acceleration))
+            }
+            Pending::Sine(command) => {
+                Course::Sine(Sine::new(from, &command, self.mm_per_pulse, self.tick))
+            }
+        }
+    }
+
+    /// The axis no longer moves: the course's end, or the whole pulse where it was cut short.
     fn rest_at(&mut self, here: Position, since: Seconds, reading: &Reading) -> Position {
         let Motion::Moving {
-            profile,
+            course,
             is_stopping,
             ..
         } = self.motion
@@ -149,8 +175,8 @@ impl PathTracker {
         };
         self.motion = Motion::Rest;
         // A stepper rests on a whole pulse: its target, or the pulse at which it was cut short.
-        if !is_stopping && since.0 + self.tick.0 >= profile.duration().0 {
-            profile.end()
+        if !is_stopping && since.0 + self.tick.0 >= course.duration().0 {
+            course.end()
         } else {
             position_from_pulses(reading.pulses, self.mm_per_pulse)
         }

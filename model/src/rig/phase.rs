@@ -61,6 +61,18 @@ phases! {
     Jog = 11, "jog";
     /// Back out of the tissue at constant speed, recorded for a fit.
     Unload = 12, "unload";
+    /// Constant force while the depth creeps.
+    Creep = 13, "creep";
+    /// Depth follows a sine.
+    Sine = 14, "sine";
+    /// A person is asked for something.
+    Prompt = 15, "prompt";
+    /// The load cell is read under a known mass.
+    Weigh = 16, "weigh";
+    /// The home switch is touched again.
+    CheckHome = 17, "check-home";
+    /// Paused at rest.
+    Paused = 18, "paused";
 }
 
 impl fmt::Display for Phase {

@@ -49,16 +49,21 @@ impl Profile {
     /// The deceleration to rest of this move when it is stopped at `at`.
     #[must_use]
     pub fn stopped_at(&self, at: Seconds) -> Self {
-        let velocity = self.velocity(at).0;
-        let speed = velocity.abs();
+        Self::braking(self.position(at), self.velocity(at), MmPerS2(self.accel))
+    }
+
+    /// The deceleration to rest of an axis that moves through `from` with a signed velocity.
+    #[must_use]
+    pub fn braking(from: Position, velocity: MmPerS, acceleration: MmPerS2) -> Self {
+        let speed = velocity.0.abs();
         Self {
-            from: self.position(at).0,
-            sign: if velocity < 0.0 { -1.0 } else { 1.0 },
+            from: from.0,
+            sign: if velocity.0 < 0.0 { -1.0 } else { 1.0 },
             speed_start: speed,
-            accel: self.accel,
+            accel: acceleration.0,
             accel_secs: 0.0,
             cruise_secs: 0.0,
-            decel_secs: speed / self.accel,
+            decel_secs: speed / acceleration.0,
             cruise_speed: speed,
         }
     }

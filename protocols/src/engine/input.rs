@@ -4,8 +4,8 @@ use super::interlock::Interlock;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
 use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{Ack, Fault, Phase, Reading, RigCommand};
-use palpate_model::units::{Newtons, Position, Seconds, Volts};
+use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand};
+use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -46,6 +46,21 @@ pub enum Operator {
     Retract,
     /// After a stop: end the session where the probe stands.
     Close,
+    /// Pause as soon as it is sound: motion decelerates, a hold or rest goes on until resumed.
+    Pause,
+    /// Pause at the checkpoint behind a step of the plan.
+    PauseAfter {
+        /// Index of the step.
+        step_index: usize,
+    },
+    /// Go on after a pause, or forget a pause that was asked for.
+    Resume,
+    /// While paused: leave out what is left to measure and do the plan's last retract.
+    Finish,
+    /// The prompt is answered: what it asked for is done.
+    Confirm,
+    /// The prompt is answered: it will not be done.
+    Decline,
 }
 
 /// Everything the engine can do.
@@ -54,6 +69,8 @@ pub enum Operator {
 pub enum Effect {
     /// Tell the rig something.
     Command(RigCommand),
+    /// A person has done this at the rig; a simulated rig does it now.
+    ByHand(HandAction),
     /// Write something down.
     Record(Record),
     /// The run has ended.
@@ -95,8 +112,11 @@ pub enum Record {
         volts: Volts,
         /// Filtered force above tare.
         force: Newtons,
+        /// The samples that triggered, unfiltered and above tare, oldest first.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        raw: Vec<Newtons>,
     },
-    /// The contact position was estimated from the slow pass.
+    /// The contact position was estimated.
     ContactFound {
         /// Estimate, from home.
         position: Position,
@@ -114,6 +134,102 @@ pub enum Record {
         /// Time at depth so far.
         held: Seconds,
     },
+    /// The force hardly changes any more: the hold ends before its planned duration.
+    HoldSteady {
+        /// Slope of the force over the window, in N/s.
+        slope_n_per_s: f64,
+        /// Time at depth so far.
+        held: Seconds,
+    },
+    /// The probe stopped at a force.
+    ForceReached {
+        /// What was wanted.
+        target: Newtons,
+        /// Filtered force as the axis came to rest.
+        force: Newtons,
+        /// Depth there.
+        depth: Depth,
+    },
+    /// A person was asked for something.
+    Prompted {
+        /// What.
+        message: String,
+        /// How long the run waits.
+        timeout: Seconds,
+    },
+    /// A prompt was answered, or nobody answered it.
+    Answered {
+        /// By whom, or that nobody did.
+        answer: Answer,
+    },
+    /// A pause was asked for, and will begin behind a step.
+    PausePending {
+        /// Index of the step.
+        step_index: usize,
+    },
+    /// The run paused.
+    Paused {
+        /// Who or what asked for it.
+        reason: String,
+        /// Why it cannot go on from here; none if it can.
+        no_resume: Option<String>,
+    },
+    /// The run goes on.
+    Resumed,
+    /// What the operator asked for cannot be done now.
+    Refused {
+        /// Why.
+        reason: String,
+    },
+    /// What was left to measure is left out.
+    FinishedEarly,
+    /// A step could not be done and the plan says what follows.
+    StepFailed {
+        /// Why.
+        reason: String,
+        /// What follows.
+        then: Recovery,
+    },
+    /// A monitor of the plan tripped.
+    MonitorTripped {
+        /// Its place in the plan.
+        index: usize,
+        /// The value that tripped it.
+        value: f64,
+        /// Its message.
+        message: String,
+    },
+    /// What tripped a monitor is past.
+    MonitorPast {
+        /// Its place in the plan.
+        index: usize,
+        /// The value now.
+        value: f64,
+    },
+    /// The load cell was read under a known mass.
+    Weighed {
+        /// The mass in g, platform included.
+        mass_g: f64,
+        /// Whether the masses go up.
+        is_loading: bool,
+        /// Which pass through the masses, from 1.
+        repeat: u32,
+        /// Mean signal.
+        volts: Volts,
+        /// Standard deviation of one sample.
+        noise: Volts,
+        /// Slope that was left, in V/s.
+        slope_v_per_s: f64,
+        /// Samples in the mean.
+        samples: u64,
+        /// Time until the signal had come to rest.
+        waited: Seconds,
+    },
+    /// The home switch was touched again.
+    HomeChecked {
+        /// Pulses by which it was found beyond position zero: pulses missed on the way.
+        missed_pulses: i64,
+    },
     /// An interlock tripped.
     InterlockTripped {
         /// Which.
@@ -128,6 +244,28 @@ pub enum Record {
         /// Why.
         reason: String,
     },
+}
+
+/// How a prompt ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Answer {
+    /// It is done.
+    Confirmed,
+    /// It will not be done.
+    Declined,
+    /// Nobody answered in time.
+    TimedOut,
+}
+
+/// What follows a step that could not be done.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Recovery {
+    /// Once more from where it began; counted from 1.
+    Retry(u32),
+    /// The next step.
+    Skip,
 }
 
 /// The five ways a run ends.
@@ -214,6 +352,59 @@ impl fmt::Display for Record {
                 percent(*relative),
                 percent(*wanted)
             ),
+            Self::HoldSteady {
+                slope_n_per_s,
+                held,
+            } => write!(
+                f,
+                "hold ended after {held:.1}: the force changes by {:.4} N/min",
+                60.0 * slope_n_per_s
+            ),
+            Self::ForceReached {
+                target,
+                force,
+                depth,
+            } => write!(f, "{force:.3} at {depth:.3}; {target:.3} was wanted"),
+            Self::Prompted { message, timeout } => {
+                write!(f, "{message} (waits {:.0})", *timeout)
+            }
+            Self::Answered { answer } => f.write_str(match answer {
+                Answer::Confirmed => "done",
+                Answer::Declined => "declined",
+                Answer::TimedOut => "nobody answered",
+            }),
+            Self::PausePending { step_index } => {
+                write!(f, "will pause behind step {}", step_index + 1)
+            }
+            Self::Paused { reason, no_resume } => match no_resume {
+                Some(why) => write!(f, "paused: {reason}; cannot go on: {why}"),
+                None => write!(f, "paused: {reason}"),
+            },
+            Self::Resumed => f.write_str("resumed"),
+            Self::Refused { reason } => write!(f, "refused: {reason}"),
+            Self::FinishedEarly => f.write_str("the rest of the measurement is left out"),
+            Self::StepFailed { reason, then } => match then {
+                Recovery::Retry(count) => write!(f, "{reason}; trying again ({count})"),
+                Recovery::Skip => write!(f, "{reason}; left out"),
+            },
+            Self::MonitorTripped { message, value, .. } => write!(f, "{message} ({value:.4})"),
+            Self::MonitorPast { index, value } => {
+                write!(f, "monitor {} is past ({value:.4})", index + 1)
+            }
+            Self::Weighed {
+                mass_g,
+                is_loading,
+                repeat,
+                volts,
+                ..
+            } => {
+                let way = if *is_loading { "loading" } else { "unloading" };
+                write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
+            }
+            Self::HomeChecked { missed_pulses } => match missed_pulses {
+                0 => f.write_str("home is where it was; no pulse was missed"),
+                missed => write!(f, "home is {missed} pulses from where it was"),
+            },
             Self::InterlockTripped { interlock, reason } => {
                 write!(f, "{interlock} interlock: {reason}")
             }

@@ -4,12 +4,18 @@
 //! clock, holds no device and knows no disk, so a dry run, a replay and a real run are the same
 //! code fed from different places.
 
+mod between;
 mod contact;
 mod context;
+mod creep;
 mod hold;
 mod home;
 mod input;
 mod interlock;
+mod load;
+mod monitor;
+mod pause;
+mod prompt;
 mod self_test;
 mod state;
 mod stats;
@@ -18,10 +24,12 @@ mod stop;
 mod tare;
 #[cfg(test)]
 mod tests;
+mod touch_log;
+mod weigh;
 
-pub use input::{Effect, EndingKind, Input, Operator, Outcome, Record};
+pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
-pub use state::{Config, Contact, Derived, Power, State, Tare};
+pub use state::{Config, Contact, Derived, PauseView, Power, State, Tare};
 pub use step::step;
 
 /// Version of the engine's decisions. Raised whenever a recorded session could decide

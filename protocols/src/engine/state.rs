@@ -1,12 +1,17 @@
 //! The engine's state: a plain value, cloneable, comparable, printable.
 
 use super::contact::ContactSearch;
+use super::creep::Creeping;
+use super::hold::Holding;
 use super::home::Homing;
 use super::input::{EndingKind, Outcome};
 use super::interlock::Watch;
+use super::load::Loading;
+use super::monitor::Condition;
 use super::self_test::SelfTest;
 use super::tare::Taring;
-use crate::plans::{Plan, Step};
+use super::weigh::Weighing;
+use crate::plans::{Plan, Prompt, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
 use palpate_model::fit::LiveEstimate;
@@ -75,6 +80,24 @@ pub struct Derived {
     pub depth: Option<Depth>,
 }
 
+/// How the run is paused, for whoever shows it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PauseView {
+    /// It is not.
+    #[default]
+    None,
+    /// It will be, behind this step.
+    Pending {
+        /// Index of the step.
+        step_index: usize,
+    },
+    /// It is.
+    Paused {
+        /// Why it cannot go on from here; none if it can.
+        no_resume: Option<&'static str>,
+    },
+}
+
 /// A step in progress, holding only its own data.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) enum Active {
@@ -84,9 +107,16 @@ pub(super) enum Active {
     Contact(Box<ContactSearch>),
     /// Ramp, unload, retract and jog: one move, done when the axis rests.
     Move,
-    /// Hold until this controller tick.
-    Hold {
+    Hold(Holding),
+    /// Stay until this controller tick.
+    Rest {
         until_tick: u64,
+    },
+    Load(Loading),
+    Creep(Creeping),
+    Weigh(Box<Weighing>),
+    Prompt {
+        deadline: Nanos,
     },
 }
 
@@ -99,6 +129,10 @@ pub(super) enum Activity {
     Starting,
     /// Running the plan.
     Step(Active),
+    /// Coming to rest between two steps.
+    Between { then: Then, deadline: Nanos },
+    /// At rest until the operator goes on; with the step to go on with, if that is sound.
+    Paused { next: Result<usize, &'static str> },
     /// Decelerating because of `ending`.
     Braking { ending: Outcome, deadline: Nanos },
     /// At rest after a stop; the operator may retract or close.
@@ -107,6 +141,26 @@ pub(super) enum Activity {
     Retracting { ending: Outcome },
     /// Over.
     Ended(Outcome),
+}
+
+/// What follows once the axis rests between two steps.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Then {
+    /// This step begins.
+    Begin(usize),
+    /// Back to where the step began, then it begins again.
+    Return(usize),
+    /// The run pauses.
+    Pause(Result<usize, &'static str>),
+}
+
+/// A pause that was asked for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Pause {
+    /// Behind this step.
+    After(usize),
+    /// The waiting in progress goes on until the operator resumes.
+    Extended,
 }
 
 /// A move under way, for its time limit.
@@ -140,6 +194,14 @@ pub struct State {
     pub(super) unacknowledged: VecDeque<(Nanos, RigCommand)>,
     pub(super) in_flight: Option<MoveInFlight>,
     pub(super) live: Option<LiveEstimate>,
+    pub(super) pause: Option<Pause>,
+    /// Where the step in progress began, and how often it was tried again.
+    pub(super) step_from: i64,
+    pub(super) retries: u32,
+    pub(super) monitors: Vec<Condition>,
+    /// Whether the probe leaves the tissue by itself once the axis rests after a stop.
+    pub(super) leaves_after_stop: bool,
+    pub(super) is_finished_early: bool,
 }
 
 impl State {
@@ -165,6 +227,12 @@ impl State {
             unacknowledged: VecDeque::new(),
             in_flight: None,
             live: None,
+            pause: None,
+            step_from: 0,
+            retries: 0,
+            monitors: vec![Condition::default(); config.plan.monitors.len()],
+            leaves_after_stop: false,
+            is_finished_early: false,
             config,
         }
     }
@@ -175,13 +243,47 @@ impl State {
         self.phase
     }
 
-    /// Cycle number; a ramp and hold has one cycle.
+    /// Repeat of the measurement, from 1; 0 where nothing is measured. A ramp and hold has one cycle.
     #[must_use]
     pub fn cycle(&self) -> u32 {
-        u32::from(matches!(
-            self.phase,
-            Phase::Ramp | Phase::Hold | Phase::Unload
-        ))
+        let planned = self.config.plan.steps.get(self.step_index);
+        let cycle = planned.map_or(0, |planned| planned.cycle);
+        match self.phase {
+            Phase::Ramp | Phase::Hold | Phase::Unload | Phase::Creep | Phase::Sine => cycle.max(1),
+            Phase::Rest | Phase::Weigh => cycle,
+            _ => 0,
+        }
+    }
+
+    /// Whether and how the run is paused or about to.
+    #[must_use]
+    pub fn pause(&self) -> PauseView {
+        match (&self.activity, self.pause) {
+            (Activity::Paused { next }, _)
+            | (
+                Activity::Between {
+                    then: Then::Pause(next),
+                    ..
+                },
+                _,
+            ) => PauseView::Paused {
+                no_resume: next.err(),
+            },
+            (_, Some(Pause::Extended)) => PauseView::Paused { no_resume: None },
+            (_, Some(Pause::After(step_index))) => PauseView::Pending { step_index },
+            (_, None) => PauseView::None,
+        }
+    }
+
+    /// The prompt that waits for an answer, and until when.
+    #[must_use]
+    pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
+        match (&self.activity, self.current_step()) {
+            (Activity::Step(Active::Prompt { deadline }), Some(Step::Prompt(prompt))) => {
+                Some((prompt, *deadline))
+            }
+            _ => None,
+        }
     }
 
     /// Index of the step in progress, and since when.
@@ -226,6 +328,12 @@ impl State {
         self.live.as_ref()
     }
 
+    /// Whether a plan runs that never energised the motor, such as a calibration: no command can move the axis.
+    #[must_use]
+    pub fn is_unpowered(&self) -> bool {
+        self.power == Power::Stopped && matches!(self.activity, Activity::Step(_))
+    }
+
     /// Whether the axis may be moving or about to move.
     #[must_use]
     pub fn is_motion_possible(&self) -> bool {
@@ -233,6 +341,8 @@ impl State {
             self.activity,
             Activity::Starting
                 | Activity::Step(_)
+                | Activity::Between { .. }
+                | Activity::Paused { .. }
                 | Activity::Braking { .. }
                 | Activity::Retracting { .. }
         )
@@ -273,7 +383,8 @@ impl State {
     /// The plan's step in progress, if any.
     #[must_use]
     pub fn current_step(&self) -> Option<&Step> {
-        self.config.plan.steps.get(self.step_index)
+        let planned = self.config.plan.steps.get(self.step_index)?;
+        Some(&planned.step)
     }
 
     /// What does not change during the run.

@@ -2,17 +2,22 @@
 
 use super::contact::ContactSearch;
 use super::context::{Context, Progress};
-use super::hold;
+use super::creep::Creeping;
+use super::hold::{self, Holding};
 use super::home::Homing;
-use super::input::{Effect, EndingKind, Input, Operator, Outcome, Record};
+use super::input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record};
 use super::interlock::{self, Interlock, Trip};
+use super::load::Loading;
 use super::self_test::SelfTest;
-use super::state::{Active, Activity, Derived, Power, State};
-use super::stop;
+use super::state::{Active, Activity, Derived, Pause, Power, State};
 use super::tare::Taring;
+use super::weigh::Weighing;
+use super::{between, monitor, pause, prompt, stop};
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Reading, RigCommand};
+use palpate_model::rig::{
+    Ack, AxisStatus, Fault, Oscillation, PathTracker, Phase, Reading, RigCommand,
+};
 use palpate_model::units::{Depth, Position, Seconds};
 
 /// Longest time a controller may take to acknowledge a command.
@@ -54,11 +59,15 @@ fn on_reading(cx: &mut Context<'_>, reading: &Reading) {
         return on_trip(cx, trip);
     }
     if cx.state.activity == Activity::Starting {
-        return begin_step(cx, 0);
+        return begin(cx, 0);
     }
-    match cx.state.activity.take_step() {
-        Some(active) => run_step(cx, active, reading),
-        None => stop::on_time(cx),
+    monitor::judge(cx, reading);
+    match cx.state.activity {
+        Activity::Between { then, deadline } => between::on_reading(cx, then, deadline),
+        _ => match cx.state.activity.take_step() {
+            Some(active) => run_step(cx, active, reading),
+            None => stop::on_time(cx),
+        },
     }
 }
 
@@ -101,37 +110,77 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
             Ok(false) => Progress::Continue,
             Err(reason) => Progress::Fail(reason),
         },
-        Active::Hold { until_tick } if reading.tick >= *until_tick => Progress::Done,
-        Active::Hold { .. } => Progress::Continue,
+        Active::Hold(hold) => hold.on_reading(cx, reading),
+        Active::Rest { until_tick } if reading.tick >= *until_tick => Progress::Done,
+        Active::Rest { .. } => Progress::Continue,
+        Active::Load(load) => load.on_reading(cx),
+        Active::Creep(creep) => creep.on_reading(cx, reading),
+        Active::Weigh(weighing) => weighing.on_reading(cx, reading),
+        Active::Prompt { deadline } => prompt::on_time(cx, deadline),
     };
+    // A wait that is paused stays what it is until the operator goes on.
+    let is_extended = cx.state.pause == Some(Pause::Extended);
     match progress {
+        Progress::Done if is_extended => cx.state.activity = Activity::Step(active),
         Progress::Continue => cx.state.activity = Activity::Step(active),
-        Progress::Done => begin_step(cx, cx.state.step_index + 1),
-        Progress::Fail(reason) => stop::begin(cx, EndingKind::Abort, reason),
+        Progress::Done => next(cx),
+        Progress::Fail(reason) => fail(cx, reason),
+        Progress::Stop(reason) => stop::begin(cx, EndingKind::Stop, reason),
+    }
+}
+
+fn fail(cx: &mut Context<'_>, reason: String) {
+    if let Progress::Fail(reason) = between::on_failure(cx, reason) {
+        stop::begin(cx, EndingKind::Abort, reason);
+    }
+}
+
+/// The step in progress is done: a pause that was asked for begins, or the next step.
+pub(super) fn next(cx: &mut Context<'_>) {
+    let step_index = cx.state.step_index;
+    if cx.state.pause == Some(Pause::After(step_index)) {
+        pause::at_checkpoint(cx, step_index);
+    } else {
+        begin(cx, step_index + 1);
     }
 }
 
 /// Begins a step of the plan, skipping what is already done, or finishes the run.
-fn begin_step(cx: &mut Context<'_>, step_index: usize) {
-    let Some(step) = cx.state.config.plan.steps.get(step_index).copied() else {
+pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
+    let config = std::sync::Arc::clone(&cx.state.config);
+    let Some(step) = config
+        .plan
+        .steps
+        .get(step_index)
+        .map(|planned| &planned.step)
+    else {
         cx.state.power = Power::Stopped;
+        let reason = if cx.state.is_finished_early {
+            "finished early by the operator"
+        } else {
+            "the plan is complete"
+        };
         return stop::end(
             cx,
             Outcome {
                 ending: EndingKind::Finish,
-                reason: "the plan is complete".into(),
+                reason: reason.into(),
             },
         );
     };
+    if step_index != cx.state.step_index || cx.state.phase == Phase::Idle {
+        cx.state.retries = 0;
+    }
     cx.state.step_index = step_index;
     cx.state.step_started = cx.now;
+    cx.state.step_from = cx.state.pulses;
     if matches!(step, Step::Home { .. }) && cx.state.is_homed {
-        return begin_step(cx, step_index + 1);
+        return next(cx);
     }
     cx.enter_phase(step.phase());
-    match begin_active(cx, &step) {
+    match begin_active(cx, step) {
         Ok(active) => cx.state.activity = Activity::Step(active),
-        Err(reason) => stop::begin(cx, EndingKind::Abort, format!("{}: {reason}", step.phase())),
+        Err(reason) => fail(cx, format!("{}: {reason}", step.phase())),
     }
 }
 
@@ -156,9 +205,13 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             cx.move_to(target, speed)?;
             Active::Move
         }
-        Step::Hold { duration, .. } => Active::Hold {
+        Step::LoadTo(plan) => Active::Load(Loading::begin(cx, plan)?),
+        Step::Hold { duration, rate, .. } => Active::Hold(Holding::begin(cx, duration, rate)),
+        Step::HoldForce(plan) => Active::Creep(Creeping::begin(cx, plan)?),
+        Step::Rest { duration } => Active::Rest {
             until_tick: cx.state.tick + cx.state.ticks(duration),
         },
+        Step::Prompt(ref asked) => prompt::begin(cx, asked),
         Step::Unload {
             speed,
             clearance_mm,
@@ -176,6 +229,22 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             cx.move_to_pulses(cx.state.pulses + pulses, speed)?;
             Active::Move
         }
+        Step::Sine(ref sine) => {
+            let rig = &cx.state.config.rig;
+            let command = Oscillation {
+                amplitude_pulses: (sine.amplitude_mm / rig.mm_per_pulse).round() as i64,
+                period_ticks: (1.0 / (sine.frequency_hz * rig.tick().0)).round() as u32,
+                cycles: sine.cycles,
+                acceleration: rig.acceleration,
+            };
+            cx.oscillate(command)?;
+            Active::Move
+        }
+        Step::Weigh(ref weigh) => Active::Weigh(Box::new(Weighing::begin(cx, weigh.clone()))),
+        Step::CheckHome { speed, touch_speed } => {
+            Active::Home(Homing::begin_check(cx, speed, touch_speed)?)
+        }
+        Step::FindBase(_) => return Err("the base cannot be found yet".into()),
     })
 }
 
@@ -308,6 +377,12 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         ),
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
+        Operator::Pause => pause::now(cx, "the operator asked for it".into()),
+        Operator::PauseAfter { step_index } => pause::after(cx, step_index),
+        Operator::Resume => pause::resume(cx),
+        Operator::Finish => pause::finish(cx),
+        Operator::Confirm => prompt::answer(cx, Answer::Confirmed),
+        Operator::Decline => prompt::answer(cx, Answer::Declined),
     }
 }
 

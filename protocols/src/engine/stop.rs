@@ -28,7 +28,11 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
         Activity::Braking { ending, .. }
         | Activity::Holding { ending }
         | Activity::Retracting { ending } => ending.clone(),
-        Activity::Waiting | Activity::Starting | Activity::Step(_) => {
+        Activity::Waiting
+        | Activity::Starting
+        | Activity::Step(_)
+        | Activity::Between { .. }
+        | Activity::Paused { .. } => {
             cx.record(Record::EndingStarted {
                 ending,
                 reason: reason.clone(),
@@ -38,6 +42,7 @@ pub(super) fn begin(cx: &mut Context<'_>, ending: EndingKind, reason: String) {
     };
     cx.state.power = Power::Stopped;
     cx.state.in_flight = None;
+    cx.state.pause = None;
     // Any operator stop reaches the rig, also when the engine believes the axis at rest.
     if is_halt {
         cut(cx);
@@ -101,6 +106,11 @@ pub(super) fn on_time(cx: &mut Context<'_>) {
             Ok(_) => {}
             Err(reason) => begin(cx, EndingKind::Abort, reason),
         },
+        // A plan that wanted the probe out has its wish once the axis rests.
+        Activity::Holding { .. } if cx.state.leaves_after_stop => {
+            cx.state.leaves_after_stop = false;
+            retract(cx);
+        }
         _ => {}
     }
 }

@@ -50,11 +50,7 @@ impl Bench {
             rig: rig(),
             limits: Limits::for_travel(Position(150.0)),
             curve: calibration.curve().unwrap(),
-            plan: Plan {
-                name: "table".into(),
-                version: 1,
-                steps,
-            },
+            plan: Plan::of("table", 1, steps),
             is_homed: true,
         };
         let state = Some(State::new(Arc::new(config)));
@@ -84,6 +80,7 @@ impl Bench {
             Step::Hold {
                 duration: Seconds(hold),
                 until,
+                rate: None,
             },
         ]);
         bench.start();

@@ -1,14 +1,22 @@
 //! Plans: serialisable lists of typed steps. A plan never moves anything.
 
+pub mod hold_rate;
 pub mod hold_until;
+pub mod monitor;
 pub mod ramp_hold;
+pub mod step;
 
-use palpate_model::rig::Phase;
-use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::rig::Limits;
+use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 
+pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
+pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::RampHold;
+pub use step::{
+    FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
+};
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -17,130 +25,110 @@ pub struct Plan {
     pub name: String,
     /// Version of the plan's own definition.
     pub version: u32,
-    /// The steps.
-    pub steps: Vec<Step>,
+    /// The steps, loops written out.
+    pub steps: Vec<PlannedStep>,
+    /// What is watched beside the interlocks.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub monitors: Vec<Monitor>,
+    /// Limits tighter than the rig's.
+    #[serde(default, skip_serializing_if = "PlanLimits::is_none")]
+    pub limits: PlanLimits,
 }
 
-/// One step of a plan.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(tag = "step", rename_all = "kebab-case", deny_unknown_fields)]
-pub enum Step {
-    /// Check link, stop command, sample rate and signal at rest; energise the motor.
-    SelfTest {
-        /// How long the signal is watched.
-        duration: Seconds,
-    },
-    /// Find the home switch, unless the axis is homed already.
-    Home {
-        /// Speed of the search.
-        speed: MmPerS,
-        /// Speed of the second touch, which defines position zero.
-        touch_speed: MmPerS,
-    },
-    /// Average the unloaded signal.
-    Tare {
-        /// Whole mains cycles: a whole second is 50 or 60 of them.
-        duration: Seconds,
-    },
-    /// Find the tissue surface in two passes and rest before the measurement.
-    FindContact(FindContact),
-    /// Indent to a depth at constant speed.
-    Ramp {
-        /// Indentation speed.
-        speed: MmPerS,
-        /// Depth from contact.
-        depth: Depth,
-    },
-    /// Stay at depth while the force relaxes.
-    Hold {
-        /// How long, at most.
-        duration: Seconds,
-        /// What may end it before.
-        #[serde(default, skip_serializing_if = "Option::is_none")]
-        until: Option<HoldUntil>,
-    },
-    /// Come back to the surface at constant speed, as carefully recorded as the way in.
-    Unload {
-        /// Speed of the way back.
-        speed: MmPerS,
-        /// Distance from contact to stop at, in mm: where the force is surely gone.
-        clearance_mm: f64,
-    },
-    /// Leave the tissue.
-    Retract {
-        /// Speed of the way out.
-        speed: MmPerS,
-        /// Distance from contact to stop at, in mm.
-        clearance_mm: f64,
-    },
-    /// Move by a signed distance; allowed before homing.
-    Jog {
-        /// Signed distance in mm, positive towards the tissue.
-        distance_mm: f64,
-        /// Speed.
-        speed: MmPerS,
-    },
+/// One step at its place in the plan.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PlannedStep {
+    /// What to do.
+    #[serde(flatten)]
+    pub step: Step,
+    /// Which repeat of the measurement it belongs to, from 1; 0 where nothing is repeated.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub cycle: u32,
+    /// Name of the checkpoint behind this step: where the run may pause without spoiling data.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub checkpoint: Option<String>,
+    /// What follows if the step cannot be done.
+    #[serde(default, skip_serializing_if = "OnFailure::is_default")]
+    pub on_failure: OnFailure,
 }
 
-/// Parameters of the contact search.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct FindContact {
-    /// Speed of the first pass.
-    pub approach_speed: MmPerS,
-    /// Filtered force above tare that ends the first pass.
-    pub criterion: Newtons,
-    /// Distance to withdraw before the second pass, in mm.
-    pub retreat_mm: f64,
-    /// Speed of the second pass.
-    pub pass_speed: MmPerS,
-    /// Filtered force that ends the second pass: enough of the onset to fit its start.
-    pub pass_force: Newtons,
-    /// Rest after each pass, about ten relaxation times of soft tissue.
-    pub recovery: Seconds,
-    /// Widest accepted standard error of the contact position, in mm.
-    pub std_error_mm_max: f64,
+/// What follows a step that cannot be done. Interlocks always stop the run.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnFailure {
+    /// The run is given up; the data is kept.
+    #[default]
+    Abort,
+    /// Back to where the step began and once more, so many times; then as [`OnFailure::Abort`].
+    Retry(u32),
+    /// Written down, and the plan goes on with the next step.
+    Skip,
 }
 
-impl Default for FindContact {
-    /// 1.5 mm/s stays under the 2-3 mm/s above which published testers trigger late;
-    /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is ten times
-    /// slower and goes on to 0.1 N, a fifth of the 0.5 N that contact finding may ever exert.
-    fn default() -> Self {
+/// Limits that a plan adds to the rig's own. They can only be tighter.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanLimits {
+    /// Highest force above tare.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub force_max: Option<Newtons>,
+}
+
+impl PlanLimits {
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_none(&self) -> bool {
+        self.force_max.is_none()
+    }
+
+    /// The rig's limits, made tighter where this plan asks for it.
+    #[must_use]
+    pub fn tighten(&self, mut limits: Limits) -> Limits {
+        if let Some(force) = self.force_max {
+            limits.force_max = Newtons(limits.force_max.0.min(force.0));
+        }
+        limits
+    }
+}
+
+impl OnFailure {
+    fn is_default(&self) -> bool {
+        *self == Self::default()
+    }
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn is_zero(cycle: &u32) -> bool {
+    *cycle == 0
+}
+
+impl From<Step> for PlannedStep {
+    fn from(step: Step) -> Self {
         Self {
-            approach_speed: MmPerS(1.5),
-            criterion: Newtons(0.03),
-            retreat_mm: 3.0,
-            pass_speed: MmPerS(0.15),
-            pass_force: Newtons(0.1),
-            recovery: Seconds(10.0),
-            std_error_mm_max: 0.1,
+            step,
+            cycle: 0,
+            checkpoint: None,
+            on_failure: OnFailure::default(),
         }
     }
 }
 
-impl Step {
-    /// The phase a step begins with.
+impl Plan {
+    /// A plan of steps with nothing repeated, watched or named.
     #[must_use]
-    pub fn phase(&self) -> Phase {
-        match self {
-            Self::SelfTest { .. } => Phase::SelfTest,
-            Self::Home { .. } => Phase::Home,
-            Self::Tare { .. } => Phase::Tare,
-            Self::FindContact(_) => Phase::Contact,
-            Self::Ramp { .. } => Phase::Ramp,
-            Self::Hold { .. } => Phase::Hold,
-            Self::Unload { .. } => Phase::Unload,
-            Self::Retract { .. } => Phase::Retract,
-            Self::Jog { .. } => Phase::Jog,
+    pub fn of(name: &str, version: u32, steps: Vec<Step>) -> Self {
+        Self {
+            name: name.into(),
+            version,
+            steps: steps.into_iter().map(PlannedStep::from).collect(),
+            monitors: Vec::new(),
+            limits: PlanLimits::default(),
         }
     }
 
-    /// Whether the step moves the probe by a known position, which needs a homed axis.
-    #[must_use]
-    pub fn needs_homed_axis(&self) -> bool {
-        matches!(
-            self,
-            Self::FindContact(_) | Self::Ramp { .. } | Self::Unload { .. } | Self::Retract { .. }
-        )
+    /// The checkpoints ahead of a step: index of the step before each, and its name.
+    pub fn checkpoints_from(&self, step_index: usize) -> impl Iterator<Item = (usize, &str)> {
+        let steps = self.steps.iter().enumerate().skip(step_index);
+        steps.filter_map(|(index, planned)| Some((index, planned.checkpoint.as_deref()?)))
     }
 }

@@ -62,6 +62,7 @@ impl RampHold {
             Step::Hold {
                 duration: self.hold,
                 until: self.until,
+                rate: None,
             },
         ];
         steps.extend(self.unload.map(|speed| Step::Unload {
@@ -72,10 +73,6 @@ impl RampHold {
             speed: MmPerS(6.0),
             clearance_mm: 10.0,
         });
-        Plan {
-            name: "ramp-hold".into(),
-            version: 1,
-            steps,
-        }
+        Plan::of("ramp-hold", 1, steps)
     }
 }

@@ -88,6 +88,7 @@ fn an_answer_from_before_the_hold_ends_nothing() {
         Step::Hold {
             duration: Seconds(0.1),
             until: Some(rule(0.0)),
+            rate: None,
         },
     ]);
     bench.start();
@@ -109,7 +110,8 @@ fn a_plan_without_a_rule_is_written_and_read_as_before() {
         step,
         Step::Hold {
             duration: Seconds(2.0),
-            until: None
+            until: None,
+            rate: None,
         }
     );
     assert_eq!(serde_json::to_string(&step).unwrap(), text);

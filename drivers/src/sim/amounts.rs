@@ -1,0 +1,152 @@
+//! Settings of the simulated rig that are an amount of something, each with its unit and range.
+
+use super::settings::SimSettingError;
+use palpate_model::Newtons;
+use std::fmt;
+use std::str::FromStr;
+
+/// A whole number of a unit within a range.
+macro_rules! amount {
+    ($(#[$doc:meta])* $name:ident, $word:literal, $usual:literal, $range:expr, $choices:literal) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub struct $name(u32);
+
+        impl Default for $name {
+            fn default() -> Self {
+                Self($usual)
+            }
+        }
+
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                self.0.fmt(f)
+            }
+        }
+
+        impl FromStr for $name {
+            type Err = SimSettingError;
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                let amount = text.parse().ok().filter(|amount| $range.contains(amount));
+                amount
+                    .map(Self)
+                    .ok_or_else(|| SimSettingError::new($word, text, $choices))
+            }
+        }
+    };
+}
+
+amount!(
+    /// White noise of the ideal load cell, rms, in whole mN.
+    SimNoise, "noise", 20, (0..=1000), "0 to 1000 (whole millinewtons)"
+);
+amount!(
+    /// Stiffness of the tissue in whole percent of what it usually is: `mu` and `tau_sig` alike, so that
+    /// forces scale and times do not.
+    SimStiffness, "stiffness", 100, (10..=1000), "10 to 1000 (whole percent)"
+);
+amount!(
+    /// How far the rig itself gives way under force, in whole um/N.
+    SimCompliance, "compliance", 0, (0..=1000), "0 to 1000 (whole micrometres per newton)"
+);
+
+impl SimNoise {
+    /// The noise in N.
+    #[must_use]
+    pub fn newtons(self) -> Newtons {
+        // A quotient of whole numbers is the nearest double to the decimal fraction.
+        Newtons(f64::from(self.0) / 1000.0)
+    }
+}
+
+impl SimStiffness {
+    /// As a share: 1 is usual.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        f64::from(self.0) / 100.0
+    }
+}
+
+impl SimCompliance {
+    /// In mm/N.
+    #[must_use]
+    pub fn mm_per_newton(self) -> f64 {
+        f64::from(self.0) / 1000.0
+    }
+}
+
+/// From the surface of the specimen a rig begins with to the stiff base behind it, in mm to a tenth.
+///
+/// Usually 100 mm, so far behind that only a search without specimen meets it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SimThickness {
+    tenths: u32,
+}
+
+/// Thinnest: fresh specimens differ by up to 4 mm in where their surface is, and each has to be before the base.
+const TENTHS_MIN: u32 = 50;
+/// Thickest: the base is then behind the travel.
+const TENTHS_MAX: u32 = 2000;
+
+impl SimThickness {
+    /// In mm.
+    #[must_use]
+    pub fn mm(self) -> f64 {
+        f64::from(self.tenths) / 10.0
+    }
+}
+
+impl Default for SimThickness {
+    fn default() -> Self {
+        Self { tenths: 1000 }
+    }
+}
+
+impl fmt::Display for SimThickness {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        self.mm().fmt(f)
+    }
+}
+
+impl FromStr for SimThickness {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let refused = || {
+            let choices = "5 to 200 (millimetres, to a tenth)";
+            SimSettingError::new("thickness", text, choices)
+        };
+        let tenths = 10.0 * text.parse::<f64>().map_err(|_| refused())?;
+        // A decimal number misses its tenth by rounding only.
+        let is_tenth = (tenths - tenths.round()).abs() < 1e-9;
+        let is_inside = (f64::from(TENTHS_MIN)..=f64::from(TENTHS_MAX)).contains(&tenths.round());
+        if is_tenth && is_inside {
+            let tenths = tenths.round() as u32;
+            Ok(Self { tenths })
+        } else {
+            Err(refused())
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn amounts_are_read_within_their_range() {
+        assert_eq!(SimNoise::default().newtons(), Newtons(0.02));
+        assert_eq!("50".parse::<SimNoise>().unwrap().newtons(), Newtons(0.05));
+        assert_eq!("50".parse::<SimStiffness>().unwrap().share(), 0.5);
+        assert_eq!("40".parse::<SimCompliance>().unwrap().mm_per_newton(), 0.04);
+        assert_eq!("12.3".parse::<SimThickness>().unwrap().mm(), 12.3);
+        for wrong in ["", "-1", "1001", "2.5", "nan", "1e9"] {
+            assert!(wrong.parse::<SimNoise>().is_err(), "{wrong}");
+            assert!(wrong.parse::<SimThickness>().is_err(), "{wrong}");
+        }
+        let err = "5".parse::<SimStiffness>().unwrap_err();
+        assert_eq!(
+            err.to_string(),
+            "the simulated rig's stiffness cannot be '5'; give 10 to 1000 (whole percent)"
+        );
+    }
+}

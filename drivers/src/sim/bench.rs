@@ -1,0 +1,156 @@
+//! What stands before the probe - a specimen, a stiff base behind it - and the weights a person puts on the
+//! cell. The rig gives way in between: the probe is not quite where the axis is.
+
+use super::random::Random;
+use super::settings::SimSettings;
+use super::tissue::Tissue;
+use palpate_model::rig::HandAction;
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_model::{Newtons, Position, Seconds};
+
+/// Stiffness of the base in N/mm: a box wall of some millimetres of acrylic. At the 0.03 mm/s of a careful
+/// touch the force then rises by 3 N/s, slow enough to be stopped in time.
+const BASE_STIFFNESS: f64 = 100.0;
+
+/// The probe's position is solved for this closely, in mm: far below what any force resolves.
+const SOLVED_MM: f64 = 1e-12;
+
+/// Four to eight steps are usual; a search that takes more is stuck at the rounding of the force.
+const SOLVE_STEPS_MAX: usize = 60;
+
+/// What the probe and the cell feel at a tick.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Felt {
+    /// True position of the probe's tip.
+    pub probe: Position,
+    /// Force on the probe.
+    pub on_probe: Newtons,
+    /// Force on the load cell: the probe's and the weights'.
+    pub on_cell: Newtons,
+}
+
+/// The bench of one rig.
+#[derive(Clone, Debug)]
+pub struct Bench {
+    settings: SimSettings,
+    specimen: Option<Tissue>,
+    base: Position,
+    /// Of the specimen clipped in last.
+    body: ModifiedKelvin,
+    weights: Newtons,
+    probe: Position,
+}
+
+impl Bench {
+    /// The bench as the rig is switched on, its own specimen clipped in and the probe far outside.
+    pub fn new(settings: &SimSettings, probe: Position) -> Self {
+        let specimen = Tissue::new(&mut Random::of_specimen(settings.seed, 0), settings);
+        Self {
+            settings: *settings,
+            base: specimen.surface().moved_by(settings.thickness.mm()),
+            body: specimen.body(),
+            specimen: Some(specimen),
+            weights: Newtons(0.0),
+            probe,
+        }
+    }
+
+    /// What the probe would meet first: the specimen's surface, or without a specimen the base.
+    pub fn surface(&self) -> Position {
+        self.specimen.as_ref().map_or(self.base, Tissue::surface)
+    }
+
+    /// Front of the base.
+    pub fn base(&self) -> Position {
+        self.base
+    }
+
+    /// Parameters of the specimen clipped in last.
+    pub fn body(&self) -> ModifiedKelvin {
+        self.body
+    }
+
+    /// A person does something. A mass that is none, negative or not finite, changes nothing.
+    pub fn by_hand(&mut self, action: HandAction) {
+        match action {
+            HandAction::LoadCell { mass_g } if mass_g >= 0.0 && mass_g.is_finite() => {
+                self.weights = HandAction::weight(mass_g);
+            }
+            HandAction::LoadCell { .. } => {}
+            HandAction::Mount { specimen } => {
+                let mut random = Random::of_specimen(self.settings.seed, specimen);
+                let tissue = Tissue::new(&mut random, &self.settings).clipped_before(self.probe);
+                self.body = tissue.body();
+                self.specimen = Some(tissue);
+            }
+            HandAction::Unmount => self.specimen = None,
+        }
+    }
+
+    /// The axis has moved straight to a true position in a time step.
+    pub fn advance(&mut self, axis: Position, dt: Seconds) -> Felt {
+        let compliance = self.settings.compliance.mm_per_newton();
+        self.probe = if compliance > 0.0 {
+            self.balanced(axis, dt, compliance)
+        } else {
+            axis
+        };
+        let on_probe = self.push(self.probe, dt);
+        Felt {
+            probe: self.probe,
+            on_probe,
+            on_cell: on_probe + self.weights,
+        }
+    }
+
+    /// Where the force that bends the rig is the force that tissue and base have there:
+    /// `probe = axis - compliance F(probe)` at the end of the step. Found by bisection with false-position
+    /// steps in the bracket (the Illinois rule, Dowell & Jarratt, BIT 11 (1971) 168-174), for the force
+    /// within a step grows with depth.
+    fn balanced(&self, axis: Position, dt: Seconds, compliance: f64) -> Position {
+        let miss = |probe: f64| {
+            let force = self.clone().push(Position(probe), dt).0;
+            probe + compliance * force - axis.0
+        };
+        let (mut high, mut high_miss) = (axis.0, miss(axis.0));
+        let mut low = axis.0 - high_miss;
+        let mut low_miss = miss(low);
+        let mut at = low;
+        let mut is_high_kept = None;
+        for _ in 0..SOLVE_STEPS_MAX {
+            let between = (low * high_miss - high * low_miss) / (high_miss - low_miss);
+            if !(between > low && between < high) {
+                break;
+            }
+            let here = miss(between);
+            at = between;
+            if here.abs() <= SOLVED_MM {
+                break;
+            }
+            // An end kept twice counts half, so that the bracket shrinks from both sides.
+            let keep_high = here <= 0.0;
+            let share = if is_high_kept == Some(keep_high) {
+                0.5
+            } else {
+                1.0
+            };
+            if keep_high {
+                (low, low_miss, high_miss) = (between, here, share * high_miss);
+            } else {
+                (high, high_miss, low_miss) = (between, here, share * low_miss);
+            }
+            is_high_kept = Some(keep_high);
+        }
+        Position(at)
+    }
+
+    /// Moves the probe and returns the force on it.
+    fn push(&mut self, probe: Position, dt: Seconds) -> Newtons {
+        let tissue = match &mut self.specimen {
+            Some(tissue) => tissue.advance(probe, dt),
+            None => Newtons(0.0),
+        };
+        let into_base = probe.distance_from(self.base).max(0.0);
+        tissue + Newtons(BASE_STIFFNESS * into_base)
+    }
+}

@@ -1,0 +1,58 @@
+//! Whatever motion is under way: the one path that a slider makes and a host follows.
+
+use super::oscillation::Sine;
+use super::profile::Profile;
+use crate::units::{MmPerS, Position, Seconds};
+
+/// Position and velocity as functions of the time since the start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Course {
+    /// A move from point to point, or the deceleration that cut a motion short.
+    Move(Profile),
+    /// In and out again.
+    Sine(Sine),
+}
+
+impl Course {
+    /// The deceleration to rest when it is stopped at `at`.
+    #[must_use]
+    pub fn stopped_at(&self, at: Seconds) -> Self {
+        Self::Move(match self {
+            Self::Move(profile) => profile.stopped_at(at),
+            Self::Sine(sine) => sine.stopped_at(at),
+        })
+    }
+
+    /// Time from start to rest.
+    #[must_use]
+    pub fn duration(&self) -> Seconds {
+        match self {
+            Self::Move(profile) => profile.duration(),
+            Self::Sine(sine) => sine.duration(),
+        }
+    }
+
+    /// Where it ends.
+    #[must_use]
+    pub fn end(&self) -> Position {
+        self.position(self.duration())
+    }
+
+    /// Commanded position at a time since the start; before and after, the ends.
+    #[must_use]
+    pub fn position(&self, at: Seconds) -> Position {
+        match self {
+            Self::Move(profile) => profile.position(at),
+            Self::Sine(sine) => sine.position(at),
+        }
+    }
+
+    /// Commanded velocity at a time since the start, signed.
+    #[must_use]
+    pub fn velocity(&self, at: Seconds) -> MmPerS {
+        match self {
+            Self::Move(profile) => profile.velocity(at),
+            Self::Sine(sine) => sine.velocity(at),
+        }
+    }
+}

@@ -1,0 +1,104 @@
+//! Constant force: the probe follows the tissue in small steps while the force is kept.
+
+use super::context::{Context, Progress};
+use crate::plans::HoldForce;
+use palpate_model::rig::Reading;
+use palpate_model::signal::MovingMean;
+use palpate_model::units::{Depth, Newtons, Position};
+
+/// Samples averaged before a correction: 50 ms at 1 kHz, two to three mains cycles.
+const FILTER_SAMPLES: usize = 50;
+
+/// Share of the error that a correction takes away if the tissue is as stiff as it is taken to be. Half stays far
+/// below the factor of two at which corrections would grow.
+const GAIN: f64 = 0.5;
+
+/// Stiffness at first, as a multiple of the secant's: soft tissue stiffens with depth and with speed. The thesis body's
+/// answer to a fast step is up to ten times its secant; the corrections find out.
+const STIFFNESS_FIRST: f64 = 10.0;
+
+/// Bounds of what the corrections may find, as multiples of the secant's stiffness.
+const STIFFNESS_RANGE: [f64; 2] = [1.0, 50.0];
+
+/// Share of a new finding in the stiffness; corrections of fewer pulses tell more of noise than of tissue.
+const LEARN: f64 = 0.3;
+const LEARN_PULSES: f64 = 4.0;
+
+/// Data of a force hold in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Creeping {
+    plan: HoldForce,
+    until_tick: u64,
+    /// No correction before this tick: the mean must be of the new position only.
+    quiet_until: u64,
+    filter: MovingMean,
+    /// Stiffness as a multiple of the secant's.
+    stiffness: f64,
+    /// Force before the correction under way and its length in mm.
+    corrected: Option<(f64, f64)>,
+}
+
+impl Creeping {
+    pub fn begin(cx: &Context<'_>, plan: HoldForce) -> Result<Self, String> {
+        if cx.state.contact.is_none() {
+            return Err("contact is not known; find it first".into());
+        }
+        Ok(Self {
+            plan,
+            until_tick: cx.state.tick + cx.state.ticks(plan.duration),
+            quiet_until: cx.state.tick + FILTER_SAMPLES as u64,
+            filter: MovingMean::new(FILTER_SAMPLES),
+            stiffness: STIFFNESS_FIRST,
+            corrected: None,
+        })
+    }
+
+    pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
+        match self.advance(cx, reading) {
+            Ok(progress) => progress,
+            Err(reason) => Progress::Fail(format!("creep: {reason}")),
+        }
+    }
+
+    fn advance(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
+        let force = cx.state.derived.force.unwrap_or(Newtons(0.0));
+        let depth = cx.state.derived.depth.unwrap_or(Depth(0.0));
+        let mean = Newtons(self.filter.push(force.0));
+        if depth > self.plan.depth_max {
+            return Err(format!(
+                "the probe reached {depth:.2}, deeper than {:.2}; check the specimen or allow a greater depth",
+                self.plan.depth_max
+            ));
+        }
+        if !cx.at_rest()? {
+            self.quiet_until = reading.tick + FILTER_SAMPLES as u64;
+            return Ok(Progress::Continue);
+        }
+        if reading.tick >= self.until_tick {
+            return Ok(Progress::Done);
+        }
+        if reading.tick < self.quiet_until {
+            return Ok(Progress::Continue);
+        }
+        let error = self.plan.force - mean;
+        // Secant stiffness; a probe hardly in the tissue counts as a tenth of a millimetre in.
+        let secant = self.plan.force.0 / depth.0.max(0.1);
+        if let Some((before, length)) = self.corrected.take() {
+            let found = (mean.0 - before) / length / secant;
+            let [least, most] = STIFFNESS_RANGE;
+            self.stiffness += LEARN * (found.clamp(least, most) - self.stiffness);
+        }
+        let correction_mm = GAIN * error.0 / (self.stiffness * secant);
+        let rig = &cx.state.config.rig;
+        let pulses = (correction_mm / rig.mm_per_pulse).round();
+        if pulses != 0.0 {
+            let to = cx.state.pulses + pulses as i64;
+            let end = Position(to as f64 * rig.mm_per_pulse);
+            let end = Position(end.0.clamp(0.0, cx.state.config.limits.travel_max.0));
+            cx.move_to(end, self.plan.speed)?;
+            let length = pulses * cx.state.config.rig.mm_per_pulse;
+            self.corrected = (pulses.abs() >= LEARN_PULSES).then_some((mean.0, length));
+        }
+        Ok(Progress::Continue)
+    }
+}

@@ -1,0 +1,96 @@
+//! The plan's own conditions, judged on every sample after the interlocks.
+
+use super::context::Context;
+use super::input::{EndingKind, Record};
+use super::state::Activity;
+use super::{pause, stop};
+use crate::plans::{Action, Source};
+use palpate_model::Nanos;
+use palpate_model::rig::Reading;
+
+/// How one monitor stands.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Condition {
+    is_tripped: bool,
+    /// Since when it is past again.
+    past_since: Option<Nanos>,
+}
+
+/// Judges all of them. They act only while the plan runs or is paused.
+pub(super) fn judge(cx: &mut Context<'_>, reading: &Reading) {
+    for index in 0..cx.state.monitors.len() {
+        if !matches!(
+            cx.state.activity,
+            Activity::Step(_) | Activity::Between { .. } | Activity::Paused { .. }
+        ) {
+            return;
+        }
+        let monitor = &cx.state.config.plan.monitors[index];
+        let derived = &cx.state.derived;
+        let value = match monitor.source {
+            Source::Force => derived.force.map(|force| force.0),
+            Source::Depth => derived.depth.map(|depth| depth.0),
+            Source::Volts => Some(reading.volts.0),
+            Source::Position => cx.state.is_homed.then_some(derived.position.0),
+        };
+        let Some(value) = value else { continue };
+        let condition = &cx.state.monitors[index];
+        if condition.is_tripped {
+            judge_past(cx, index, value);
+        } else if monitor.is_tripped_by(value) {
+            trip(cx, index, value);
+        }
+    }
+}
+
+fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
+    let monitor = &cx.state.config.plan.monitors[index];
+    let (action, message) = (monitor.action, monitor.message.clone());
+    cx.state.monitors[index] = Condition {
+        is_tripped: true,
+        past_since: None,
+    };
+    cx.record(Record::MonitorTripped {
+        index,
+        value,
+        message: message.clone(),
+    });
+    match action {
+        Action::Note => {}
+        Action::Pause => pause::now(cx, message),
+        Action::Stop => stop::begin(cx, EndingKind::Stop, message),
+        Action::Retract => {
+            cx.state.leaves_after_stop = true;
+            stop::begin(cx, EndingKind::Stop, message);
+        }
+        Action::Halt => stop::begin(cx, EndingKind::Halt, message),
+    }
+}
+
+/// A tripped monitor is past once its value has been for the settle time.
+fn judge_past(cx: &mut Context<'_>, index: usize, value: f64) {
+    let monitor = &cx.state.config.plan.monitors[index];
+    let (settle, action) = (monitor.settle, monitor.action);
+    let is_past = monitor.is_past_at(value);
+    let now = cx.now;
+    let condition = &mut cx.state.monitors[index];
+    if !is_past {
+        condition.past_since = None;
+        return;
+    }
+    let since = *condition.past_since.get_or_insert(now);
+    if now.since(since).seconds() < settle {
+        return;
+    }
+    *condition = Condition::default();
+    cx.record(Record::MonitorPast { index, value });
+    let is_another_tripped = cx
+        .state
+        .monitors
+        .iter()
+        .zip(&cx.state.config.plan.monitors)
+        .any(|(one, monitor)| one.is_tripped && monitor.action == Action::Pause);
+    if action == Action::Pause && !is_another_tripped {
+        pause::resume_by_itself(cx);
+    }
+}

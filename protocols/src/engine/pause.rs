@@ -1,0 +1,174 @@
+//! Pause and go on. A pause never repeats a measurement: tissue that was indented is another specimen, so a
+//! ramp that was interrupted can be finished early or given up, not resumed.
+
+use super::context::Context;
+use super::input::Record;
+use super::state::{Active, Activity, Pause, Then};
+use super::{between, step};
+use crate::plans::Step;
+use palpate_model::rig::Phase;
+
+/// What pausing means for a step in progress.
+enum Kind {
+    /// It only waits, and waits longer.
+    Wait,
+    /// It is short and does not move the probe: it is completed.
+    Complete,
+    /// It moves outside the measurement and can begin again.
+    Repeat,
+    /// It is the measurement.
+    Measure(&'static str),
+}
+
+fn kind(active: &Active, step: Option<&Step>) -> Kind {
+    match active {
+        Active::Hold(_) | Active::Rest { .. } | Active::Creep(_) | Active::Prompt { .. } => {
+            Kind::Wait
+        }
+        Active::SelfTest(_) | Active::Tare(_) | Active::Weigh(_) => Kind::Complete,
+        Active::Home(_) | Active::Contact(_) => Kind::Repeat,
+        Active::Load(_) => Kind::Measure("an interrupted indentation is another experiment"),
+        Active::Move => match step {
+            Some(Step::Ramp { .. }) => {
+                Kind::Measure("an interrupted indentation is another experiment")
+            }
+            Some(Step::Unload { .. }) => {
+                Kind::Measure("an interrupted unloading is another experiment")
+            }
+            Some(Step::Sine(_)) => {
+                Kind::Measure("an interrupted oscillation is another experiment")
+            }
+            _ => Kind::Repeat,
+        },
+    }
+}
+
+/// Pauses as soon as it is sound.
+pub(super) fn now(cx: &mut Context<'_>, reason: String) {
+    let step_index = cx.state.step_index;
+    let kind = match &cx.state.activity {
+        Activity::Step(active) => kind(active, cx.state.current_step()),
+        Activity::Between {
+            then: Then::Begin(index) | Then::Return(index),
+            ..
+        } => {
+            let next = Ok(*index);
+            return halt_motion(cx, next, reason);
+        }
+        _ => {
+            let reason = "nothing runs that could pause".to_owned();
+            return cx.record(Record::Refused { reason });
+        }
+    };
+    match kind {
+        Kind::Wait => {
+            cx.state.pause = Some(Pause::Extended);
+            cx.record(Record::Paused {
+                reason,
+                no_resume: None,
+            });
+        }
+        Kind::Complete => after(cx, step_index),
+        Kind::Repeat => halt_motion(cx, Ok(step_index), reason),
+        Kind::Measure(why) => halt_motion(cx, Err(why), reason),
+    }
+}
+
+/// Pauses behind a step that has not ended yet.
+pub(super) fn after(cx: &mut Context<'_>, step_index: usize) {
+    let is_ahead = (cx.state.step_index..cx.state.config.plan.steps.len()).contains(&step_index);
+    let is_running = matches!(
+        cx.state.activity,
+        Activity::Starting | Activity::Step(_) | Activity::Between { .. }
+    );
+    if !is_ahead || !is_running {
+        let reason = "that place of the plan is not ahead".to_owned();
+        return cx.record(Record::Refused { reason });
+    }
+    cx.state.pause = Some(Pause::After(step_index));
+    cx.record(Record::PausePending { step_index });
+}
+
+fn halt_motion(cx: &mut Context<'_>, next: Result<usize, &'static str>, reason: String) {
+    cx.record(Record::Paused {
+        reason,
+        no_resume: next.err().map(str::to_owned),
+    });
+    cx.state.pause = None;
+    cx.enter_phase(Phase::Paused);
+    between::come_to_rest(cx, Then::Pause(next));
+}
+
+/// The step behind which a pause was asked for is done: the axis rests.
+pub(super) fn at_checkpoint(cx: &mut Context<'_>, done_index: usize) {
+    let planned = cx.state.config.plan.steps.get(done_index);
+    let name = planned.and_then(|planned| planned.checkpoint.clone());
+    let reason = name.unwrap_or_else(|| format!("behind step {}", done_index + 1));
+    cx.state.pause = None;
+    cx.record(Record::Paused {
+        reason,
+        no_resume: None,
+    });
+    cx.enter_phase(Phase::Paused);
+    cx.state.activity = Activity::Paused {
+        next: Ok(done_index + 1),
+    };
+}
+
+/// The operator goes on.
+pub(super) fn resume(cx: &mut Context<'_>) {
+    match (&cx.state.activity, cx.state.pause) {
+        (Activity::Paused { next: Ok(next), .. }, _) => {
+            let next = *next;
+            cx.record(Record::Resumed);
+            step::begin(cx, next);
+        }
+        (Activity::Paused { next: Err(why), .. }, _) => {
+            let reason = format!("{why}; finish early or stop");
+            cx.record(Record::Refused { reason });
+        }
+        (_, Some(_)) => {
+            cx.state.pause = None;
+            cx.record(Record::Resumed);
+        }
+        _ => {
+            let reason = "the run is not paused".to_owned();
+            cx.record(Record::Refused { reason });
+        }
+    }
+}
+
+/// What paused the run is past: it goes on where that is sound, else the operator decides.
+pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
+    let can_resume = matches!(cx.state.activity, Activity::Paused { next: Ok(_), .. })
+        || cx.state.pause == Some(Pause::Extended);
+    if can_resume {
+        resume(cx);
+    }
+}
+
+/// The operator leaves out what is left to measure.
+pub(super) fn finish(cx: &mut Context<'_>) {
+    let is_at_rest = match &cx.state.activity {
+        Activity::Paused { .. } => true,
+        Activity::Step(active) => {
+            cx.state.pause == Some(Pause::Extended)
+                && !matches!(active, Active::Creep(_) if !cx.state.is_at_rest())
+        }
+        _ => false,
+    };
+    if !is_at_rest {
+        let reason = "pause first, then finish early".to_owned();
+        return cx.record(Record::Refused { reason });
+    }
+    cx.state.pause = None;
+    cx.state.is_finished_early = true;
+    cx.record(Record::FinishedEarly);
+    let steps = &cx.state.config.plan.steps;
+    let is_retract = |index: &usize| matches!(steps[*index].step, Step::Retract { .. });
+    let last = (cx.state.step_index + 1..steps.len())
+        .rev()
+        .find(is_retract);
+    let next = last.unwrap_or(steps.len());
+    step::begin(cx, next);
+}

@@ -1,0 +1,123 @@
+//! Conditions a plan watches on every sample, beside the interlocks and after them.
+
+use palpate_model::units::Seconds;
+use serde::{Deserialize, Serialize};
+
+/// One condition: what trips it, when it counts as past, and what happens.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Monitor {
+    /// What is watched.
+    pub source: Source,
+    /// Whether values above the threshold trip it, or values below.
+    pub side: Side,
+    /// The value that trips it, in the source's unit.
+    pub threshold: f64,
+    /// The value at which it is past again.
+    pub resume: f64,
+    /// How long it must be past before a paused run goes on.
+    pub settle: Seconds,
+    /// What happens.
+    pub action: Action,
+    /// What the operator reads, naming what tripped.
+    pub message: String,
+}
+
+/// What a monitor looks at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Source {
+    /// Force above tare, in N.
+    Force,
+    /// Depth from contact, in mm.
+    Depth,
+    /// Raw signal, in V.
+    Volts,
+    /// Machine position from home, in mm.
+    Position,
+}
+
+/// Which side of the threshold trips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Side {
+    /// At or above.
+    Above,
+    /// At or below.
+    Below,
+}
+
+/// What a monitor does when it trips.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Action {
+    /// Write it down.
+    Note,
+    /// Pause; go on by itself once it is past, where going on is sound.
+    Pause,
+    /// Stop the run and hold.
+    Stop,
+    /// Stop the run and leave the tissue.
+    Retract,
+    /// Cut the motion.
+    Halt,
+}
+
+impl Source {
+    /// Its unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Depth | Self::Position => "mm",
+            Self::Volts => "V",
+        }
+    }
+}
+
+impl Monitor {
+    /// Whether a value trips it.
+    #[must_use]
+    pub fn is_tripped_by(&self, value: f64) -> bool {
+        match self.side {
+            Side::Above => value >= self.threshold,
+            Side::Below => value <= self.threshold,
+        }
+    }
+
+    /// Whether a value is past it again.
+    #[must_use]
+    pub fn is_past_at(&self, value: f64) -> bool {
+        match self.side {
+            Side::Above => value <= self.resume,
+            Side::Below => value >= self.resume,
+        }
+    }
+
+    /// What is wrong with it, in words.
+    pub fn check(&self) -> Result<(), String> {
+        if !(self.threshold.is_finite() && self.resume.is_finite()) {
+            return Err("a monitor's threshold and resume value must be numbers".into());
+        }
+        let is_apart = match self.side {
+            Side::Above => self.resume <= self.threshold,
+            Side::Below => self.resume >= self.threshold,
+        };
+        if !is_apart {
+            return Err(format!(
+                "a monitor that trips at {} cannot be past at {}, which still trips it",
+                self.threshold, self.resume
+            ));
+        }
+        if !(0.0..=3600.0).contains(&self.settle.0) {
+            return Err(format!(
+                "a settle time of {} is not possible; give 0 to 3600 s",
+                self.settle
+            ));
+        }
+        if self.message.trim().is_empty() {
+            return Err("a monitor needs a message that names what tripped".into());
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,146 @@
+//! What the specimen is expected to answer: the thesis body, and how far others are from it.
+
+use crate::plans::{LoadTo, Sine};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+
+/// Softest and stiffest specimen expected, as multiples of the thesis body. Specimens of one
+/// organ differ in level by tens of percent; the band must not be narrower than that.
+const STIFFNESS_BAND: [f64; 2] = [0.7, 1.35];
+
+/// Points of one move: the exact step has no error of its own, so this is for the picture and for how well
+/// the depth at a force is known.
+const MOVE_POINTS: u32 = 48;
+
+/// Points of a wait and of one cycle of a sine.
+const WAIT_POINTS: u32 = 12;
+
+/// Cycles of a sine that are followed one by one; later ones repeat the last.
+const SINE_CYCLES_MAX: u32 = 20;
+
+/// One point of the picture of a plan.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct OutlinePoint {
+    /// Time since the start.
+    pub t: Seconds,
+    /// Depth from contact.
+    pub depth: Depth,
+    /// Force of the thesis body.
+    pub force: Newtons,
+    /// Phase.
+    pub phase: Phase,
+}
+
+/// The expected specimen on its way through the plan.
+pub(super) struct Expected {
+    state: KelvinState,
+    depth: f64,
+    t: f64,
+    force: f64,
+    /// Highest force of the thesis body under a prescribed depth, and highest force prescribed.
+    peak_of_depth: f64,
+    peak_of_force: f64,
+    has_outline: bool,
+    pub outline: Vec<OutlinePoint>,
+}
+
+impl Expected {
+    pub fn new(has_outline: bool) -> Self {
+        Self {
+            state: KelvinState::at_rest(),
+            depth: 0.0,
+            t: 0.0,
+            force: 0.0,
+            peak_of_depth: 0.0,
+            peak_of_force: 0.0,
+            has_outline,
+            outline: Vec::new(),
+        }
+    }
+
+    pub fn depth(&self) -> f64 {
+        self.depth
+    }
+
+    /// The probe is placed on relaxed tissue.
+    pub fn place(&mut self, depth: f64) {
+        self.state = KelvinState::at_rest();
+        (self.depth, self.force) = (depth, 0.0);
+    }
+
+    /// One straight piece of the way.
+    fn advance(&mut self, phase: Phase, depth: f64, secs: f64) {
+        let force = self
+            .state
+            .step(&ModifiedKelvin::THESIS, Depth(depth), Seconds(secs));
+        self.force = force.0.max(0.0);
+        self.depth = depth;
+        self.t += secs;
+        if self.has_outline {
+            self.outline.push(OutlinePoint {
+                t: Seconds(self.t),
+                depth: Depth(depth),
+                force: Newtons(self.force),
+                phase,
+            });
+        }
+    }
+
+    pub fn go(&mut self, phase: Phase, depth: f64, secs: f64) {
+        let from = self.depth;
+        for i in 1..=MOVE_POINTS {
+            let share = f64::from(i) / f64::from(MOVE_POINTS);
+            self.advance(
+                phase,
+                from + share * (depth - from),
+                secs / f64::from(MOVE_POINTS),
+            );
+            self.peak_of_depth = self.peak_of_depth.max(self.force);
+        }
+    }
+
+    pub fn stay(&mut self, phase: Phase, secs: f64) {
+        for _ in 0..WAIT_POINTS {
+            self.advance(phase, self.depth, secs / f64::from(WAIT_POINTS));
+        }
+    }
+
+    /// The force is kept; how far the tissue creeps is not predicted.
+    pub fn keep(&mut self, phase: Phase, secs: f64) {
+        let force = self.force;
+        self.stay(phase, secs);
+        for point in self.outline.iter_mut().rev().take(WAIT_POINTS as usize) {
+            point.force = Newtons(force);
+        }
+        self.force = force;
+    }
+
+    /// Indents until the force is reached; the time it takes, in s.
+    pub fn load(&mut self, phase: Phase, load: &LoadTo) -> f64 {
+        self.peak_of_force = self.peak_of_force.max(load.force.0);
+        let (begun, from) = (self.t, self.depth);
+        let piece = (load.depth_max.0 - from) / f64::from(4 * MOVE_POINTS);
+        while self.force < load.force.0 && self.depth + piece <= load.depth_max.0 && piece > 0.0 {
+            self.advance(phase, self.depth + piece, piece / load.speed.0);
+        }
+        self.t - begun
+    }
+
+    pub fn oscillate(&mut self, phase: Phase, sine: &Sine) {
+        let (from, period) = (self.depth, 1.0 / sine.frequency_hz);
+        let followed = sine.cycles.min(SINE_CYCLES_MAX);
+        for i in 1..=followed * MOVE_POINTS {
+            let turn = std::f64::consts::TAU * f64::from(i) / f64::from(MOVE_POINTS);
+            let depth = from + sine.amplitude_mm * (1.0 - turn.cos());
+            self.advance(phase, depth, period / f64::from(MOVE_POINTS));
+            self.peak_of_depth = self.peak_of_depth.max(self.force);
+        }
+        self.t += period * f64::from(sine.cycles - followed);
+    }
+
+    /// Peak force of the softest and the stiffest expected specimen.
+    pub fn force_band(&self) -> [Newtons; 2] {
+        STIFFNESS_BAND.map(|factor| Newtons((factor * self.peak_of_depth).max(self.peak_of_force)))
+    }
+}
