@@ -10,5 +10,6 @@ pub mod cycles;
 pub mod engine;
 pub mod plans;
 pub mod preview;
+pub mod programme;
 pub mod replay;
 pub mod runner;
