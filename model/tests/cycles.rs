@@ -162,6 +162,7 @@ fn a_hold_relaxes_or_creeps() {
     assert!((relaxation.half_time.unwrap().0 - 1.023 * 2f64.ln()).abs() < 0.01);
     let mut creeping = cycles(&[0.0], 12.0, 0.0);
     for one in creeping.iter_mut().filter(|one| one.phase == Phase::Hold) {
+        one.phase = Phase::Creep;
         one.depth = Depth(30.0 + 0.1 * (one.t.0 - 10.0));
         one.force = Newtons(5.0);
     }

@@ -205,14 +205,14 @@ fn is_fitted(row: &Row, stretch: Stretch) -> bool {
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
-fn is_saturated(session: &Session, row: &Row) -> bool {
+pub(crate) fn is_saturated(session: &Session, row: &Row) -> bool {
     let ends = session.manifest.rig.adc;
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
 
 /// How many samples came before an interlock tripped; all of them if none did.
-fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
+pub(crate) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
     let tripped = decisions
         .iter()
         .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
@@ -220,7 +220,7 @@ fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
 }
 
 /// What the engine decided, each after so many samples.
-fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
+pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     session
         .entries
         .iter()

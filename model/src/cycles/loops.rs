@@ -19,8 +19,6 @@ const HALF: usize = 2;
 const NEAR: f64 = 0.05;
 /// First part of the way in over which the force at the start is averaged.
 const START: f64 = 0.01;
-/// A hold whose depth moved further, in mm, held the force: a stepper at rest does not move a pulse.
-const CREEP_MIN: f64 = 0.05;
 
 /// The depth at which the way in last rose through a force.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -65,9 +63,9 @@ pub struct CycleAnalysis {
     pub levels: [Option<LevelDepth>; 3],
     /// Stiffness at the depth asked for.
     pub stiffness: Option<Stiffness>,
-    /// The hold of the depth, if there was one.
+    /// The hold of the depth, if there was one of twenty samples.
     pub relaxation: Option<Relaxation>,
-    /// The hold of the force, if there was one.
+    /// The hold of the force, if there was one of twenty samples.
     pub creep: Option<Creep>,
 }
 
@@ -94,10 +92,14 @@ pub fn analyse(samples: &[CycleSample], at: Option<Depth>) -> Vec<CycleAnalysis>
     let mut levels = None;
     let of_cycles: Vec<CycleSample> = samples
         .iter()
-        .filter(|one| matches!(one.phase, Phase::Ramp | Phase::Hold | Phase::Unload))
+        .filter(|one| is_of_cycle(one.phase))
         .copied()
         .collect();
-    for cycle in of_cycles.chunk_by(|one, next| one.cycle == next.cycle) {
+    // Steps of one cycle, as in a relaxation in several steps, each have a way in.
+    let is_same = |one: &CycleSample, next: &CycleSample| {
+        one.cycle == next.cycle && (next.phase != Phase::Ramp || one.phase == Phase::Ramp)
+    };
+    for cycle in of_cycles.chunk_by(is_same) {
         let Some(way) = WayIn::of(cycle) else {
             continue;
         };
@@ -132,6 +134,13 @@ pub fn stiffness_at(way_in: &[[f64; 2]], at: Depth) -> Option<Stiffness> {
         depth: at,
         slope: Estimate::of(|slope| slope, parabola(&near, at.0)?.slope),
     })
+}
+
+fn is_of_cycle(phase: Phase) -> bool {
+    matches!(
+        phase,
+        Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Unload
+    )
 }
 
 fn reach(points: &[[f64; 2]]) -> (f64, f64) {
@@ -225,20 +234,10 @@ impl WayIn {
         let start = cycle.first().map_or(0.0, |one| one.t.0);
         let end = cycle.last().map_or(0.0, |one| one.t.0);
         let bins = bins(&self.points);
-        let energy = |phases: &[Phase]| {
-            let path = cycle.iter().filter(|one| phases.contains(&one.phase));
-            work(path.map(|one| (one.depth, one.force)))
-        };
         let is_back = cycle.iter().any(|one| one.phase == Phase::Unload);
-        let hold: Vec<CycleSample> = cycle
-            .iter()
-            .filter(|one| one.phase == Phase::Hold)
-            .copied()
-            .collect();
-        let held: Vec<[f64; 2]> = hold.iter().map(|one| [one.t.0, one.force.0]).collect();
-        let depths: Vec<[f64; 2]> = hold.iter().map(|one| [one.depth.0, 0.0]).collect();
-        let (low, high) = reach(&depths);
-        let is_creep = high - low > CREEP_MIN;
+        let of = |phase: Phase| cycle.iter().filter(move |one| one.phase == phase);
+        let held: Vec<[f64; 2]> = of(Phase::Hold).map(|one| [one.t.0, one.force.0]).collect();
+        let creeping: Vec<CycleSample> = of(Phase::Creep).copied().collect();
         CycleAnalysis {
             cycle: cycle.first().map_or(0, |one| one.cycle),
             start: Seconds(start),
@@ -247,8 +246,8 @@ impl WayIn {
             depth_peak: Depth(self.depth_peak),
             force_start,
             force_peak: self.force_peak,
-            work_loading: energy(&[Phase::Ramp]),
-            work_loop: is_back.then(|| energy(&[Phase::Ramp, Phase::Hold, Phase::Unload])),
+            work_loading: work(of(Phase::Ramp).map(|one| (one.depth, one.force))),
+            work_loop: is_back.then(|| work(cycle.iter().map(|one| (one.depth, one.force)))),
             levels: levels.map(|level| {
                 Some(LevelDepth {
                     force: Newtons(level),
@@ -256,10 +255,8 @@ impl WayIn {
                 })
             }),
             stiffness: stiffness_at(&self.points, at),
-            relaxation: (!is_creep)
-                .then(|| relaxation(&held, self.force_peak))
-                .flatten(),
-            creep: is_creep.then(|| creep(&hold)).flatten(),
+            relaxation: relaxation(&held, self.force_peak),
+            creep: creep(&creeping),
         }
     }
 }

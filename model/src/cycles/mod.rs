@@ -33,7 +33,7 @@ pub struct CycleSample {
     pub depth: Depth,
     /// Force above tare.
     pub force: Newtons,
-    /// Ramp, hold or unload; other phases are between cycles.
+    /// Ramp, hold, creep or unload; other phases are between cycles.
     pub phase: Phase,
     /// Which cycle, from 1.
     pub cycle: u32,
