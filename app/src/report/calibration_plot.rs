@@ -143,11 +143,11 @@ fn uncertainty(svg: &mut Svg, told: &Told, axis: Axis) -> f64 {
     }
     let inks = [
         LIGHT.series,
-        LIGHT.limit,
+        LIGHT.text_quiet,
         LIGHT.notice_fill,
         LIGHT.alarm_text,
-        LIGHT.text_quiet,
         LIGHT.active_fill,
+        LIGHT.limit,
     ];
     let mut legend = vec![("all terms", LIGHT.text)];
     for (term, ink) in Term::ALL.into_iter().zip(inks) {

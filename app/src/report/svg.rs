@@ -119,6 +119,20 @@ impl Svg {
         ));
     }
 
+    /// A band between an upper and a lower edge.
+    pub fn band(&mut self, upper: &[[f64; 2]], lower: &[[f64; 2]], color: Color32) {
+        let mut list = String::new();
+        for [x, y] in upper.iter().chain(lower.iter().rev()) {
+            // Writing to a string does not fail.
+            let _ = write!(list, "{x:.1},{y:.1} ");
+        }
+        self.push(&format!(
+            "<polygon points=\"{}\" fill=\"{}\" fill-opacity=\"0.18\"/>",
+            list.trim_end(),
+            hex(color)
+        ));
+    }
+
     pub fn dot(&mut self, [x, y]: [f64; 2], color: Color32, radius: f64) {
         self.push(&format!(
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
