@@ -1,5 +1,6 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
+mod calibration;
 mod export;
 mod extremes;
 mod fit;
@@ -48,6 +49,9 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Test numerical stability at the extremes, every family, integrator and fit
     Extremes(extremes::ExtremesArgs),
+    /// Keep, show and check load-cell calibrations
+    #[command(subcommand)]
+    Calibration(calibration::CalibrationCommand),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -127,6 +131,9 @@ pub fn main() -> ExitCode {
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
+        Some(Command::Calibration(command)) => {
+            with(command.is_json(), |out| calibration::run(&command, out))
+        }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
     };
