@@ -3,7 +3,7 @@
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
-use palpate_model::rig::{Limits, Phase, Reading};
+use palpate_model::rig::{Limits, Phase, Reading, RigCommand};
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{
     Config, Derived, Effect, Input, Operator, Outcome, Record, State, step,
@@ -39,6 +39,8 @@ pub struct Lab<R: Rig> {
     pub now: Nanos,
     next_tick: Nanos,
     is_sample_seen: bool,
+    /// Every command with its time.
+    pub commands: Vec<(Nanos, RigCommand)>,
     /// Every record with its time.
     pub records: Vec<(Nanos, Record)>,
     /// Every sample, if they are kept.
@@ -70,12 +72,22 @@ impl<R: Rig> Lab<R> {
             now: Nanos::ZERO,
             next_tick: TICK,
             is_sample_seen: false,
+            commands: Vec::new(),
             records: Vec::new(),
             seen: Vec::new(),
             is_keeping: true,
             is_answering: true,
             outcome: None,
         }
+    }
+
+    /// With other limits than the rig's usual ones.
+    #[must_use]
+    pub fn within(mut self, limits: Limits) -> Self {
+        let mut config = self.state().config().clone();
+        config.limits = config.plan.limits.tighten(limits);
+        self.state = Some(State::new(Arc::new(config)));
+        self
     }
 
     /// Forgets samples as they come: for long runs.
@@ -106,7 +118,10 @@ impl<R: Rig> Lab<R> {
         let (state, effects) = step(state, self.now, input);
         for effect in effects {
             match effect {
-                Effect::Command(command) => self.rig.send(command),
+                Effect::Command(command) => {
+                    self.commands.push((self.now, command));
+                    self.rig.send(command);
+                }
                 Effect::ByHand(action) => self.rig.by_hand(action),
                 Effect::Record(record) => self.records.push((self.now, record)),
                 Effect::Finished(outcome) => self.outcome = Some(outcome),

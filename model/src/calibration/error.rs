@@ -85,6 +85,12 @@ pub enum CalibrationError {
         /// The sum of its weights in g.
         sum_g: f64,
     },
+    /// A tolerance that is none.
+    #[error("a tolerance of {tolerance_g} g is not possible; give 0 or more")]
+    Tolerance {
+        /// The tolerance in g.
+        tolerance_g: f64,
+    },
     /// Straight segments through masses that were not taken.
     #[error(
         "straight segments through {} do not go from the first to the last weight through weights that were taken; give masses of the table in order", grams(.through_g)

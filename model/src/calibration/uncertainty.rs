@@ -156,6 +156,12 @@ impl ForceUncertainty {
         !(self.range.0.0..=self.range.1.0).contains(&force.0)
     }
 
+    /// The heaviest weight.
+    #[must_use]
+    pub fn force_max(&self) -> Newtons {
+        self.range.1
+    }
+
     /// The term of each independent error.
     pub fn errors(&self) -> impl Iterator<Item = Term> {
         self.components.iter().map(|component| component.term)

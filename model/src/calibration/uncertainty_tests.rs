@@ -52,19 +52,7 @@ fn bench() -> Calibration {
         .map(|(k, steps)| (ways[k % 2], k as u32 / 2 + 1, steps.as_slice()))
         .collect();
     let mut calibration = document(&borrowed);
-    calibration.weights = (1..6)
-        .map(|i| NamedWeight {
-            name: format!("W{i}"),
-            mass_g: 100.0,
-            tolerance_g: Some(0.5),
-        })
-        .collect();
-    for series in &mut calibration.series {
-        for step in &mut series.steps {
-            let count = (step.mass_g / 100.0).round() as usize;
-            step.weights = (1..=count).map(|i| format!("W{i}")).collect();
-        }
-    }
+    calibration = calibration.with_stacked_weights(0.5).unwrap();
     (calibration.zero_before, calibration.zero_after) = (Some(Volts(1.0)), Some(Volts(1.002)));
     calibration
 }

@@ -8,6 +8,6 @@ mod work;
 
 pub use contact::{ContactError, ContactEstimate, ContactPoint, fit_contact};
 pub use filter::MovingMean;
-pub use touch::{TouchPoint, fit_touch};
+pub use touch::{TouchEstimate, TouchPoint, fit_touch};
 pub use trace::{LiveTrace, TracePoint};
 pub use work::work;

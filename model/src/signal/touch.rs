@@ -31,27 +31,49 @@ const FORCES_MIN: usize = 100;
 /// Relaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
 const TAU_RANGE: [f64; 2] = [0.02, 60.0];
 /// Relaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
-const TAU_COUNT: usize = 10;
+const TAU_COUNT: u32 = 10;
 /// Contact positions scanned, evenly over the search.
-const CONTACT_COUNT: usize = 60;
+const CONTACT_COUNT: u32 = 60;
 /// The scan looks at about so many points, each a mean of several.
 const SCAN_POINTS: usize = 300;
 /// Refinements settle within a handful of steps.
 const STEPS_MAX: usize = 40;
 /// Points in a block whose mean shows whether residuals remember: 0.2 s of the engine's points.
-const BLOCK: usize = 20;
+const BLOCK: usize = 10;
 
 /// Offset, drift, four coefficients of the body, then the derivatives by contact and ln tau, then the force.
 const LINEAR: usize = 6;
 const COLUMNS: usize = LINEAR + 2;
+type Row = [f64; COLUMNS + 1];
+
+/// Standard errors by which two touches must be apart to be two: rarer by chance than one in three hundred.
+const APART_SIGMAS: f64 = 3.0;
+
+/// What a search says of the contact position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchEstimate {
+    /// The contact position. Half of the distance between the touches is part of its standard error if it is
+    /// more than noise.
+    pub contact: ContactEstimate,
+    /// How much deeper the second touch met the tissue than the first, in mm, if there were two and this is
+    /// more than noise.
+    pub apart_mm: Option<f64>,
+}
 
 /// Estimates the contact position from a whole search. The path must begin out of contact and go on without
-/// gaps; times rise.
-pub fn fit_touch(points: &[TouchPoint]) -> Result<ContactEstimate, ContactError> {
+/// gaps; times rise. What follows the last point without force is the second touch.
+pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
     let search = Search::new(points.to_vec())?;
     let coarse = search.thinned(points.len().div_ceil(SCAN_POINTS));
-    let start = coarse.scan().ok_or(ContactError::NoOnset)?;
-    let near = coarse.refined(start);
+    // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
+    // relaxation time has its own valley, and the deepest shows only at its bottom.
+    let bottoms = coarse.scan().into_iter().filter_map(|start| {
+        let trial = coarse.refined(start);
+        Some((trial, coarse.solve(trial)?.1))
+    });
+    let (near, _) = bottoms
+        .min_by(|one, other| one.1.total_cmp(&other.1))
+        .ok_or(ContactError::NoOnset)?;
     let trial = search.refined(near);
     search.estimate(trial).ok_or(ContactError::NoOnset)
 }
@@ -167,23 +189,22 @@ impl Search {
         Some(([c, drift, f1, f2, f3, g], rows.residual_sum()))
     }
 
-    fn scan(&self) -> Option<Trial> {
+    /// The best contact position of each relaxation time scanned.
+    fn scan(&self) -> Vec<Trial> {
         let [low, high] = TAU_RANGE.map(f64::ln);
-        let mut best: Option<(Trial, f64)> = None;
-        for i in 1..CONTACT_COUNT {
-            let share = i as f64 / CONTACT_COUNT as f64;
-            let contact = self.shallow + share * (self.deep - self.shallow);
-            for j in 0..TAU_COUNT {
-                let log_tau = low + (high - low) * j as f64 / (TAU_COUNT - 1) as f64;
+        let best_at = |log_tau: f64| {
+            let trials = (1..CONTACT_COUNT).filter_map(|i| {
+                let share = f64::from(i) / f64::from(CONTACT_COUNT);
+                let contact = self.shallow + share * (self.deep - self.shallow);
                 let trial = Trial { contact, log_tau };
-                if let Some((_, cost)) = self.solve(trial)
-                    && best.is_none_or(|(_, least)| cost < least)
-                {
-                    best = Some((trial, cost));
-                }
-            }
-        }
-        best.map(|(trial, _)| trial)
+                Some((trial, self.solve(trial)?.1))
+            });
+            let best = trials.min_by(|one, other| one.1.total_cmp(&other.1))?;
+            Some(best.0)
+        };
+        (0..TAU_COUNT)
+            .filter_map(|j| best_at(low + (high - low) * f64::from(j) / f64::from(TAU_COUNT - 1)))
+            .collect()
     }
 
     /// Gauss-Newton with step halving from a trial to the bottom of its valley.
@@ -193,7 +214,11 @@ impl Search {
         };
         let [low, high] = TAU_RANGE.map(f64::ln);
         for _ in 0..STEPS_MAX {
-            let Some(step) = self.linearised(trial).and_then(|rows| rows.solve(COLUMNS)) else {
+            let Some(step) = self.linearised(trial).and_then(|rows| {
+                let mut triangle = Triangle::default();
+                rows.into_iter().for_each(|(_, row)| triangle.push(row));
+                triangle.solve(COLUMNS)
+            }) else {
                 break;
             };
             let better = (0..12).find_map(|halving| {
@@ -221,8 +246,9 @@ impl Search {
         trial
     }
 
-    /// All columns at a trial, with the derivatives of the fitted force by contact and ln tau.
-    fn linearised(&self, trial: Trial) -> Option<Triangle<{ COLUMNS + 1 }>> {
+    /// All columns at a trial, with the derivatives of the fitted force by contact and ln tau, and the index of
+    /// their point.
+    fn linearised(&self, trial: Trial) -> Option<Vec<(usize, Row)>> {
         let (linear, _) = self.solve(trial)?;
         let reach = self.deep - trial.contact;
         // Central differences of an exact response: 1e-4 of the depth and of tau leaves eight digits.
@@ -247,38 +273,60 @@ impl Search {
         };
         let (deeper, higher) = (shifted(dx, 0.0), shifted(-dx, 0.0));
         let (slower, faster) = (shifted(0.0, dl), shifted(0.0, -dl));
-        let mut rows = Triangle::default();
-        let mut i = 0;
-        self.follow(trial, |_, point, force, columns| {
+        let mut rows = Vec::with_capacity(deeper.len());
+        self.follow(trial, |index, point, force, columns| {
+            let i = rows.len();
             let [c, drift, f1, f2, f3, g] = self.row(point, columns);
             let by_contact = (deeper[i] - higher[i]) / (2.0 * dx);
             let by_tau = (slower[i] - faster[i]) / (2.0 * dl);
-            rows.push([c, drift, f1, f2, f3, g, by_contact, by_tau, force]);
-            i += 1;
+            let row = [c, drift, f1, f2, f3, g, by_contact, by_tau, force];
+            rows.push((index, row));
         });
         Some(rows)
     }
 
-    fn estimate(&self, trial: Trial) -> Option<ContactEstimate> {
+    fn estimate(&self, trial: Trial) -> Option<TouchEstimate> {
         let (linear, cost) = self.solve(trial)?;
         let rows = self.linearised(trial)?;
-        let forces = self.points.iter().filter_map(|point| point.force);
-        let count = forces.count() as f64;
-        let variance = cost / (count - COLUMNS as f64);
+        let variance = cost / (rows.len() - COLUMNS) as f64;
         let memory = self.memory(trial, &linear, variance);
-        let std_error_mm = (variance * memory * rows.inverse_diagonal(LINEAR)?).sqrt();
+        let mut triangle = Triangle::default();
+        rows.iter().for_each(|(_, row)| triangle.push(*row));
+        let by_noise = (variance * memory * triangle.inverse_diagonal(LINEAR)?).sqrt();
+        let apart_mm = self.apart(&rows, memory);
+        let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0);
         // Against offset and drift alone the fit must gain what noise cannot: chi-square with six degrees,
         // for which 100 has a chance of 1e-18 a trial.
         let gain = (self.cost_without_contact()? - cost) / variance;
-        (gain > 100.0 && std_error_mm.is_finite()).then_some(ContactEstimate {
+        let contact = ContactEstimate {
             position: Position(trial.contact),
             std_error_mm,
             rmse_n: variance.sqrt(),
-        })
+        };
+        (gain > 100.0 && std_error_mm.is_finite()).then_some(TouchEstimate { contact, apart_mm })
     }
 
-    /// How much more the means of blocks of residuals scatter than those of white noise would, at least 1: by
-    /// so much the variance of a slow parameter is larger than white noise would make it.
+    /// How much deeper the second touch met the tissue, if that is more than noise: the one further parameter
+    /// by which the fitted force of the second touch alone may shift.
+    fn apart(&self, rows: &[(usize, Row)], memory: f64) -> Option<f64> {
+        let second = self
+            .points
+            .iter()
+            .rposition(|point| point.force.is_none())?;
+        let mut triangle = Triangle::<{ COLUMNS + 2 }>::default();
+        for (index, row) in rows {
+            let [c, drift, f1, f2, f3, g, by_contact, by_tau, force] = *row;
+            let shift = if *index > second { by_contact } else { 0.0 };
+            triangle.push([c, drift, f1, f2, f3, g, by_contact, by_tau, shift, force]);
+        }
+        let shift = triangle.solve(COLUMNS + 1)?[COLUMNS];
+        let variance = triangle.residual_sum() / (rows.len() - COLUMNS - 1) as f64;
+        let error = (variance * memory * triangle.inverse_diagonal(COLUMNS)?).sqrt();
+        (shift.abs() > APART_SIGMAS * error).then_some(shift)
+    }
+
+    /// How much more the means of blocks of residuals scatter than those of white noise could, else 1: by so
+    /// much the variance of a slow parameter is larger than white noise would make it.
     fn memory(&self, trial: Trial, linear: &[f64; LINEAR], variance: f64) -> f64 {
         let (mut blocks, mut squares) = (0.0, 0.0);
         let (mut sum, mut length, mut last) = (0.0, 0, None);
@@ -297,11 +345,13 @@ impl Search {
                 (sum, length) = (0.0, 0);
             }
         });
-        // Ten blocks are the fewest that tell a variance to half of itself.
-        if blocks < 10.0 || variance <= 0.0 {
-            1.0
+        let ratio = squares / blocks / variance;
+        // A variance from so many blocks scatters by the root of two over their number; three times that is
+        // no accident. A ratio that is no number comes of too few blocks or of no noise at all.
+        if ratio > 1.0 + 3.0 * (2.0f64 / blocks).sqrt() {
+            ratio
         } else {
-            (squares / blocks / variance).max(1.0)
+            1.0
         }
     }
 

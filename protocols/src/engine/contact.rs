@@ -8,10 +8,12 @@
 use super::context::{Context, Progress};
 use super::input::Record;
 use super::state::Contact;
-use super::touch_log::{Counts, POINT_SAMPLES, TouchLog};
+use super::touch_log::{Counts, TouchLog};
 use crate::plans::FindContact;
 use palpate_model::rig::{Phase, Reading};
-use palpate_model::signal::{ContactEstimate, ContactPoint, MovingMean, fit_contact, fit_touch};
+use palpate_model::signal::{
+    ContactEstimate, ContactPoint, MovingMean, TouchEstimate, fit_contact, fit_touch,
+};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
 use std::collections::VecDeque;
 
@@ -31,13 +33,6 @@ const FORCE_FAST_MAX: Newtons = Newtons(0.45);
 /// Triggers after which the force fell again; more are no accident.
 const FALSE_TRIGGERS_MAX: u32 = 5;
 
-/// A first estimate that differs from the last by more standard errors than this, and by more than
-/// [`TOUCHES_DIFFER_MM`], was another surface.
-const TOUCHES_DIFFER_SIGMAS: f64 = 5.0;
-
-/// The first touch alone is fitted with half the data and a body known to a tenth: so much is no contradiction.
-const TOUCHES_DIFFER_MM: f64 = 0.5;
-
 /// The criterion is at least this many standard deviations of the filtered signal.
 const CRITERION_SIGMAS: f64 = 6.0;
 
@@ -49,6 +44,9 @@ const FORCE_MAX: Newtons = Newtons(0.5);
 
 /// How far past the first trigger the second pass may go, in mm.
 const PASS_OVERRUN_MM: f64 = 4.0;
+
+/// Raw samples averaged into one point of the fit of a second pass alone: 100 points a second at 1 kHz.
+const POINT_SAMPLES: u32 = 10;
 
 /// Distance from contact at which the tissue recovers untouched, in mm.
 const CLEARANCE_MM: f64 = 1.0;
@@ -86,8 +84,8 @@ pub(crate) struct ContactSearch {
     raw: VecDeque<Newtons>,
     false_triggers: u32,
     first_trigger: Position,
-    /// What the first touch says by itself, and where it ended.
-    first_touch: Option<(ContactEstimate, Position)>,
+    /// Where the first touch ended, once it has been understood.
+    first_end: Option<Position>,
     log: TouchLog,
     pass_start_tick: u64,
     points: Vec<ContactPoint>,
@@ -130,7 +128,7 @@ impl ContactSearch {
             raw: VecDeque::with_capacity(CONSECUTIVE as usize),
             false_triggers: 0,
             first_trigger: Position(0.0),
-            first_touch: None,
+            first_end: None,
             log: TouchLog::new(cx.state.tick, cx.state.config.rig.tick()),
             pass_start_tick: 0,
             points: Vec::new(),
@@ -188,18 +186,16 @@ impl ContactSearch {
             },
             Stage::Dwell { until_tick } if reading.tick >= until_tick => {
                 let first = self.fit()?;
-                self.first_touch = Some((first, position));
-                self.retreat(cx, first.position)?;
+                self.first_end = Some(position);
+                self.retreat(cx, first.contact.position)?;
             }
             Stage::Retreat if at_rest => {
                 let until_tick = reading.tick + cx.state.ticks(self.plan.recovery);
                 self.stage = Stage::Recover { until_tick };
             }
             Stage::Recover { until_tick } if reading.tick >= until_tick => {
-                let end = match self.first_touch {
-                    Some((_, deepest)) => deepest,
-                    None => self.first_trigger.moved_by(PASS_OVERRUN_MM),
-                };
+                let overrun = self.first_trigger.moved_by(PASS_OVERRUN_MM);
+                let end = self.first_end.unwrap_or(overrun);
                 cx.move_to(end, self.plan.pass_speed)?;
                 self.above = 0;
                 self.pass_start_tick = reading.tick;
@@ -208,7 +204,7 @@ impl ContactSearch {
             Stage::SlowPass => {
                 self.collect(cx, reading, position, force);
                 let target = Newtons(self.plan.pass_force.0.max(2.0 * self.criterion.0));
-                let is_felt = self.first_touch.is_some() && filtered >= self.criterion;
+                let is_felt = self.first_end.is_some() && filtered >= self.criterion;
                 if self.is_triggered(filtered, target) {
                     self.record_trigger(cx, reading, 2, filtered);
                     cx.stop_move();
@@ -371,12 +367,17 @@ impl ContactSearch {
     }
 
     /// What everything felt so far says of the contact position.
-    fn fit(&self) -> Result<ContactEstimate, String> {
+    fn fit(&self) -> Result<TouchEstimate, String> {
         let points = self.log.points();
         let found = fit_touch(points).map_err(|err| err.to_string())?;
         let begun = points.first().map_or(Position(0.0), |point| point.position);
         // Three standard errors: a surface before the beginning was not approached.
-        if found.position < begun.moved_by(3.0 * found.std_error_mm) {
+        let ContactEstimate {
+            position,
+            std_error_mm,
+            ..
+        } = found.contact;
+        if position < begun.moved_by(3.0 * std_error_mm) {
             return Err(
                 "the probe touched the tissue before the search began; retract and tare again"
                     .into(),
@@ -386,29 +387,31 @@ impl ContactSearch {
     }
 
     fn estimate(&self) -> Result<Contact, String> {
-        let estimate = match self.first_touch {
-            Some((first, _)) => {
-                let found = self.fit()?;
-                let apart = found.position.distance_from(first.position).abs();
-                let allowed = TOUCHES_DIFFER_SIGMAS * first.std_error_mm.hypot(found.std_error_mm);
-                if apart > allowed.max(TOUCHES_DIFFER_MM) {
+        let limit = self.plan.std_error_mm_max;
+        let found = match self.plan.press {
+            Some(_) => {
+                let TouchEstimate { contact, apart_mm } = self.fit()?;
+                // Half of the distance is an error of the position.
+                if let Some(apart) = apart_mm.filter(|apart| apart.abs() > 2.0 * limit) {
+                    let way = if apart > 0.0 { "after" } else { "before" };
                     return Err(format!(
-                        "the second touch found the tissue {apart:.2} mm from where the first did; check that the specimen is held"
+                        "the second touch met the tissue {:.2} mm {way} where the first did; check that the specimen is held and let it rest longer",
+                        apart.abs()
                     ));
                 }
-                found
+                contact
             }
             None => fit_contact(&self.points).map_err(|err| err.to_string())?,
         };
-        if estimate.std_error_mm > self.plan.std_error_mm_max {
+        if found.std_error_mm > limit {
             return Err(format!(
-                "the contact position is only known to {:.3} mm, wider than {:.3} mm; quieten the signal or press further",
-                estimate.std_error_mm, self.plan.std_error_mm_max
+                "the contact position is only known to {:.3} mm, wider than {limit:.3} mm; quieten the signal or press further",
+                found.std_error_mm
             ));
         }
         Ok(Contact {
-            position: estimate.position,
-            std_error_mm: estimate.std_error_mm,
+            position: found.position,
+            std_error_mm: found.std_error_mm,
         })
     }
 }

@@ -225,8 +225,18 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             Active::Move
         }
         Step::Jog { distance_mm, speed } => {
-            let pulses = (distance_mm / cx.state.config.rig.mm_per_pulse).round() as i64;
-            cx.move_to_pulses(cx.state.pulses + pulses, speed)?;
+            let mm_per_pulse = cx.state.config.rig.mm_per_pulse;
+            let to = cx.state.pulses + (distance_mm / mm_per_pulse).round() as i64;
+            let end = to as f64 * mm_per_pulse;
+            let travel = cx.state.config.limits.travel_max;
+            // Where home is unknown the switches are all there is; a jog that comes back is always allowed.
+            if cx.state.is_homed && distance_mm > 0.0 && end > travel.0 {
+                return Err(format!(
+                    "a jog to {end:.3} mm is outside the travel of 0 to {:.1} mm",
+                    travel.0
+                ));
+            }
+            cx.move_to_pulses(to, speed)?;
             Active::Move
         }
         Step::Sine(ref sine) => {
@@ -278,7 +288,7 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
         .unacknowledged
         .pop_front()
         .map(|(_, command)| command);
-    if expected != Some(ack.command) {
+    if !expected.is_some_and(|asked| asked.is_answered_by(&ack.command)) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
             None => format!(

@@ -216,24 +216,24 @@ pub struct Press {
 
 impl Default for FindContact {
     /// 1.5 mm/s stays under the 2-3 mm/s above which published testers trigger late;
-    /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is ten times slower.
+    /// 0.03 N (3 g) is in the range of their 0.01-5 g criteria; the second pass is eight times slower.
     ///
-    /// The press to 0.4 N leaves a fifth of the 0.5 N that contact finding may ever exert to filter and
-    /// brake; the 5 s after it are five relaxation times of pig stomach. Together with the pass to 0.12 N they
+    /// The press to 0.42 N leaves a sixth of the 0.5 N that contact finding may ever exert to filter and
+    /// brake; the 6 s after it are six relaxation times of pig stomach. Together with the pass to 0.14 N they
     /// give the contact position to 0.02 mm at 0.05 N of noise, with nothing known of the body beforehand; a
     /// pass of its own would give 0.06 mm.
     fn default() -> Self {
         Self {
             approach_speed: MmPerS(1.5),
             criterion: Newtons(0.03),
-            retreat_mm: 3.0,
-            pass_speed: MmPerS(0.15),
-            pass_force: Newtons(0.12),
+            retreat_mm: 2.0,
+            pass_speed: MmPerS(0.18),
+            pass_force: Newtons(0.14),
             recovery: Seconds(10.0),
             std_error_mm_max: 0.1,
             press: Some(Press {
-                force: Newtons(0.4),
-                dwell: Seconds(5.0),
+                force: Newtons(0.42),
+                dwell: Seconds(6.0),
             }),
         }
     }

@@ -17,8 +17,8 @@ use serde::{Deserialize, Serialize};
 /// 23 on the ideal one, whose noise fills every digit; rounded up.
 const BYTES_PER_SAMPLE: f64 = 30.0;
 
-/// Contact finding never exerts more than 0.5 N; filter and brake need a fifth of it.
-const PRESS_MAX: Newtons = Newtons(0.4);
+/// Contact finding never exerts more than 0.5 N; filter and brake need a sixth of it.
+const PRESS_MAX: Newtons = Newtons(0.42);
 
 /// Where contact is expected when nothing is known: in the first half of the travel.
 const CONTACT_EXPECTED_SHARE: f64 = 0.3;
