@@ -1,6 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
 mod calibration;
+mod analyse;
 mod export;
 mod extremes;
 mod fit;
@@ -39,6 +40,9 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Tell what the cycles of a record show: loops, shift, decay, relaxation
+    #[command(alias = "analyze")]
+    Analyse(analyse::AnalyseArgs),
     /// Compare model families and recommend the cheapest that will do
     Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
@@ -126,6 +130,7 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Analyse(args)) => with(args.json, |out| analyse::run(&args, out)),
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),

@@ -3,6 +3,7 @@
 
 pub mod calibration;
 mod calibration_plot;
+pub mod cycles;
 pub mod extremes;
 pub mod family;
 pub mod picture;
