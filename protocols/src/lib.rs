@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod engine;
+pub mod file;
 pub mod plans;
 pub mod preview;
 pub mod replay;
