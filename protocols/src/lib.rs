@@ -6,6 +6,7 @@
 //! Start reading at [`engine::step`].
 
 pub mod analysis;
+pub mod cycles;
 pub mod engine;
 pub mod file;
 pub mod plans;

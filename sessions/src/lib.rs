@@ -10,6 +10,7 @@
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
+pub mod calibrations;
 pub mod export;
 pub mod folder;
 pub mod import;
@@ -21,6 +22,9 @@ mod schema;
 pub mod text;
 pub mod trade;
 
+pub use calibrations::{
+    Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
+};
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,

@@ -127,6 +127,13 @@ impl KelvinState {
         )
     }
 
+    /// The filtered powers of depth and the filtered viscous drive, in mm, mm^2, mm^3 and mm^2/s: what `mu1`,
+    /// `mu2`, `mu3` and `tau_sig` multiply.
+    pub(crate) fn columns(&self) -> [f64; 4] {
+        let [f1, f2, f3] = &self.powers;
+        [f1.value, f2.value, f3.value, self.viscous.value]
+    }
+
     /// Moves straight to `depth_to` within `dt` and returns the force in N at the end.
     ///
     /// A step of no time is a jump: the elastic memory does not change, the viscous drive does.

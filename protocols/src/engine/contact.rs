@@ -1,23 +1,37 @@
-//! Finding the tissue: a first pass to know roughly where it is, a slow second pass whose onset
-//! is fitted, a rest for the tissue to recover, and the way to depth zero.
+//! Finding the tissue: a first pass to know roughly where it is and, if the plan presses, how it answers;
+//! a slow second pass; a rest for the tissue to recover; and the way to depth zero.
 //!
 //! The trigger of a moving mean is late by construction and published testers trigger early on
-//! single peaks, so the trigger only ends a pass; the position comes from the fit.
+//! single peaks, so the trigger only ends a pass; the position comes from a fit: of everything felt where the
+//! plan presses, else of the onset in the second pass.
 
 use super::context::{Context, Progress};
 use super::input::Record;
 use super::state::Contact;
+use super::touch_log::{Counts, TouchLog};
 use crate::plans::FindContact;
 use palpate_model::rig::{Phase, Reading};
-use palpate_model::signal::{ContactPoint, MovingMean, fit_contact};
+use palpate_model::signal::{
+    ContactEstimate, ContactPoint, MovingMean, TouchEstimate, fit_contact, fit_touch,
+};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
+use std::collections::VecDeque;
 
 /// Samples averaged before a force is compared with a criterion: 50 ms at 1 kHz, two to three
 /// mains cycles.
 const FILTER_SAMPLES: usize = 50;
 
-/// Consecutive filtered samples that must be above the criterion.
+/// Consecutive samples that must be above the criterion: filtered ones, and raw ones where the plan presses.
 const CONSECUTIVE: u32 = 10;
+
+/// A mean of so few samples is late by 5 ms only: what is hard is noticed by it.
+const FAST_SAMPLES: usize = 10;
+
+/// A press ends early where the fast mean is above this: filter and brake need what is left to [`FORCE_MAX`].
+const FORCE_FAST_MAX: Newtons = Newtons(0.45);
+
+/// Triggers after which the force fell again; more are no accident.
+const FALSE_TRIGGERS_MAX: u32 = 5;
 
 /// The criterion is at least this many standard deviations of the filtered signal.
 const CRITERION_SIGMAS: f64 = 6.0;
@@ -31,7 +45,7 @@ const FORCE_MAX: Newtons = Newtons(0.5);
 /// How far past the first trigger the second pass may go, in mm.
 const PASS_OVERRUN_MM: f64 = 4.0;
 
-/// Raw samples averaged into one point of the fit: 100 points a second at 1 kHz.
+/// Raw samples averaged into one point of the fit of a second pass alone: 100 points a second at 1 kHz.
 const POINT_SAMPLES: u32 = 10;
 
 /// Distance from contact at which the tissue recovers untouched, in mm.
@@ -43,11 +57,14 @@ const TRAVEL_MARGIN_MM: f64 = 1.0;
 #[derive(Clone, Debug, PartialEq)]
 enum Stage {
     Approach,
+    Press,
     ApproachBraking,
+    Dwell { until_tick: u64 },
     Retreat,
     Recover { until_tick: u64 },
     SlowPass,
     SlowBraking,
+    SlowDwell { until_tick: u64 },
     Clear { found: Contact },
     Rest { found: Contact, until_tick: u64 },
     ToZero { found: Contact },
@@ -60,8 +77,16 @@ pub(crate) struct ContactSearch {
     criterion: Newtons,
     stage: Stage,
     filter: MovingMean,
+    fast: MovingMean,
+    seen: usize,
     above: u32,
+    /// The newest raw forces, oldest first.
+    raw: VecDeque<Newtons>,
+    false_triggers: u32,
     first_trigger: Position,
+    /// Where the first touch ended, once it has been understood.
+    first_end: Option<Position>,
+    log: TouchLog,
     pass_start_tick: u64,
     points: Vec<ContactPoint>,
     bin: Bin,
@@ -97,8 +122,14 @@ impl ContactSearch {
             criterion,
             stage: Stage::Approach,
             filter: MovingMean::new(FILTER_SAMPLES),
+            fast: MovingMean::new(FAST_SAMPLES),
+            seen: 0,
             above: 0,
+            raw: VecDeque::with_capacity(CONSECUTIVE as usize),
+            false_triggers: 0,
             first_trigger: Position(0.0),
+            first_end: None,
+            log: TouchLog::new(cx.state.tick, cx.state.config.rig.tick()),
             pass_start_tick: 0,
             points: Vec::new(),
             bin: Bin::default(),
@@ -116,37 +147,55 @@ impl ContactSearch {
         let position = cx.state.derived.position;
         let force = cx.state.derived.force.unwrap_or(Newtons(0.0));
         let filtered = Newtons(self.filter.push(force.0));
+        let fast = Newtons(self.fast.push(force.0));
+        self.remember(reading.tick, position, force);
         let at_rest = cx.at_rest()?;
-        if filtered > FORCE_MAX && matches!(self.stage, Stage::Approach | Stage::SlowPass) {
-            return Err(format!(
-                "the force reached {filtered:.2} before contact was certain"
-            ));
-        }
+        self.check_force(filtered, fast)?;
         match self.stage.clone() {
             Stage::Approach => {
-                if self.is_triggered(filtered, self.criterion) {
+                if self.is_first_triggered(force, filtered) {
                     self.first_trigger = position;
                     self.record_trigger(cx, reading, 1, filtered);
-                    cx.stop_move();
-                    self.stage = Stage::ApproachBraking;
+                    if self.plan.press.is_some() {
+                        self.stage = Stage::Press;
+                    } else {
+                        cx.stop_move();
+                        self.stage = Stage::ApproachBraking;
+                    }
                 } else if at_rest {
-                    return Err(format!(
-                        "no tissue before {:.1} mm; check the specimen",
-                        position.0
-                    ));
+                    return Err(no_tissue(position));
                 }
             }
-            Stage::ApproachBraking if at_rest => {
-                let back = self.first_trigger.moved_by(-self.plan.retreat_mm);
-                cx.move_to(Position(back.0.max(0.0)), self.plan.approach_speed)?;
-                self.stage = Stage::Retreat;
+            Stage::Press => {
+                let wanted = self.plan.press.map_or(FORCE_MAX, |press| press.force);
+                if filtered >= wanted || fast >= FORCE_FAST_MAX {
+                    cx.stop_move();
+                    self.stage = Stage::ApproachBraking;
+                } else if filtered.0 < 0.5 * self.criterion.0 {
+                    self.on_false_trigger()?;
+                } else if at_rest {
+                    return Err(no_tissue(position));
+                }
+            }
+            Stage::ApproachBraking if at_rest => match self.plan.press {
+                Some(press) => {
+                    let until_tick = reading.tick + cx.state.ticks(press.dwell);
+                    self.stage = Stage::Dwell { until_tick };
+                }
+                None => self.retreat(cx, self.first_trigger)?,
+            },
+            Stage::Dwell { until_tick } if reading.tick >= until_tick => {
+                let first = self.fit()?;
+                self.first_end = Some(position);
+                self.retreat(cx, first.contact.position)?;
             }
             Stage::Retreat if at_rest => {
                 let until_tick = reading.tick + cx.state.ticks(self.plan.recovery);
                 self.stage = Stage::Recover { until_tick };
             }
             Stage::Recover { until_tick } if reading.tick >= until_tick => {
-                let end = self.first_trigger.moved_by(PASS_OVERRUN_MM);
+                let overrun = self.first_trigger.moved_by(PASS_OVERRUN_MM);
+                let end = self.first_end.unwrap_or(overrun);
                 cx.move_to(end, self.plan.pass_speed)?;
                 self.above = 0;
                 self.pass_start_tick = reading.tick;
@@ -155,20 +204,26 @@ impl ContactSearch {
             Stage::SlowPass => {
                 self.collect(cx, reading, position, force);
                 let target = Newtons(self.plan.pass_force.0.max(2.0 * self.criterion.0));
+                let is_felt = self.first_end.is_some() && filtered >= self.criterion;
                 if self.is_triggered(filtered, target) {
                     self.record_trigger(cx, reading, 2, filtered);
                     cx.stop_move();
+                    self.stage = Stage::SlowBraking;
+                } else if at_rest && is_felt {
+                    self.record_trigger(cx, reading, 2, filtered);
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
                     return Err("the second pass did not feel what the first one felt".into());
                 }
             }
-            Stage::SlowBraking if at_rest => {
-                let found = self.estimate()?;
-                let clear = Position((found.position.0 - CLEARANCE_MM).max(0.0));
-                cx.move_to(clear, self.plan.approach_speed)?;
-                self.stage = Stage::Clear { found };
-            }
+            Stage::SlowBraking if at_rest => match self.plan.press {
+                Some(press) => {
+                    let until_tick = reading.tick + cx.state.ticks(press.dwell);
+                    self.stage = Stage::SlowDwell { until_tick };
+                }
+                None => self.clear(cx)?,
+            },
+            Stage::SlowDwell { until_tick } if reading.tick >= until_tick => self.clear(cx)?,
             Stage::Clear { found } if at_rest => {
                 cx.enter_phase(Phase::Rest);
                 let until_tick = reading.tick + cx.state.ticks(self.plan.recovery);
@@ -190,6 +245,85 @@ impl ContactSearch {
         Ok(Progress::Continue)
     }
 
+    /// Takes a sample into what is remembered, where the plan presses.
+    fn remember(&mut self, tick: u64, position: Position, force: Newtons) {
+        self.seen += 1;
+        if self.plan.press.is_none() {
+            return;
+        }
+        if self.raw.len() == CONSECUTIVE as usize {
+            self.raw.pop_front();
+        }
+        self.raw.push_back(force);
+        let counts = match self.stage {
+            Stage::Approach => Counts::Lead,
+            // The tissue may lag behind the probe, and what it does then is no part of the body.
+            Stage::Retreat => Counts::No,
+            Stage::Clear { .. } | Stage::Rest { .. } | Stage::ToZero { .. } => return,
+            _ => Counts::Yes,
+        };
+        self.log.push(tick, position, force, counts);
+    }
+
+    /// Refuses a load before the approach and a force that contact finding must not exert.
+    fn check_force(&self, filtered: Newtons, fast: Newtons) -> Result<(), String> {
+        if self.seen == FILTER_SAMPLES && filtered.abs() >= self.criterion {
+            return Err(format!(
+                "the load cell reads {filtered:.3} before the tissue is met; free the probe and tare again"
+            ));
+        }
+        let is_searching = matches!(self.stage, Stage::Approach | Stage::Press | Stage::SlowPass);
+        if is_searching && filtered > FORCE_MAX {
+            return Err(format!(
+                "the force reached {filtered:.2} before contact was certain"
+            ));
+        }
+        if self.plan.press.is_some() && self.stage == Stage::Approach && fast >= FORCE_FAST_MAX {
+            return Err(format!(
+                "the force rose to {fast:.2} at once: what was met is too hard for this speed; approach more slowly"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Where the plan presses, so many raw samples in a row tell of the tissue; else filtered ones.
+    fn is_first_triggered(&mut self, force: Newtons, filtered: Newtons) -> bool {
+        let judged = if self.plan.press.is_some() {
+            force
+        } else {
+            filtered
+        };
+        self.is_triggered(judged, self.criterion)
+    }
+
+    fn on_false_trigger(&mut self) -> Result<(), String> {
+        self.false_triggers += 1;
+        if self.false_triggers > FALSE_TRIGGERS_MAX {
+            return Err(format!(
+                "the force rose above {:.3} and fell again {} times without tissue; quieten the signal",
+                self.criterion, self.false_triggers
+            ));
+        }
+        self.above = 0;
+        self.stage = Stage::Approach;
+        Ok(())
+    }
+
+    fn retreat(&mut self, cx: &mut Context<'_>, from: Position) -> Result<(), String> {
+        let back = from.moved_by(-self.plan.retreat_mm);
+        cx.move_to(Position(back.0.max(0.0)), self.plan.approach_speed)?;
+        self.stage = Stage::Retreat;
+        Ok(())
+    }
+
+    fn clear(&mut self, cx: &mut Context<'_>) -> Result<(), String> {
+        let found = self.estimate()?;
+        let clear = Position((found.position.0 - CLEARANCE_MM).max(0.0));
+        cx.move_to(clear, self.plan.approach_speed)?;
+        self.stage = Stage::Clear { found };
+        Ok(())
+    }
+
     fn is_triggered(&mut self, filtered: Newtons, criterion: Newtons) -> bool {
         self.above = if filtered >= criterion {
             self.above + 1
@@ -206,6 +340,7 @@ impl ContactSearch {
             position,
             volts: reading.volts,
             force,
+            raw: self.raw.iter().copied().collect(),
         });
     }
 
@@ -231,19 +366,58 @@ impl ContactSearch {
         }
     }
 
+    /// What everything felt so far says of the contact position.
+    fn fit(&self) -> Result<TouchEstimate, String> {
+        let points = self.log.points();
+        let found = fit_touch(points).map_err(|err| err.to_string())?;
+        let begun = points.first().map_or(Position(0.0), |point| point.position);
+        // Three standard errors: a surface before the beginning was not approached.
+        let ContactEstimate {
+            position,
+            std_error_mm,
+            ..
+        } = found.contact;
+        if position < begun.moved_by(3.0 * std_error_mm) {
+            return Err(
+                "the probe touched the tissue before the search began; retract and tare again"
+                    .into(),
+            );
+        }
+        Ok(found)
+    }
+
     fn estimate(&self) -> Result<Contact, String> {
-        let estimate = fit_contact(&self.points).map_err(|err| err.to_string())?;
-        if estimate.std_error_mm > self.plan.std_error_mm_max {
+        let limit = self.plan.std_error_mm_max;
+        let found = match self.plan.press {
+            Some(_) => {
+                let TouchEstimate { contact, apart_mm } = self.fit()?;
+                // Half of the distance is an error of the position.
+                if let Some(apart) = apart_mm.filter(|apart| apart.abs() > 2.0 * limit) {
+                    let way = if apart > 0.0 { "after" } else { "before" };
+                    return Err(format!(
+                        "the second touch met the tissue {:.2} mm {way} where the first did; check that the specimen is held and let it rest longer",
+                        apart.abs()
+                    ));
+                }
+                contact
+            }
+            None => fit_contact(&self.points).map_err(|err| err.to_string())?,
+        };
+        if found.std_error_mm > limit {
             return Err(format!(
-                "the contact position is only known to {:.3} mm, wider than {:.3} mm; quieten the signal or press further",
-                estimate.std_error_mm, self.plan.std_error_mm_max
+                "the contact position is only known to {:.3} mm, wider than {limit:.3} mm; quieten the signal or press further",
+                found.std_error_mm
             ));
         }
         Ok(Contact {
-            position: estimate.position,
-            std_error_mm: estimate.std_error_mm,
+            position: found.position,
+            std_error_mm: found.std_error_mm,
         })
     }
+}
+
+fn no_tissue(position: Position) -> String {
+    format!("no tissue before {:.1} mm; check the specimen", position.0)
 }
 
 fn is_cruising(velocity: MmPerS, speed: MmPerS) -> bool {

@@ -15,7 +15,9 @@ pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::RampHold;
-pub use step::{FindContact, HoldForce, LoadTo, OnTimeout, Prompt, Settle, Sine, Step, Weigh};
+pub use step::{
+    FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
+};
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

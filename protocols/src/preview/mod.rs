@@ -6,7 +6,7 @@ mod tests;
 
 pub use expected::OutlinePoint;
 
-use crate::plans::{FindContact, HoldUntil, LoadTo, Plan, Step};
+use crate::plans::{FindContact, HoldUntil, LoadTo, Plan, Press, Step};
 use expected::Expected;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, Profile, RigDescription};
@@ -17,12 +17,15 @@ use serde::{Deserialize, Serialize};
 /// 23 on the ideal one, whose noise fills every digit; rounded up.
 const BYTES_PER_SAMPLE: f64 = 30.0;
 
+/// Contact finding never exerts more than 0.5 N; filter and brake need a sixth of it.
+const PRESS_MAX: Newtons = Newtons(0.42);
+
 /// Where contact is expected when nothing is known: in the first half of the travel.
 const CONTACT_EXPECTED_SHARE: f64 = 0.3;
 
 /// Controller ticks from the sample that begins a move to the first tick of its motion, and from its last tick to
-/// the sample that shows rest: report 1.0 to 1.5 ms, command 0.5 ms, and one more tick each way.
-const MOVE_TICKS: u64 = 3;
+/// the sample that shows rest: report 1.0 to 1.5 ms and command 0.5 ms make one, the tick that shows rest the other.
+const MOVE_TICKS: u64 = 2;
 
 /// A correction at a constant force takes about so long beyond the hold itself.
 const SETTLE_SECS: f64 = 0.1;
@@ -351,11 +354,15 @@ impl Walk<'_> {
             search.std_error_mm_max,
         ]);
         self.check_span(search.recovery);
+        if let Some(press) = search.press {
+            self.check_press(&press);
+        }
         self.check_speed(search.approach_speed);
         self.check_speed(search.pass_speed);
         let travel = self.limits.travel_max.0;
         let approach = |distance: f64| self.move_secs(distance, search.approach_speed);
-        let rest = 2.0 * search.recovery.0;
+        let dwell = search.press.map_or(0.0, |press| press.dwell.0);
+        let rest = 2.0 * (search.recovery.0 + dwell);
         let slow = self.move_secs(search.retreat_mm + 1.0, search.pass_speed)
             + self.move_secs(1.0, search.pass_speed);
         let moves = 2.0 * approach(search.retreat_mm) + slow + rest;
@@ -363,6 +370,16 @@ impl Walk<'_> {
             approach(CONTACT_EXPECTED_SHARE * travel) + moves,
             approach(travel) + moves,
         )
+    }
+
+    fn check_press(&mut self, press: &Press) {
+        self.check_span(press.dwell);
+        if !(press.force.0 > 0.0 && press.force <= PRESS_MAX) {
+            self.refusals.push(format!(
+                "finding contact cannot press to {}; give above 0 and up to {PRESS_MAX}",
+                press.force
+            ));
+        }
     }
 
     /// A wait of so many whole samples.

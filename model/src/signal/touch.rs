@@ -1,0 +1,369 @@
+//! Where the tissue begins, from everything that was felt while it was touched twice: a fast press, the
+//! relaxation after it, and a slow pass.
+//!
+//! One pass at one speed cannot tell a late onset from a slow one: at speed `v` a body with relaxation
+//! time `tau` feels as if it began `v tau` deeper, and if `tau` is unknown so is the contact. Two speeds and a
+//! relaxation tell `tau` apart. The force model's whole body is followed along the commanded path by its exact
+//! step; for each contact position and relaxation time its four coefficients, the offset and a steady drift are
+//! linear and solved exactly (variable projection, Golub & Pereyra 1973), and the two others are scanned
+//! coarsely, then refined by Gauss-Newton.
+
+use super::contact::{ContactError, ContactEstimate};
+use crate::linalg::Triangle;
+use crate::units::{Depth, Newtons, Position, Seconds};
+use crate::viscoelastic::{KelvinState, ModifiedKelvin};
+
+/// One averaged sample of the search.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchPoint {
+    /// Time in the search.
+    pub t: Seconds,
+    /// Commanded position from home.
+    pub position: Position,
+    /// Force above tare; `None` where the tissue moved but the force does not count, such as on a retreat
+    /// that may have lifted off.
+    pub force: Option<Newtons>,
+}
+
+/// Fewer forces than this do not carry two outer and six linear parameters.
+const FORCES_MIN: usize = 100;
+
+/// Relaxation times considered, in s: faster than any load cell of this kind follows, slower than any search.
+const TAU_RANGE: [f64; 2] = [0.02, 60.0];
+/// Relaxation times scanned: three a decade, close enough for Gauss-Newton to find the nearest minimum.
+const TAU_COUNT: u32 = 10;
+/// Contact positions scanned, evenly over the search.
+const CONTACT_COUNT: u32 = 60;
+/// The scan looks at about so many points, each a mean of several.
+const SCAN_POINTS: usize = 300;
+/// Refinements settle within a handful of steps.
+const STEPS_MAX: usize = 40;
+/// Points in a block whose mean shows whether residuals remember: 0.2 s of the engine's points.
+const BLOCK: usize = 10;
+
+/// Offset, drift, four coefficients of the body, then the derivatives by contact and ln tau, then the force.
+const LINEAR: usize = 6;
+const COLUMNS: usize = LINEAR + 2;
+type Row = [f64; COLUMNS + 1];
+
+/// Standard errors by which two touches must be apart to be two: rarer by chance than one in three hundred.
+const APART_SIGMAS: f64 = 3.0;
+
+/// What a search says of the contact position.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchEstimate {
+    /// The contact position. Half of the distance between the touches is part of its standard error if it is
+    /// more than noise.
+    pub contact: ContactEstimate,
+    /// How much deeper the second touch met the tissue than the first, in mm, if there were two and this is
+    /// more than noise.
+    pub apart_mm: Option<f64>,
+}
+
+/// Estimates the contact position from a whole search. The path must begin out of contact and go on without
+/// gaps; times rise. What follows the last point without force is the second touch.
+pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
+    let search = Search::new(points.to_vec())?;
+    let coarse = search.thinned(points.len().div_ceil(SCAN_POINTS));
+    // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
+    // relaxation time has its own valley, and the deepest shows only at its bottom.
+    let bottoms = coarse.scan().into_iter().filter_map(|start| {
+        let trial = coarse.refined(start);
+        Some((trial, coarse.solve(trial)?.1))
+    });
+    let (near, _) = bottoms
+        .min_by(|one, other| one.1.total_cmp(&other.1))
+        .ok_or(ContactError::NoOnset)?;
+    let trial = search.refined(near);
+    search.estimate(trial).ok_or(ContactError::NoOnset)
+}
+
+/// A trial contact position in mm and the logarithm of a relaxation time in s.
+#[derive(Clone, Copy, Debug)]
+struct Trial {
+    contact: f64,
+    log_tau: f64,
+}
+
+struct Search {
+    points: Vec<TouchPoint>,
+    shallow: f64,
+    deep: f64,
+    span: f64,
+}
+
+impl Search {
+    fn new(points: Vec<TouchPoint>) -> Result<Self, ContactError> {
+        let forces = points.iter().filter(|point| point.force.is_some()).count();
+        if forces < FORCES_MIN {
+            return Err(ContactError::TooShort { points: forces });
+        }
+        let is_forward = points.windows(2).all(|pair| pair[1].t.0 > pair[0].t.0);
+        let is_finite = points.iter().all(|point| {
+            let force = point.force.unwrap_or(Newtons(0.0));
+            point.t.is_finite() && point.position.is_finite() && force.is_finite()
+        });
+        let mut deep = f64::NEG_INFINITY;
+        points
+            .iter()
+            .for_each(|point| deep = deep.max(point.position.0));
+        let (begin, end) = (points[0], points[points.len() - 1]);
+        if !(is_forward && is_finite && deep > begin.position.0) {
+            return Err(ContactError::NotOneSpeed);
+        }
+        Ok(Self {
+            shallow: begin.position.0,
+            deep,
+            span: end.t.0 - begin.t.0,
+            points,
+        })
+    }
+
+    /// The same search with means of so many points in the place of one.
+    fn thinned(&self, group: usize) -> Self {
+        let mean_of = |points: &[TouchPoint]| {
+            let mean = |of: &dyn Fn(&TouchPoint) -> f64| {
+                points.iter().map(of).sum::<f64>() / points.len() as f64
+            };
+            let forces: Option<Vec<f64>> = points
+                .iter()
+                .map(|point| point.force.map(|force| force.0))
+                .collect();
+            TouchPoint {
+                t: Seconds(mean(&|point| point.t.0)),
+                position: Position(mean(&|point| point.position.0)),
+                force: forces.map(|f| Newtons(f.iter().sum::<f64>() / f.len() as f64)),
+            }
+        };
+        Self {
+            points: self.points.chunks(group).map(mean_of).collect(),
+            ..*self
+        }
+    }
+
+    /// Follows the path; hands out the body's columns at every force, zero where nothing is touched.
+    fn follow(&self, trial: Trial, mut at: impl FnMut(usize, &TouchPoint, f64, [f64; 4])) {
+        let body = ModifiedKelvin {
+            tau_eps: trial.log_tau.exp(),
+            mu: [0.0; 3],
+            tau_sig: 0.0,
+        };
+        let depth = |point: &TouchPoint| Depth(point.position.0 - trial.contact);
+        let reach = self.deep - trial.contact;
+        // Columns of like size: powers of the share of the deepest depth.
+        let scales = [reach, reach.powi(2), reach.powi(3), reach.powi(2)].map(f64::recip);
+        let mut state = KelvinState::at_rest_from(depth(&self.points[0]));
+        let mut before = self.points[0].t.0;
+        for (index, point) in self.points.iter().enumerate() {
+            let depth = depth(point);
+            if point.t.0 > before {
+                state.step(&body, depth, Seconds(point.t.0 - before));
+                before = point.t.0;
+            }
+            if let Some(force) = point.force {
+                let mut columns = [0.0; 4];
+                if depth.0 > 0.0 {
+                    columns = state.columns();
+                    columns.iter_mut().zip(scales).for_each(|(c, s)| *c *= s);
+                }
+                at(index, point, force.0, columns);
+            }
+        }
+    }
+
+    fn row(&self, point: &TouchPoint, [f1, f2, f3, g]: [f64; 4]) -> [f64; LINEAR] {
+        [1.0, point.t.0 / self.span, f1, f2, f3, g]
+    }
+
+    /// Linear coefficients and residual sum at a trial; `None` where the trial is meaningless.
+    fn solve(&self, trial: Trial) -> Option<([f64; LINEAR], f64)> {
+        if !(trial.contact > self.shallow && trial.contact < self.deep) {
+            return None;
+        }
+        let mut rows = Triangle::<{ LINEAR + 1 }>::default();
+        self.follow(trial, |_, point, force, columns| {
+            let [c, drift, f1, f2, f3, g] = self.row(point, columns);
+            rows.push([c, drift, f1, f2, f3, g, force]);
+        });
+        let [c, drift, f1, f2, f3, g, _] = rows.solve(LINEAR)?;
+        Some(([c, drift, f1, f2, f3, g], rows.residual_sum()))
+    }
+
+    /// The best contact position of each relaxation time scanned.
+    fn scan(&self) -> Vec<Trial> {
+        let [low, high] = TAU_RANGE.map(f64::ln);
+        let best_at = |log_tau: f64| {
+            let trials = (1..CONTACT_COUNT).filter_map(|i| {
+                let share = f64::from(i) / f64::from(CONTACT_COUNT);
+                let contact = self.shallow + share * (self.deep - self.shallow);
+                let trial = Trial { contact, log_tau };
+                Some((trial, self.solve(trial)?.1))
+            });
+            let best = trials.min_by(|one, other| one.1.total_cmp(&other.1))?;
+            Some(best.0)
+        };
+        (0..TAU_COUNT)
+            .filter_map(|j| best_at(low + (high - low) * f64::from(j) / f64::from(TAU_COUNT - 1)))
+            .collect()
+    }
+
+    /// Gauss-Newton with step halving from a trial to the bottom of its valley.
+    fn refined(&self, mut trial: Trial) -> Trial {
+        let Some((_, mut cost)) = self.solve(trial) else {
+            return trial;
+        };
+        let [low, high] = TAU_RANGE.map(f64::ln);
+        for _ in 0..STEPS_MAX {
+            let Some(step) = self.linearised(trial).and_then(|rows| {
+                let mut triangle = Triangle::default();
+                rows.into_iter().for_each(|(_, row)| triangle.push(row));
+                triangle.solve(COLUMNS)
+            }) else {
+                break;
+            };
+            let better = (0..12).find_map(|halving| {
+                let share = 0.5f64.powi(halving);
+                let next = Trial {
+                    contact: trial.contact + share * step[LINEAR],
+                    // A factor of e at a time keeps the step where the linearisation holds.
+                    log_tau: (trial.log_tau + share * step[LINEAR + 1].clamp(-1.0, 1.0))
+                        .clamp(low, high),
+                };
+                let (_, next_cost) = self.solve(next)?;
+                (next_cost < cost).then_some((next, next_cost))
+            });
+            let Some((next, next_cost)) = better else {
+                break;
+            };
+            // A step that gains less than a hundredth of one degree of freedom moves the answer by less
+            // than a tenth of its standard error.
+            let is_settled = cost - next_cost <= 1e-2 * cost / self.points.len() as f64;
+            (trial, cost) = (next, next_cost);
+            if is_settled {
+                break;
+            }
+        }
+        trial
+    }
+
+    /// All columns at a trial, with the derivatives of the fitted force by contact and ln tau, and the index of
+    /// their point.
+    fn linearised(&self, trial: Trial) -> Option<Vec<(usize, Row)>> {
+        let (linear, _) = self.solve(trial)?;
+        let reach = self.deep - trial.contact;
+        // Central differences of an exact response: 1e-4 of the depth and of tau leaves eight digits.
+        let (dx, dl) = (1e-4 * reach, 1e-4);
+        let response = |by: Trial| {
+            let moved = self.deep - by.contact;
+            // The coefficients belong to the scales of the trial itself.
+            let ratio = moved / reach;
+            let ratios = [ratio, ratio.powi(2), ratio.powi(3), ratio.powi(2)];
+            let mut forces = Vec::with_capacity(self.points.len());
+            self.follow(by, |_, _, _, columns| {
+                let terms = (0..4).map(|k| linear[k + 2] * columns[k] * ratios[k]);
+                forces.push(terms.sum::<f64>());
+            });
+            forces
+        };
+        let shifted = |contact: f64, log_tau: f64| {
+            response(Trial {
+                contact: trial.contact + contact,
+                log_tau: trial.log_tau + log_tau,
+            })
+        };
+        let (deeper, higher) = (shifted(dx, 0.0), shifted(-dx, 0.0));
+        let (slower, faster) = (shifted(0.0, dl), shifted(0.0, -dl));
+        let mut rows = Vec::with_capacity(deeper.len());
+        self.follow(trial, |index, point, force, columns| {
+            let i = rows.len();
+            let [c, drift, f1, f2, f3, g] = self.row(point, columns);
+            let by_contact = (deeper[i] - higher[i]) / (2.0 * dx);
+            let by_tau = (slower[i] - faster[i]) / (2.0 * dl);
+            let row = [c, drift, f1, f2, f3, g, by_contact, by_tau, force];
+            rows.push((index, row));
+        });
+        Some(rows)
+    }
+
+    fn estimate(&self, trial: Trial) -> Option<TouchEstimate> {
+        let (linear, cost) = self.solve(trial)?;
+        let rows = self.linearised(trial)?;
+        let variance = cost / (rows.len() - COLUMNS) as f64;
+        let memory = self.memory(trial, &linear, variance);
+        let mut triangle = Triangle::default();
+        rows.iter().for_each(|(_, row)| triangle.push(*row));
+        let by_noise = (variance * memory * triangle.inverse_diagonal(LINEAR)?).sqrt();
+        let apart_mm = self.apart(&rows, memory);
+        let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0);
+        // Against offset and drift alone the fit must gain what noise cannot: chi-square with six degrees,
+        // for which 100 has a chance of 1e-18 a trial.
+        let gain = (self.cost_without_contact()? - cost) / variance;
+        let contact = ContactEstimate {
+            position: Position(trial.contact),
+            std_error_mm,
+            rmse_n: variance.sqrt(),
+        };
+        (gain > 100.0 && std_error_mm.is_finite()).then_some(TouchEstimate { contact, apart_mm })
+    }
+
+    /// How much deeper the second touch met the tissue, if that is more than noise: the one further parameter
+    /// by which the fitted force of the second touch alone may shift.
+    fn apart(&self, rows: &[(usize, Row)], memory: f64) -> Option<f64> {
+        let second = self
+            .points
+            .iter()
+            .rposition(|point| point.force.is_none())?;
+        let mut triangle = Triangle::<{ COLUMNS + 2 }>::default();
+        for (index, row) in rows {
+            let [c, drift, f1, f2, f3, g, by_contact, by_tau, force] = *row;
+            let shift = if *index > second { by_contact } else { 0.0 };
+            triangle.push([c, drift, f1, f2, f3, g, by_contact, by_tau, shift, force]);
+        }
+        let shift = triangle.solve(COLUMNS + 1)?[COLUMNS];
+        let variance = triangle.residual_sum() / (rows.len() - COLUMNS - 1) as f64;
+        let error = (variance * memory * triangle.inverse_diagonal(COLUMNS)?).sqrt();
+        (shift.abs() > APART_SIGMAS * error).then_some(shift)
+    }
+
+    /// How much more the means of blocks of residuals scatter than those of white noise could, else 1: by so
+    /// much the variance of a slow parameter is larger than white noise would make it.
+    fn memory(&self, trial: Trial, linear: &[f64; LINEAR], variance: f64) -> f64 {
+        let (mut blocks, mut squares) = (0.0, 0.0);
+        let (mut sum, mut length, mut last) = (0.0, 0, None);
+        self.follow(trial, |index, point, force, columns| {
+            if last.is_some_and(|last| index != last + 1) {
+                (sum, length) = (0.0, 0);
+            }
+            last = Some(index);
+            let row = self.row(point, columns);
+            let fitted: f64 = row.iter().zip(linear).map(|(x, a)| x * a).sum();
+            sum += force - fitted;
+            length += 1;
+            if length == BLOCK {
+                squares += sum * sum / BLOCK as f64;
+                blocks += 1.0;
+                (sum, length) = (0.0, 0);
+            }
+        });
+        let ratio = squares / blocks / variance;
+        // A variance from so many blocks scatters by the root of two over their number; three times that is
+        // no accident. A ratio that is no number comes of too few blocks or of no noise at all.
+        if ratio > 1.0 + 3.0 * (2.0f64 / blocks).sqrt() {
+            ratio
+        } else {
+            1.0
+        }
+    }
+
+    /// Sum of squares about offset and drift.
+    fn cost_without_contact(&self) -> Option<f64> {
+        let mut rows = Triangle::<3>::default();
+        for point in &self.points {
+            if let Some(force) = point.force {
+                rows.push([1.0, point.t.0 / self.span, force.0]);
+            }
+        }
+        rows.solve(2)?;
+        Some(rows.residual_sum())
+    }
+}
