@@ -8,6 +8,7 @@
 pub mod analysis;
 pub mod cycles;
 pub mod engine;
+pub mod file;
 pub mod plans;
 pub mod preview;
 pub mod programme;
