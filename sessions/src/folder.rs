@@ -151,6 +151,13 @@ pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
     library.join("sessions").join(session_id)
 }
 
+/// The folder a new run of a programme gets in a library.
+#[must_use]
+pub fn new_programme_folder(library: &Path, name: &str) -> PathBuf {
+    let begun = crate::manifest::new_session_id(chrono::Utc::now());
+    library.join("programmes").join(format!("{name}-{begun}"))
+}
+
 /// Refuses a disk with less than twice the room a session needs.
 ///
 /// `path` may not exist yet; its nearest existing parent is asked (`statvfs`, POSIX.1-2001).
