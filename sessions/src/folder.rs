@@ -1,6 +1,7 @@
 //! Where sessions live: the library, the folder of one session, and room on its disk.
 
 pub use crate::lock::{HolderLock, LockError};
+use chrono::{DateTime, Utc};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -153,8 +154,8 @@ pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
 
 /// The folder a new run of a programme gets in a library.
 #[must_use]
-pub fn new_programme_folder(library: &Path, name: &str) -> PathBuf {
-    let begun = crate::manifest::new_session_id(chrono::Utc::now());
+pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc>) -> PathBuf {
+    let begun = crate::manifest::new_session_id(started_at);
     library.join("programmes").join(format!("{name}-{begun}"))
 }
 

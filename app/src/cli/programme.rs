@@ -5,7 +5,7 @@ use super::output::Output;
 use super::rig::RigArgs;
 use crate::report::programme::Page;
 use palpate_protocols::programme::{Done, Event, Laboratory, Programme, RunError, run as carry_out};
-use palpate_protocols::runner::{Answers, RunView, Runner};
+use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
 use serde::Serialize;
@@ -62,7 +62,7 @@ pub(super) fn run(args: &ProgrammeArgs<'_>, output: &Output) -> Result<(), Failu
         Some(folder) => folder.to_path_buf(),
         None => {
             let library = library_folder().map_err(Failure::usage)?;
-            new_programme_folder(&library, &programme.name)
+            new_programme_folder(&library, &programme.name, wall_now().into())
         }
     };
     let bench = super::rig::open(&rig_args)?;

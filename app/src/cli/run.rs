@@ -163,7 +163,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
 }
 
 /// The first signal stops, the second halts.
-fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
+pub(super) fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
     let requests = runner.requests();
     let count = AtomicU32::new(0);
     ctrlc::set_handler(move || {
