@@ -9,6 +9,7 @@
 //! [`viscoelastic`] for the force model and [`fit`] for its identification.
 
 pub mod calibration;
+pub mod cycles;
 pub mod expected;
 pub mod extremes;
 pub mod families;

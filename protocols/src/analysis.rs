@@ -23,6 +23,8 @@ pub struct FitSource {
     pub notes: Vec<String>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
 }
 
 /// What of an indentation is read.
@@ -113,11 +115,13 @@ pub fn read_stretch(
             start: Seconds(0.0),
             notes: table.notes,
             specimen: None,
+            calibration: None,
         });
     }
     let session = Session::open(path)?;
     let samples = samples_of(&session, stretch)?;
     let start = start_of(&session);
+    let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
     if censored > 0 {
@@ -131,6 +135,16 @@ pub fn read_stretch(
         samples,
         start,
         notes,
+        calibration,
+    })
+}
+
+/// The calibration in a session's manifest.
+pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
+    serde_json::from_value(session.manifest.calibration.clone()).map_err(|err| {
+        SourceError::Calibration {
+            detail: err.to_string(),
+        }
     })
 }
 
@@ -140,9 +154,9 @@ pub fn read_stretch(
 /// has left the tissue on the way back.
 pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
     let bad = |detail: String| SourceError::Calibration { detail };
-    let calibration: Calibration = serde_json::from_value(session.manifest.calibration.clone())
+    let curve = calibration_of(session)?
+        .curve()
         .map_err(|err| bad(err.to_string()))?;
-    let curve = calibration.curve().map_err(|err| bad(err.to_string()))?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;
@@ -191,14 +205,14 @@ fn is_fitted(row: &Row, stretch: Stretch) -> bool {
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
-fn is_saturated(session: &Session, row: &Row) -> bool {
+pub(crate) fn is_saturated(session: &Session, row: &Row) -> bool {
     let ends = session.manifest.rig.adc;
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
 
 /// How many samples came before an interlock tripped; all of them if none did.
-fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
+pub(crate) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
     let tripped = decisions
         .iter()
         .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
@@ -206,7 +220,7 @@ fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
 }
 
 /// What the engine decided, each after so many samples.
-fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
+pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     session
         .entries
         .iter()

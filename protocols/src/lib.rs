@@ -6,8 +6,11 @@
 //! Start reading at [`engine::step`].
 
 pub mod analysis;
+pub mod cycles;
 pub mod engine;
+pub mod file;
 pub mod plans;
 pub mod preview;
+pub mod programme;
 pub mod replay;
 pub mod runner;

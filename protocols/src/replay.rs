@@ -191,7 +191,7 @@ fn config_of(session: &Session) -> Result<Config, ReplayError> {
         .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
     Ok(Config {
         rig: manifest.rig.clone(),
-        limits: manifest.limits,
+        limits: plan.limits.tighten(manifest.limits),
         curve: calibration
             .curve()
             .map_err(|err| bad("calibration", err.to_string()))?,

@@ -10,9 +10,11 @@
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
+pub mod calibrations;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;
@@ -21,6 +23,9 @@ mod schema;
 pub mod text;
 pub mod trade;
 
+pub use calibrations::{
+    Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
+};
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,

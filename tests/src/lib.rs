@@ -1,6 +1,7 @@
 //! Fixtures shared by the tests that cross crates.
 
 pub mod flow;
+pub mod lab;
 pub mod recorded;
 pub mod searching;
 pub mod simulated;

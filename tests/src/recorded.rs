@@ -4,7 +4,9 @@ use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::RampHold;
-use palpate_protocols::runner::{AfterStop, Labels, Request, RunRequest, Runner, TimeScale};
+use palpate_protocols::runner::{
+    AfterStop, Answers, Labels, Request, RunRequest, Runner, TimeScale,
+};
 use palpate_sessions::Session;
 use std::sync::mpsc::sync_channel;
 use std::time::Duration;
@@ -25,6 +27,7 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
         labels: Labels::default(),
         is_acknowledged: false,
         after_stop: AfterStop::Close,
+        answers: Answers::Confirm,
     };
     let (reply, answer) = sync_channel(1);
     let (wake, woken) = sync_channel(1);

@@ -96,6 +96,7 @@ pub fn search_on(
         for effect in effects {
             match effect {
                 Effect::Command(command) => rig.send(command),
+                Effect::ByHand(action) => rig.by_hand(action),
                 Effect::Record(record) => records.push(record),
                 Effect::Finished(_) => {}
             }

@@ -64,6 +64,7 @@ pub fn run(settings: SimSettings, params: RampHold) -> Run {
         for effect in effects {
             match effect {
                 Effect::Command(command) => rig.send(command),
+                Effect::ByHand(action) => rig.by_hand(action),
                 Effect::Record(record) => records.push(record),
                 Effect::Finished(_) => {}
             }

@@ -159,6 +159,7 @@ mod tests {
             std_error,
             ci95: None,
             is_fixed,
+            systematic_error: None,
         };
         assert_eq!(doubt(&[tau(Some(0.01), false)]), None);
         assert_eq!(doubt(&[tau(None, true)]), None);

@@ -9,7 +9,7 @@ use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::{HoldUntil, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
-    AfterStop, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
+    AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
 use serde::Serialize;
 use std::path::PathBuf;
@@ -100,6 +100,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         unload: args.unload.map(MmPerS),
     };
     let bench = super::rig::open(&args.rig)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let request = RunRequest {
         plan: params.plan(),
         calibration: bench.calibration,
@@ -112,6 +113,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         },
         is_acknowledged: args.acknowledge,
         after_stop: AfterStop::Close,
+        answers: Answers::Confirm,
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(

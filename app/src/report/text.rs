@@ -1,7 +1,7 @@
 //! The strings of a fit. Window, command line and picture print these and no others, so that a
 //! number never reads differently in two places.
 
-use crate::widgets::uncertain::{interval, plain, with_error, with_interval};
+use crate::widgets::uncertain::{error_alone, interval, plain, with_error, with_interval};
 use palpate_model::fit::{FitReport, Parameter};
 
 /// One parameter in words.
@@ -13,7 +13,7 @@ pub struct ParameterText {
     pub value: String,
     /// Unit of value and interval, typeset.
     pub unit: String,
-    /// 95 % interval, empty where there is none.
+    /// 95 % interval and what the calibration adds to it, empty where there is none.
     pub interval: String,
 }
 
@@ -31,11 +31,20 @@ impl ParameterText {
             value,
             unit: typeset(&parameter.unit),
             interval: match (parameter.ci95, parameter.std_error) {
-                (Some(ends), Some(error)) => interval(ends, parameter.value, error),
+                (Some(ends), Some(error)) => {
+                    let ends = interval(ends, parameter.value, error);
+                    format!("{ends}{}", systematic(parameter))
+                }
                 _ => String::new(),
             },
         }
     }
+}
+
+/// The systematic standard uncertainty as it stands after an interval, empty where there is none.
+fn systematic(parameter: &Parameter) -> String {
+    let words = |error: f64| format!(" ± {} calibration", error_alone(error));
+    parameter.systematic_error.map(words).unwrap_or_default()
 }
 
 /// A parameter in one cell of a table: `value [low, high]`, or the value and why it has no
@@ -43,7 +52,10 @@ impl ParameterText {
 #[must_use]
 pub fn cell(parameter: &Parameter) -> String {
     match (parameter.std_error, parameter.ci95) {
-        (Some(error), Some(ends)) => with_interval(parameter.value, error, ends),
+        (Some(error), Some(ends)) => {
+            let words = with_interval(parameter.value, error, ends);
+            format!("{words}{}", systematic(parameter))
+        }
         _ => ParameterText::of(parameter).value,
     }
 }
@@ -140,6 +152,7 @@ mod tests {
             std_error,
             ci95: std_error.map(|error| [1.5 - 2.0 * error, 1.5 + 2.0 * error]),
             is_fixed,
+            systematic_error: None,
         }
     }
 
@@ -157,6 +170,15 @@ mod tests {
             );
             assert_eq!(text.unit, "N·s/mm²");
         }
+    }
+
+    #[test]
+    fn what_the_calibration_adds_stands_after_the_interval() {
+        let mut known = parameter(Some(0.1), false);
+        known.systematic_error = Some(0.0234);
+        let interval = "[1.30, 1.70] ± 0.023 calibration";
+        assert_eq!(ParameterText::of(&known).interval, interval);
+        assert_eq!(cell(&known), format!("1.50 {interval}"));
     }
 
     #[test]

@@ -6,7 +6,7 @@ use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_protocols::preview::{Preview, preview};
-use palpate_protocols::runner::{AfterStop, Labels, RunRequest};
+use palpate_protocols::runner::{AfterStop, Answers, Labels, RunRequest};
 use std::path::{Path, PathBuf};
 
 /// Longest hold the preview accepts: a day, in seconds.
@@ -182,6 +182,7 @@ impl ProtocolForm {
             labels: self.labels.clone(),
             is_acknowledged: self.is_acknowledged(),
             after_stop: AfterStop::Wait,
+            answers: Answers::Operator,
         })
     }
 

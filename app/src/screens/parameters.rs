@@ -171,6 +171,7 @@ mod tests {
             std_error,
             ci95: None,
             is_fixed: false,
+            systematic_error: None,
         }
     }
 

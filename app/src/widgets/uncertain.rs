@@ -37,6 +37,23 @@ pub fn interval([low, high]: [f64; 2], value: f64, error: f64) -> String {
     }
 }
 
+/// An error by itself, to two significant digits.
+#[must_use]
+pub fn error_alone(error: f64) -> String {
+    let Some(digits) = Digits::of(error, error) else {
+        return plain(error);
+    };
+    let scaled = format!(
+        "{:.*}",
+        digits.decimals,
+        error / 10f64.powi(digits.exponent)
+    );
+    match digits.exponent {
+        0 => scaled,
+        exponent => format!("{scaled}e{exponent}"),
+    }
+}
+
 /// How many digits an error supports, and in which power of ten.
 struct Digits {
     exponent: i32,

@@ -5,7 +5,8 @@ use super::Job;
 use crate::report::thin::thin;
 use eframe::egui::Context;
 use egui_plot::PlotPoint;
-use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, fit};
+use palpate_model::calibration::{Calibration, ForceUncertainty};
+use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
 use palpate_model::units::Seconds;
 use palpate_protocols::analysis::{self, SourceError};
 use palpate_protocols::runner::{RunView, Stopwatch};
@@ -25,6 +26,37 @@ pub struct Fitted {
     pub result: Result<FitReport, FitError>,
     /// Wall seconds of the fit alone.
     pub seconds: f64,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
+    /// What the calibration adds to the uncertainty, once asked for.
+    pub systematic: Option<Systematic>,
+}
+
+impl Fitted {
+    /// Adds what the calibration's own errors do to the parameters; a table has none, and a refusal is a
+    /// note. `options` are those of the fit.
+    #[must_use]
+    pub fn with_systematic(mut self, options: &FitOptions) -> Self {
+        let (Some(calibration), Ok(report)) = (&self.calibration, &self.result) else {
+            return self;
+        };
+        let found = ForceUncertainty::of(calibration)
+            .map_err(|err| err.to_string())
+            .and_then(|uncertainty| {
+                systematic(&self.samples, options, &calibration.name, &uncertainty)
+                    .map_err(|err| err.to_string())
+            });
+        match found {
+            Ok(found) => {
+                self.result = Ok(report.clone().with_systematic(&found));
+                self.systematic = Some(found);
+            }
+            Err(reason) => self.notes.push(format!(
+                "what the calibration adds to the uncertainty cannot be told: {reason}"
+            )),
+        }
+        self
+    }
 }
 
 /// Reads a session or a table and fits it. `columns` names the columns of a table without header.
@@ -41,6 +73,8 @@ pub fn fit_source(
         samples: source.samples,
         start: source.start,
         notes: source.notes,
+        calibration: source.calibration,
+        systematic: None,
         result,
     })
 }
@@ -138,7 +172,9 @@ impl Refitter {
 }
 
 fn exact(folder: &Path) -> Result<ExactFit, String> {
-    let fitted = fit_source(folder, None, &FitOptions::default()).map_err(|err| err.to_string())?;
+    let options = FitOptions::default();
+    let fitted = fit_source(folder, None, &options).map_err(|err| err.to_string())?;
+    let fitted = fitted.with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
     let start = fitted.start.0;

@@ -362,6 +362,39 @@ impl Calibration {
         Ok(())
     }
 
+    /// This calibration with weights that are named by what they add: each mass more than the one before
+    /// counts as one weight laid on it, with the tolerance in g.
+    pub fn with_stacked_weights(mut self, tolerance_g: f64) -> Result<Self, CalibrationError> {
+        if !(tolerance_g.is_finite() && tolerance_g >= 0.0) {
+            return Err(CalibrationError::Tolerance { tolerance_g });
+        }
+        let mut masses: Vec<f64> = self.points()?.iter().map(|point| point.mass_g).collect();
+        if masses[0] > 0.0 {
+            masses.insert(0, 0.0);
+        }
+        let name = |pair: &[f64]| format!("{} to {} g", pair[0], pair[1]);
+        let weight = |pair: &[f64]| NamedWeight {
+            name: name(pair),
+            mass_g: pair[1] - pair[0],
+            tolerance_g: Some(tolerance_g),
+        };
+        self.weights = masses.windows(2).map(weight).collect();
+        for step in self.series.iter_mut().flat_map(|one| &mut one.steps) {
+            let on = masses
+                .windows(2)
+                .filter(|pair| pair[1] <= step.mass_g + SAME_MASS);
+            step.weights = on.map(name).collect();
+        }
+        Ok(self)
+    }
+
+    /// The kind of curve that foretells weights left out best.
+    pub fn best_curve(&self) -> Result<CurveKind, CalibrationError> {
+        let found = super::candidates(&self.points()?);
+        let best = found.into_iter().find(|one| one.refused.is_none());
+        Ok(best.map_or(CurveKind::Monotone, |one| one.curve))
+    }
+
     /// The last digit of the readings, where it is known: stated, or for the thesis's table as recorded
     /// sessions carry it, read from its print.
     #[must_use]

@@ -50,6 +50,11 @@ pub enum CalibrationError {
         /// The signal of the step before in V.
         before_volts: f64,
     },
+    /// Next to no rise between two weights.
+    #[error(
+        "between two weights the signal rises by less than a millionth of its own uncertainty, so no force can be told there; leave one of them out or take the steps again"
+    )]
+    TooFlat,
     /// Written by a later version.
     #[error(
         "the calibration has form {format}, newer than this program knows; read it with the version that wrote it"
@@ -79,6 +84,12 @@ pub enum CalibrationError {
         mass_g: f64,
         /// The sum of its weights in g.
         sum_g: f64,
+    },
+    /// A tolerance that is none.
+    #[error("a tolerance of {tolerance_g} g is not possible; give 0 or more")]
+    Tolerance {
+        /// The tolerance in g.
+        tolerance_g: f64,
     },
     /// Straight segments through masses that were not taken.
     #[error(

@@ -100,8 +100,8 @@ impl CurveKind {
             let mut next = vec![f64::INFINITY; last + 1];
             let mut from = vec![0; last + 1];
             for j in 1..=last {
-                for i in 1..j {
-                    let sum = best[i] + miss(points, i, j);
+                for (i, so_far) in best[..j].iter().enumerate().skip(1) {
+                    let sum = so_far + miss(points, i, j);
                     if sum < next[j] {
                         (next[j], from[j]) = (sum, i);
                     }

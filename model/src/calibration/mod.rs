@@ -2,15 +2,22 @@
 //!
 //! Start at [`Calibration`], the document. Its [`Calibration::curve`] turns volts into newtons.
 
+mod choice;
 mod curve;
 mod document;
 mod error;
 mod kind;
+mod quality;
 mod settle;
 #[cfg(test)]
 mod tests;
+mod uncertainty;
+#[cfg(test)]
+mod uncertainty_tests;
+mod validity;
 mod weight_steps;
 
+pub use choice::{Candidate, candidates, judge_kind};
 pub use curve::{Curve, DEGREE_MAX};
 pub use document::{
     CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, Point, Reading, Series, SeriesStep,
@@ -18,5 +25,8 @@ pub use document::{
 };
 pub use error::CalibrationError;
 pub use kind::CurveKind;
+pub use quality::{FlatStretch, Hysteresis, PointQuality, Quality};
 pub use settle::{Settle, SettleRule, Settling, Steady, Unsettled};
+pub use uncertainty::{ForceUncertainty, Term};
+pub use validity::{Bench, CHECK_LIMIT_PERCENT, CheckError, CheckResult, KnownWeight};
 pub use weight_steps::{STANDARD_GRAVITY, WeightStep, newtons_of};

@@ -118,7 +118,7 @@ impl fmt::Display for Unsettled {
 }
 
 /// Mean and squared scatter of a block under construction (Welford 1962).
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Block {
     samples: u64,
     mean: f64,
@@ -135,7 +135,7 @@ impl Block {
 }
 
 /// Watches a signal sample by sample; memory does not grow.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Settling {
     rule: SettleRule,
     samples: u64,

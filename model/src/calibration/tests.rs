@@ -9,8 +9,11 @@ fn with_step(index: usize, change: impl Fn(&mut WeightStep)) -> CalibrationError
     calibration.curve().unwrap_err()
 }
 
+/// One way up or down: direction, repeat, grams and volts.
+pub(super) type Taken<'a> = (Direction, u32, &'a [(f64, f64)]);
+
 /// A calibration of series from (direction, repeat, [(g, V)]).
-pub(super) fn document(series: &[(Direction, u32, &[(f64, f64)])]) -> Calibration {
+pub(super) fn document(series: &[Taken<'_>]) -> Calibration {
     let step = |&(mass_g, volts): &(f64, f64)| SeriesStep {
         mass_g,
         volts: Volts(volts),
@@ -228,4 +231,227 @@ fn a_polynomial_through_the_flat_stretch_is_refused() {
     let refusal = CurveKind::Polynomial { degree: 6 }.through(&points);
     assert!(refusal.unwrap_err().to_string().contains("degree 6"));
     assert!(CurveKind::Polynomial { degree: 1 }.through(&points).is_ok());
+}
+
+#[test]
+fn the_flat_stretch_of_the_thesis_is_called_out() {
+    let quality = Calibration::thesis().quality().unwrap();
+    let flat = &quality.flat[0];
+    assert_eq!((flat.from_g, flat.to_g), (340.0, 640.0));
+    assert!((flat.rise_v - 0.09).abs() < 1e-12);
+    // 1.47 V over 740 g elsewhere, 0.09 V over 300 g here.
+    assert!(
+        (flat.ratio - (1.47 / 740.0) / (0.09 / 300.0)).abs() < 1e-9,
+        "{flat:?}"
+    );
+    let sentence = &quality.findings[0];
+    assert!(
+        sentence.starts_with(
+            "from 340 g to 640 g (3.33 to 6.28 N) the cell moves only 0.09 V for 300 g"
+        ),
+        "{sentence}"
+    );
+    // 0.01 V for 100 g is 0.098 N per mV; between the weights the curve is flatter yet.
+    assert!((0.098..0.14).contains(&flat.worst_n_per_mv), "{flat:?}");
+    assert!(sentence.contains("one standard uncertainty"), "{sentence}");
+    assert!(
+        quality.findings[1].starts_with("forces above 10.20 N (1040 g) are extrapolated"),
+        "{:?}",
+        quality.findings
+    );
+    assert!(
+        quality.findings[2].contains("hysteresis"),
+        "{:?}",
+        quality.findings
+    );
+    let straight = Calibration::linear("line", Volts(0.5), 0.1, Newtons(50.0));
+    assert!(straight.quality().unwrap().flat.is_empty());
+}
+
+#[test]
+fn the_curve_that_foretells_best_is_chosen() {
+    // A quadratic cell: polynomials foretell it, and straight lines do not.
+    let mut random = crate::random::SplitMix::seeded(7);
+    let series: Vec<Vec<(f64, f64)>> = (1..=3)
+        .map(|_| {
+            let steps = (0..10).map(|i| {
+                let grams = 100.0 * f64::from(i);
+                let f = newtons_of(grams).0;
+                (grams, 1.0 + 0.2 * f + 0.01 * f * f + 1e-3 * random.normal())
+            });
+            steps.collect()
+        })
+        .collect();
+    let borrowed: Vec<Taken<'_>> = (1..)
+        .zip(&series)
+        .map(|(repeat, steps)| (Direction::Loading, repeat, steps.as_slice()))
+        .collect();
+    let calibration = document(&borrowed);
+    let found = candidates(&calibration.points().unwrap());
+    assert!(
+        matches!(found[0].curve, CurveKind::Polynomial { degree: 2.. }),
+        "{}",
+        found[0].name
+    );
+    // 1 + 7 + 5 kinds, all judged.
+    assert_eq!(found.len(), 13);
+    // One straight line is off by the square: an eighth of 0.01 * 8.8^2 V at most, over 0.29 V/N.
+    let line = found
+        .iter()
+        .find(|one| one.name == "1 straight segment")
+        .unwrap();
+    assert!(line.left_out_rms_n.unwrap() > 20.0 * found[0].left_out_rms_n.unwrap());
+    let score = |one: &Candidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
+    assert!(
+        found
+            .windows(2)
+            .all(|pair| score(&pair[0]) <= score(&pair[1]))
+    );
+    // With three weights there is nothing to compare.
+    let few = document(&[(
+        Direction::Loading,
+        1,
+        &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)],
+    )]);
+    assert_eq!(candidates(&few.points().unwrap()).len(), 1);
+}
+
+#[test]
+fn every_curve_of_the_thesis_table_is_shown() {
+    let points = Calibration::thesis().points().unwrap();
+    let found = candidates(&points);
+    assert_eq!(found.len(), 13);
+    for one in found.iter().filter(|one| one.refused.is_none()) {
+        assert_eq!(one.residuals_n.len(), 11, "{}", one.name);
+        assert!(one.left_out_rms_n.is_some() && one.left_out_ends_rms_n.is_some());
+        // Tared: the empty cell reads nothing.
+        assert!(one.residuals_n[0].abs() < 1e-9, "{}", one.name);
+    }
+    let monotone = found
+        .iter()
+        .find(|one| one.curve == CurveKind::Monotone)
+        .unwrap();
+    assert!(
+        monotone
+            .residuals_n
+            .iter()
+            .all(|residual| residual.abs() < 1e-11)
+    );
+}
+
+#[test]
+fn hysteresis_and_repeatability_are_what_was_put_in() {
+    let line = |g: f64| 1.0 + 2e-3 * g;
+    let up = |error: f64| -> Vec<(f64, f64)> {
+        (0..6)
+            .map(|i| 100.0 * f64::from(i))
+            .map(|g| (g, line(g) + error * (g / 500.0)))
+            .collect()
+    };
+    // 4 mV apart at the top, repeats 1 mV up and down.
+    let down: Vec<(f64, f64)> = up(0.004).into_iter().rev().collect();
+    let (low, high) = (up(-0.001), up(0.001));
+    let calibration = document(&[
+        (Direction::Loading, 1, &low),
+        (Direction::Loading, 2, &high),
+        (Direction::Unloading, 1, &down),
+    ]);
+    let quality = calibration.quality().unwrap();
+    let hysteresis = quality.hysteresis.unwrap();
+    assert!((hysteresis.max_v - 0.004).abs() < 1e-12, "{hysteresis:?}");
+    assert!(
+        (hysteresis.max_n - 0.004 / (2e-3 / 9.806_65e-3)).abs() < 2e-4,
+        "{hysteresis:?}"
+    );
+    // Shares 0, .2, .4, .6, .8, 1 of the top: mean square 2.2/6.
+    assert!((hysteresis.rms_v - 0.004 * (2.2f64 / 6.0).sqrt()).abs() < 1e-12);
+    // Pairs 2 mV apart times those shares: variance 2 mV^2 over one degree of freedom each.
+    let expected = 1e-3 * (2.0 * 2.2f64 / 6.0).sqrt();
+    assert!((quality.repeatability_v.unwrap() - expected).abs() < 1e-12);
+}
+
+#[test]
+fn age_and_rig_raise_doubts() {
+    let mut calibration = Calibration::thesis();
+    (calibration.rig, calibration.cell) = ("bench-2".into(), "4711".into());
+    calibration.excitation = Some(Volts(10.0));
+    let bench = |age_days| Bench {
+        rig: "bench-2",
+        cell: Some("4711"),
+        excitation: Some(Volts(10.001)),
+        age_days,
+    };
+    for (age, words) in [
+        (Some(0), None),
+        (Some(335), None),
+        (Some(336), Some("valid for 29 more")),
+        (Some(365), Some("valid for 0 more")),
+        (Some(366), Some("366 days old and was valid for 365")),
+        (Some(-1), Some("dated 1 days ahead")),
+        (None, Some("does not say when")),
+    ] {
+        let doubts = calibration.doubts(&bench(age));
+        assert_eq!(
+            doubts.len(),
+            usize::from(words.is_some()),
+            "{age:?}: {doubts:?}"
+        );
+        assert!(
+            words.is_none_or(|words| doubts[0].contains(words)),
+            "{doubts:?}"
+        );
+    }
+    let other = Bench {
+        rig: "sim",
+        cell: Some("9"),
+        excitation: Some(Volts(5.0)),
+        age_days: Some(1),
+    };
+    assert_eq!(calibration.doubts(&other).len(), 3);
+}
+
+#[test]
+fn a_known_weight_passes_within_one_percent() {
+    let calibration = Calibration::linear("line", Volts(1.0), 0.1, Newtons(50.0));
+    let weight = KnownWeight {
+        mass_g: 1000.0,
+        tolerance_g: Some(0.5),
+        // The zero has drifted by 20 mV, and taring takes it out.
+        volts: Volts(1.02 + 0.980_665 * 1.009),
+        tare: Volts(1.02),
+        limit_percent: None,
+    };
+    let result = calibration.check(&weight).unwrap();
+    assert!(
+        result.is_passed && (result.error_percent - 0.9).abs() < 1e-9,
+        "{result:?}"
+    );
+    assert!(
+        result.sentence.contains("+0.90 %, within the limit of 1 %"),
+        "{result:?}"
+    );
+    let strict = KnownWeight {
+        limit_percent: Some(0.5),
+        ..weight
+    };
+    let result = calibration.check(&strict).unwrap();
+    assert!(!result.is_passed && result.sentence.contains("take a new calibration"));
+    let none = KnownWeight {
+        mass_g: 0.0,
+        ..weight
+    };
+    assert!(calibration.check(&none).is_err());
+    // In the flat stretch one percent is less than the calibration knows.
+    let thesis = Calibration::thesis();
+    let flat = KnownWeight {
+        mass_g: 440.0,
+        volts: Volts(1.79),
+        tare: Volts(1.28),
+        ..weight
+    };
+    let result = thesis.check(&flat).unwrap();
+    assert!(
+        result.is_passed && result.doubts[0].contains("says little here"),
+        "{result:?}"
+    );
 }

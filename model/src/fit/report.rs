@@ -32,6 +32,10 @@ pub struct Parameter {
     pub ci95: Option<[f64; 2]>,
     /// Whether it was kept at a given value.
     pub is_fixed: bool,
+    /// Standard uncertainty that the calibration adds, the same in every repeat; `None` where it is not
+    /// known or not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub systematic_error: Option<f64>,
 }
 
 /// What the residuals remember.
@@ -284,6 +288,7 @@ pub(super) fn parameters(
                     [(value - half).max(lowest), value + half]
                 }),
                 is_fixed: is_fixed(index),
+                systematic_error: None,
             }
         })
         .collect()

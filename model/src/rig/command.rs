@@ -51,6 +51,29 @@ pub enum RigCommand {
 }
 
 impl RigCommand {
+    /// Whether a controller that acknowledges `set` does what this command asked. It counts speed and acceleration
+    /// in quanta of its own, so 0.9 mm/s may come back as thirty times 0.03 mm/s, which is not the same float.
+    #[must_use]
+    pub fn is_answered_by(&self, set: &Self) -> bool {
+        // Far below any quantum of speed, far above the rounding of a product.
+        let is_near = |asked: f64, set: f64| (asked - set).abs() <= 1e-9 * asked.abs();
+        match (self, set) {
+            (Self::MoveTo(asked), Self::MoveTo(set)) => {
+                asked.target_pulses == set.target_pulses
+                    && is_near(asked.speed.0, set.speed.0)
+                    && is_near(asked.acceleration.0, set.acceleration.0)
+            }
+            (Self::Oscillate(asked), Self::Oscillate(set)) => {
+                let acceleration = set.acceleration;
+                *set == Oscillation {
+                    acceleration,
+                    ..*asked
+                } && is_near(asked.acceleration.0, acceleration.0)
+            }
+            _ => self == set,
+        }
+    }
+
     /// Whether this command takes speed out of the axis; such commands overtake all others.
     #[must_use]
     pub fn is_stopping(&self) -> bool {
@@ -68,4 +91,25 @@ pub fn position_from_pulses(pulses: i64, mm_per_pulse: f64) -> Position {
 #[must_use]
 pub fn pulses_from_position(position: Position, mm_per_pulse: f64) -> i64 {
     (position.0 / mm_per_pulse).round() as i64
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_speed_counted_in_quanta_is_the_speed_asked_for() {
+        let to = |speed: f64, target_pulses| {
+            RigCommand::MoveTo(MoveTo {
+                target_pulses,
+                speed: MmPerS(speed),
+                acceleration: MmPerS2(61.44),
+            })
+        };
+        // Thirty quanta are 0.8999999999999999.
+        assert!(to(0.9, 10).is_answered_by(&to(30.0 * 0.03, 10)));
+        assert!(!to(0.9, 10).is_answered_by(&to(0.87, 10)));
+        assert!(!to(0.9, 10).is_answered_by(&to(0.9, 11)));
+        assert!(!to(0.9, 10).is_answered_by(&RigCommand::Stop));
+    }
 }

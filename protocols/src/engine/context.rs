@@ -4,7 +4,7 @@ use super::input::{Effect, Record};
 use super::state::{MoveInFlight, Power, State};
 use palpate_model::Nanos;
 use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{MoveTo, Phase, Profile, RigCommand};
+use palpate_model::rig::{MoveTo, Oscillation, Phase, Profile, RigCommand, Sine};
 use palpate_model::units::{MmPerS, Position, Seconds};
 
 /// How a step stands after an input.
@@ -84,6 +84,36 @@ impl Context<'_> {
         });
         self.state.path.on_move(command);
         self.command(RigCommand::MoveTo(command));
+        Ok(())
+    }
+
+    /// Lets the axis follow a sine, deeper and back.
+    pub fn oscillate(&mut self, command: Oscillation) -> Result<(), String> {
+        let rig = &self.state.config.rig;
+        rig.check_oscillation(&command)?;
+        if self.state.power != Power::Enabled {
+            return Err("motion is not enabled".into());
+        }
+        let from = self.state.derived.position;
+        let sine = Sine::new(from, &command, rig.mm_per_pulse, rig.tick());
+        let deepest = 2.0 * command.amplitude_pulses as f64 * rig.mm_per_pulse;
+        let travel = self.state.config.limits.travel_max;
+        if from.moved_by(deepest) > travel {
+            return Err(format!(
+                "a sine to {:.3} mm is outside the travel of 0 to {:.1} mm",
+                from.moved_by(deepest).0,
+                travel.0
+            ));
+        }
+        let deadline = self.now + Nanos::from_seconds(sine.duration() + MOVE_GRACE);
+        let speed = sine.speed_max();
+        self.state.in_flight = Some(MoveInFlight {
+            deadline,
+            speed,
+            is_forward: true,
+        });
+        self.state.path.on_oscillate(command);
+        self.command(RigCommand::Oscillate(command));
         Ok(())
     }
 

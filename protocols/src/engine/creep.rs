@@ -9,10 +9,20 @@ use palpate_model::units::{Depth, Newtons, Position};
 /// Samples averaged before a correction: 50 ms at 1 kHz, two to three mains cycles.
 const FILTER_SAMPLES: usize = 50;
 
-/// Share of the error that a correction takes away if the tissue is as stiff as its secant says. Soft tissue
-/// stiffens with depth, its tangent is up to about three times its secant: half stays below the factor of
-/// two at which corrections would grow.
+/// Share of the error that a correction takes away if the tissue is as stiff as it is taken to be. Half stays far
+/// below the factor of two at which corrections would grow.
 const GAIN: f64 = 0.5;
+
+/// Stiffness at first, as a multiple of the secant's: soft tissue stiffens with depth and with speed. The thesis body's
+/// answer to a fast step is up to ten times its secant; the corrections find out.
+const STIFFNESS_FIRST: f64 = 10.0;
+
+/// Bounds of what the corrections may find, as multiples of the secant's stiffness.
+const STIFFNESS_RANGE: [f64; 2] = [1.0, 50.0];
+
+/// Share of a new finding in the stiffness; corrections of fewer pulses tell more of noise than of tissue.
+const LEARN: f64 = 0.3;
+const LEARN_PULSES: f64 = 4.0;
 
 /// Data of a force hold in progress.
 #[derive(Clone, Debug, PartialEq)]
@@ -22,6 +32,10 @@ pub(crate) struct Creeping {
     /// No correction before this tick: the mean must be of the new position only.
     quiet_until: u64,
     filter: MovingMean,
+    /// Stiffness as a multiple of the secant's.
+    stiffness: f64,
+    /// Force before the correction under way and its length in mm.
+    corrected: Option<(f64, f64)>,
 }
 
 impl Creeping {
@@ -34,6 +48,8 @@ impl Creeping {
             until_tick: cx.state.tick + cx.state.ticks(plan.duration),
             quiet_until: cx.state.tick + FILTER_SAMPLES as u64,
             filter: MovingMean::new(FILTER_SAMPLES),
+            stiffness: STIFFNESS_FIRST,
+            corrected: None,
         })
     }
 
@@ -66,8 +82,13 @@ impl Creeping {
         }
         let error = self.plan.force - mean;
         // Secant stiffness; a probe hardly in the tissue counts as a tenth of a millimetre in.
-        let stiffness = self.plan.force.0 / depth.0.max(0.1);
-        let correction_mm = GAIN * error.0 / stiffness;
+        let secant = self.plan.force.0 / depth.0.max(0.1);
+        if let Some((before, length)) = self.corrected.take() {
+            let found = (mean.0 - before) / length / secant;
+            let [least, most] = STIFFNESS_RANGE;
+            self.stiffness += LEARN * (found.clamp(least, most) - self.stiffness);
+        }
+        let correction_mm = GAIN * error.0 / (self.stiffness * secant);
         let rig = &cx.state.config.rig;
         let pulses = (correction_mm / rig.mm_per_pulse).round();
         if pulses != 0.0 {
@@ -75,6 +96,8 @@ impl Creeping {
             let end = Position(to as f64 * rig.mm_per_pulse);
             let end = Position(end.0.clamp(0.0, cx.state.config.limits.travel_max.0));
             cx.move_to(end, self.plan.speed)?;
+            let length = pulses * cx.state.config.rig.mm_per_pulse;
+            self.corrected = (pulses.abs() >= LEARN_PULSES).then_some((mean.0, length));
         }
         Ok(Progress::Continue)
     }

@@ -34,9 +34,24 @@ pub(crate) struct Homing {
     /// How far the probe was moved off the switch.
     back_off_mm: f64,
     stage: Stage,
+    /// Only look where home is: position zero stays what it is.
+    is_check: bool,
 }
 
 impl Homing {
+    pub fn begin_check(
+        cx: &mut Context<'_>,
+        speed: MmPerS,
+        touch_speed: MmPerS,
+    ) -> Result<Self, String> {
+        let homing = Self::begin(cx, speed, touch_speed)?;
+        cx.state.is_homed = true;
+        Ok(Self {
+            is_check: true,
+            ..homing
+        })
+    }
+
     pub fn begin(cx: &mut Context<'_>, speed: MmPerS, touch_speed: MmPerS) -> Result<Self, String> {
         cx.state.is_homed = false;
         let mut homing = Self {
@@ -44,6 +59,7 @@ impl Homing {
             touch_speed,
             back_off_mm: BACK_OFF_MM,
             stage: Stage::Searching,
+            is_check: false,
         };
         if cx.state.status.has(AxisStatus::HOME) {
             // Parked on the switch, perhaps on the limit behind it: leave it first.
@@ -94,6 +110,12 @@ impl Homing {
             }
             Stage::Searching | Stage::Touching if at_rest => {
                 return Err("the home switch was not found; check it and its cable".into());
+            }
+            Stage::TouchBraking { edge_pulses } if at_rest && self.is_check => {
+                cx.record(Record::HomeChecked {
+                    missed_pulses: edge_pulses,
+                });
+                return Ok(Progress::Done);
             }
             Stage::TouchBraking { edge_pulses } if at_rest => {
                 cx.command(RigCommand::DefinePosition {

@@ -5,7 +5,7 @@ use super::state::Drift;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
 use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{Ack, Fault, Phase, Reading, RigCommand};
+use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -70,6 +70,8 @@ pub enum Operator {
 pub enum Effect {
     /// Tell the rig something.
     Command(RigCommand),
+    /// A person has done this at the rig; a simulated rig does it now.
+    ByHand(HandAction),
     /// Write something down.
     Record(Record),
     /// The run has ended.
@@ -207,6 +209,25 @@ pub enum Record {
         index: usize,
         /// The value now.
         value: f64,
+    },
+    /// The load cell was read under a known mass.
+    Weighed {
+        /// The mass in g, platform included.
+        mass_g: f64,
+        /// Whether the masses go up.
+        is_loading: bool,
+        /// Which pass through the masses, from 1.
+        repeat: u32,
+        /// Mean signal.
+        volts: Volts,
+        /// Standard deviation of one sample.
+        noise: Volts,
+        /// Slope that was left, in V/s.
+        slope_v_per_s: f64,
+        /// Samples in the mean.
+        samples: u64,
+        /// Time until the signal had come to rest.
+        waited: Seconds,
     },
     /// The home switch was touched again.
     HomeChecked {
@@ -382,6 +403,16 @@ impl fmt::Display for Record {
             Self::MonitorTripped { message, value, .. } => write!(f, "{message} ({value:.4})"),
             Self::MonitorPast { index, value } => {
                 write!(f, "monitor {} is past ({value:.4})", index + 1)
+            }
+            Self::Weighed {
+                mass_g,
+                is_loading,
+                repeat,
+                volts,
+                ..
+            } => {
+                let way = if *is_loading { "loading" } else { "unloading" };
+                write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
             }
             Self::HomeChecked { missed_pulses } => match missed_pulses {
                 0 => f.write_str("home is where it was; no pulse was missed"),

@@ -162,6 +162,11 @@ pub(super) fn judge(
         ),
         None => (limits.force_max, limits.volts_max),
     };
+    if state.is_unpowered() {
+        // The motor was never energised and no command can move it: a weight on the cell harms nothing, and
+        // there is no motion to stop. Whether the signal lives and samples come counts all the same.
+        return age;
+    }
     travel_trip(state, reading, &limits)
         .or_else(|| force_trip(force, limits.force_min, force_max))
         .or_else(|| {

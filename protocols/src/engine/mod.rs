@@ -25,6 +25,7 @@ mod tare;
 #[cfg(test)]
 mod tests;
 mod touch_log;
+mod weigh;
 
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;

@@ -25,7 +25,7 @@ fn kind(active: &Active, step: Option<&Step>) -> Kind {
         Active::Hold(_) | Active::Rest { .. } | Active::Creep(_) | Active::Prompt { .. } => {
             Kind::Wait
         }
-        Active::SelfTest(_) | Active::Tare(_) => Kind::Complete,
+        Active::SelfTest(_) | Active::Tare(_) | Active::Weigh(_) => Kind::Complete,
         Active::Home(_) | Active::Contact(_) => Kind::Repeat,
         Active::Load(_) => Kind::Measure("an interrupted indentation is another experiment"),
         Active::Move => match step {
@@ -171,10 +171,4 @@ pub(super) fn finish(cx: &mut Context<'_>) {
         .find(is_retract);
     let next = last.unwrap_or(steps.len());
     step::begin(cx, next);
-}
-
-impl Pause {
-    pub fn is_extended(self) -> bool {
-        self == Self::Extended
-    }
 }

@@ -1,9 +1,9 @@
 //! A question to a person, with an end.
 
 use super::context::{Context, Progress};
-use super::input::{Answer, EndingKind, Record};
-use super::state::{Active, Activity};
-use super::{step, stop};
+use super::input::{Answer, Effect, EndingKind, Record};
+use super::state::{Active, Activity, Pause};
+use super::{pause, step, stop};
 use crate::plans::{OnTimeout, Prompt, Step};
 use palpate_model::Nanos;
 
@@ -23,7 +23,7 @@ pub(super) fn on_time(cx: &mut Context<'_>, deadline: &mut Nanos) -> Progress {
         return Progress::Continue;
     };
     let (timeout, on_timeout) = (prompt.timeout, prompt.on_timeout);
-    if cx.state.pause.is_some_and(super::state::Pause::is_extended) {
+    if cx.state.pause == Some(Pause::Extended) {
         *deadline = cx.now + Nanos::from_seconds(timeout);
     }
     if cx.now < *deadline {
@@ -46,7 +46,15 @@ pub(super) fn answer(cx: &mut Context<'_>, answer: Answer) {
     cx.record(Record::Answered { answer });
     match answer {
         Answer::Confirmed => {
-            cx.state.activity = Activity::Waiting;
+            let hand = match cx.state.current_step() {
+                Some(Step::Prompt(prompt)) => prompt.hand,
+                _ => None,
+            };
+            cx.effects.extend(hand.map(Effect::ByHand));
+            // Who answers goes on.
+            if cx.state.pause == Some(Pause::Extended) {
+                pause::resume(cx);
+            }
             step::next(cx);
         }
         _ => stop::begin(

@@ -10,6 +10,7 @@ use super::load::Loading;
 use super::monitor::Condition;
 use super::self_test::SelfTest;
 use super::tare::Taring;
+use super::weigh::Weighing;
 use crate::plans::{Plan, Prompt, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
@@ -125,6 +126,7 @@ pub(super) enum Active {
     },
     Load(Loading),
     Creep(Creeping),
+    Weigh(Box<Weighing>),
     Prompt {
         deadline: Nanos,
     },
@@ -336,6 +338,12 @@ impl State {
     #[must_use]
     pub fn live(&self) -> Option<&LiveEstimate> {
         self.live.as_ref()
+    }
+
+    /// Whether a plan runs that never energised the motor, such as a calibration: no command can move the axis.
+    #[must_use]
+    pub fn is_unpowered(&self) -> bool {
+        self.power == Power::Stopped && matches!(self.activity, Activity::Step(_))
     }
 
     /// Whether the axis may be moving or about to move.

@@ -11,10 +11,13 @@ use super::load::Loading;
 use super::self_test::SelfTest;
 use super::state::{Active, Activity, Derived, Pause, Power, State};
 use super::tare::Taring;
+use super::weigh::Weighing;
 use super::{between, monitor, pause, prompt, stop};
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Phase, Reading, RigCommand};
+use palpate_model::rig::{
+    Ack, AxisStatus, Fault, Oscillation, PathTracker, Phase, Reading, RigCommand,
+};
 use palpate_model::units::{Depth, Position, Seconds};
 
 /// Longest time a controller may take to acknowledge a command.
@@ -112,6 +115,7 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
         Active::Rest { .. } => Progress::Continue,
         Active::Load(load) => load.on_reading(cx),
         Active::Creep(creep) => creep.on_reading(cx, reading),
+        Active::Weigh(weighing) => weighing.on_reading(cx, reading),
         Active::Prompt { deadline } => prompt::on_time(cx, deadline),
     };
     // A wait that is paused stays what it is until the operator goes on.
@@ -221,13 +225,36 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             Active::Move
         }
         Step::Jog { distance_mm, speed } => {
-            let pulses = (distance_mm / cx.state.config.rig.mm_per_pulse).round() as i64;
-            cx.move_to_pulses(cx.state.pulses + pulses, speed)?;
+            let mm_per_pulse = cx.state.config.rig.mm_per_pulse;
+            let to = cx.state.pulses + (distance_mm / mm_per_pulse).round() as i64;
+            let end = to as f64 * mm_per_pulse;
+            let travel = cx.state.config.limits.travel_max;
+            // Where home is unknown the switches are all there is; a jog that comes back is always allowed.
+            if cx.state.is_homed && distance_mm > 0.0 && end > travel.0 {
+                return Err(format!(
+                    "a jog to {end:.3} mm is outside the travel of 0 to {:.1} mm",
+                    travel.0
+                ));
+            }
+            cx.move_to_pulses(to, speed)?;
             Active::Move
         }
-        Step::Sine(_) | Step::Weigh(_) | Step::FindBase(_) | Step::CheckHome { .. } => {
-            return Err("this rig's engine cannot do it yet".into());
+        Step::Sine(ref sine) => {
+            let rig = &cx.state.config.rig;
+            let command = Oscillation {
+                amplitude_pulses: (sine.amplitude_mm / rig.mm_per_pulse).round() as i64,
+                period_ticks: (1.0 / (sine.frequency_hz * rig.tick().0)).round() as u32,
+                cycles: sine.cycles,
+                acceleration: rig.acceleration,
+            };
+            cx.oscillate(command)?;
+            Active::Move
         }
+        Step::Weigh(ref weigh) => Active::Weigh(Box::new(Weighing::begin(cx, weigh.clone()))),
+        Step::CheckHome { speed, touch_speed } => {
+            Active::Home(Homing::begin_check(cx, speed, touch_speed)?)
+        }
+        Step::FindBase(_) => return Err("the base cannot be found yet".into()),
     })
 }
 
@@ -261,7 +288,7 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
         .unacknowledged
         .pop_front()
         .map(|(_, command)| command);
-    if expected != Some(ack.command) {
+    if !expected.is_some_and(|asked| asked.is_answered_by(&ack.command)) {
         let reason = match expected {
             Some(command) => format!("the rig set {:?} where {command:?} was asked", ack.command),
             None => format!(

@@ -24,8 +24,8 @@ const PRESS_MAX: Newtons = Newtons(0.42);
 const CONTACT_EXPECTED_SHARE: f64 = 0.3;
 
 /// Controller ticks from the sample that begins a move to the first tick of its motion, and from its last tick to
-/// the sample that shows rest: report 1.0 to 1.5 ms, command 0.5 ms, and one more tick each way.
-const MOVE_TICKS: u64 = 3;
+/// the sample that shows rest: report 1.0 to 1.5 ms and command 0.5 ms make one, the tick that shows rest the other.
+const MOVE_TICKS: u64 = 2;
 
 /// A correction at a constant force takes about so long beyond the hold itself.
 const SETTLE_SECS: f64 = 0.1;

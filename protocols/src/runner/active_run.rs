@@ -1,13 +1,13 @@
 //! One run in progress: the engine's state with its log, its live fit and its plot history.
 
-use super::snapshot::{LogLine, RunView};
-use super::start::AfterStop;
+use super::snapshot::{LogLine, PromptView, RunView};
+use super::start::{AfterStop, Answers};
 use crate::engine::{self, Config, Effect, EndingKind, Input, Operator, Outcome, Record, State};
 use crate::plans::Step;
 use crate::preview::Preview;
 use palpate_model::Nanos;
 use palpate_model::fit::LiveFit;
-use palpate_model::rig::{Fault, Phase, Reading, RigCommand};
+use palpate_model::rig::{Fault, HandAction, Phase, Reading, RigCommand};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
@@ -30,6 +30,7 @@ pub(super) struct ActiveRun {
     folder: PathBuf,
     origin: Nanos,
     after_stop: AfterStop,
+    answers: Answers,
     now: Nanos,
     samples: u64,
     order: u64,
@@ -53,8 +54,9 @@ impl ActiveRun {
         writer: SessionWriter,
         folder: PathBuf,
         origin: Nanos,
-        after_stop: AfterStop,
+        unattended: (AfterStop, Answers),
     ) -> Self {
+        let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         Self {
             engine: Some(State::new(Arc::new(config))),
@@ -63,6 +65,7 @@ impl ActiveRun {
             folder,
             origin,
             after_stop,
+            answers,
             now: Nanos::ZERO,
             samples: 0,
             order: 0,
@@ -96,7 +99,7 @@ impl ActiveRun {
 
     /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
     /// written down, other commands after. Commands keep the engine's order.
-    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(RigCommand)) {
+    pub fn feed(&mut self, now: Nanos, input: Input, send: &mut dyn FnMut(ToRig)) {
         let Some(state) = self.engine.take() else {
             return;
         };
@@ -110,8 +113,8 @@ impl ActiveRun {
             }
         };
         let (state, effects) = engine::step(state, now, input);
-        let commands: Vec<RigCommand> = effects.iter().filter_map(command_of).collect();
-        let is_urgent = commands.iter().any(RigCommand::is_stopping);
+        let commands: Vec<ToRig> = effects.iter().filter_map(to_rig).collect();
+        let is_urgent = commands.iter().any(ToRig::is_stopping);
         if is_urgent {
             commands.iter().copied().for_each(&mut *send);
         }
@@ -126,7 +129,7 @@ impl ActiveRun {
         for effect in effects {
             self.log(now, EntryKind::Decision, to_json(&effect));
             match effect {
-                Effect::Command(_) => {}
+                Effect::Command(_) | Effect::ByHand(_) => {}
                 Effect::Record(record) => self.note_record(now, &record),
                 Effect::Finished(outcome) => self.close(outcome),
             }
@@ -142,7 +145,7 @@ impl ActiveRun {
 
     /// What the runner owes the engine after each input: news of a failed log, and the choice of
     /// an operator who is not there.
-    fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(RigCommand)) {
+    fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(ToRig)) {
         if let (Some(detail), false) = (&self.log_failure, self.is_log_failure_told) {
             self.is_log_failure_told = true;
             let detail = detail.clone();
@@ -154,6 +157,14 @@ impl ActiveRun {
             .is_some_and(|state| state.holding().is_some());
         if is_holding && self.after_stop == AfterStop::Close {
             let choice = Operator::Close;
+            self.feed(now, Input::Operator { choice }, send);
+        }
+        let is_asked = self
+            .engine
+            .as_ref()
+            .is_some_and(|state| state.prompt().is_some());
+        if is_asked && self.answers == Answers::Confirm {
+            let choice = Operator::Confirm;
             self.feed(now, Input::Operator { choice }, send);
         }
     }
@@ -307,12 +318,25 @@ impl ActiveRun {
                 .as_ref()
                 .map_or(self.now, SessionWriter::saved_through),
             is_motion_possible: state.is_motion_possible(),
+            pause: state.pause(),
+            prompt: state.prompt().map(|(prompt, until)| PromptView {
+                message: prompt.message.clone(),
+                time_left: until.since(self.now).seconds(),
+            }),
+            next_checkpoint: self.next_checkpoint(state, step_index),
+            cycle: state.cycle(),
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
             outcome: self.outcome.clone(),
             log_error: self.log_error.clone(),
             events: Arc::new(self.events.iter().cloned().collect()),
         })
+    }
+
+    /// The nearest place ahead where a pause spoils nothing, by its name.
+    fn next_checkpoint(&self, state: &State, step_index: usize) -> Option<(usize, String)> {
+        let mut ahead = state.config().plan.checkpoints_from(step_index);
+        ahead.next().map(|(index, name)| (index, name.to_owned()))
     }
 
     /// Expected time left and share done, from the preview and the step in progress.
@@ -345,10 +369,24 @@ fn is_alarming(ending: EndingKind) -> bool {
     !matches!(ending, EndingKind::Finish | EndingKind::Stop)
 }
 
-fn command_of(effect: &Effect) -> Option<RigCommand> {
+/// What a run asks of the rig or of the hand beside it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum ToRig {
+    Command(RigCommand),
+    Hand(HandAction),
+}
+
+impl ToRig {
+    fn is_stopping(&self) -> bool {
+        matches!(self, Self::Command(command) if command.is_stopping())
+    }
+}
+
+fn to_rig(effect: &Effect) -> Option<ToRig> {
     match effect {
-        Effect::Command(command) => Some(*command),
-        _ => None,
+        Effect::Command(command) => Some(ToRig::Command(*command)),
+        Effect::ByHand(action) => Some(ToRig::Hand(*action)),
+        Effect::Record(_) | Effect::Finished(_) => None,
     }
 }
 
@@ -373,12 +411,16 @@ pub(crate) struct LiveFeed {
     first_tick: Option<u64>,
     tick_secs: f64,
     samples: u64,
+    deepest: Depth,
+    cycle: u32,
 }
 
 impl LiveFeed {
     pub fn new(config: &Config) -> Self {
         Self {
             fit: LiveFit::new(deepest(config)),
+            deepest: deepest(config),
+            cycle: 1,
             first_tick: None,
             tick_secs: config.rig.tick().0,
             samples: 0,
@@ -396,6 +438,13 @@ impl LiveFeed {
             return None;
         }
         let (depth, force, sigma) = (derived.depth?, derived.force?, derived.force_sigma?);
+        // Every repeat is fitted by itself: the tissue has rested, or it has changed.
+        if state.cycle() != self.cycle {
+            self.cycle = state.cycle();
+            self.fit = LiveFit::new(self.deepest);
+            self.first_tick = None;
+            self.samples = 0;
+        }
         let first_tick = *self.first_tick.get_or_insert(reading.tick);
         let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
         self.fit.push(t, depth, force, sigma);

@@ -1,7 +1,7 @@
 //! The only loop: wait for time or a request, collect what the rig reports, let the engine
 //! decide, act, publish.
 
-use super::active_run::ActiveRun;
+use super::active_run::{ActiveRun, ToRig};
 use super::clock::{Pacer, Throttle, TimeScale, Wake};
 use super::snapshot::{RigView, Snapshot};
 use super::start::{Bench, RunRequest, StartError, start};
@@ -270,7 +270,10 @@ impl MainLoop {
         };
         let now = run.session_time(self.now);
         let rig = &mut self.rig;
-        run.feed(now, input, &mut |command| rig.send(command));
+        run.feed(now, input, &mut |asked| match asked {
+            ToRig::Command(command) => rig.send(command),
+            ToRig::Hand(action) => rig.by_hand(action),
+        });
         if let Some(state) = run.engine() {
             self.is_homed = state.is_homed();
         }

@@ -13,5 +13,5 @@ mod start;
 pub(crate) use active_run::{LiveFeed, to_json};
 pub use clock::{Stopwatch, TimeScale, wall_now};
 pub use main_loop::{Request, Runner};
-pub use snapshot::{LogLine, RigView, RunView, Snapshot};
-pub use start::{AfterStop, Labels, RunRequest, StartError};
+pub use snapshot::{LogLine, PromptView, RigView, RunView, Snapshot};
+pub use start::{AfterStop, Answers, Labels, RunRequest, StartError};

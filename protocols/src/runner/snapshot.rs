@@ -1,6 +1,6 @@
 //! What the runner shows the world: one immutable value, swapped as a whole.
 
-use crate::engine::{Contact, Derived, Outcome, Power, Tare};
+use crate::engine::{Contact, Derived, Outcome, PauseView, Power, Tare};
 use crate::preview::StepPreview;
 use palpate_model::Nanos;
 use palpate_model::fit::LiveEstimate;
@@ -77,6 +77,14 @@ pub struct RunView {
     pub saved_through: Nanos,
     /// Whether the axis may be moving.
     pub is_motion_possible: bool,
+    /// Whether it is paused or will be.
+    pub pause: PauseView,
+    /// What a person is asked for.
+    pub prompt: Option<PromptView>,
+    /// Index and name of the next step behind which a pause spoils nothing.
+    pub next_checkpoint: Option<(usize, String)>,
+    /// Repeat of the measurement, from 1; 0 where nothing is measured.
+    pub cycle: u32,
     /// Set while the run waits for retract or close after a stop.
     pub holding: Option<Outcome>,
     /// Whether a retract is possible now, or why not.
@@ -92,6 +100,15 @@ pub struct RunView {
 impl RunView {
     /// Most lines of the event log kept for the screen. The session log keeps them all.
     pub const EVENTS_MAX: usize = 500;
+}
+
+/// A question to a person.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PromptView {
+    /// What to do.
+    pub message: String,
+    /// How long the run still waits.
+    pub time_left: Seconds,
 }
 
 /// One line of the event log.

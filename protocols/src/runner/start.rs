@@ -37,6 +37,16 @@ pub enum AfterStop {
     Wait,
 }
 
+/// Who answers the plan's prompts.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Answers {
+    /// The operator, within the prompt's time.
+    #[default]
+    Operator,
+    /// Nobody is there and everything is as asked: a simulated rig, whose hand is simulated too.
+    Confirm,
+}
+
 /// A run somebody wants.
 #[derive(Clone, Debug)]
 pub struct RunRequest {
@@ -54,6 +64,8 @@ pub struct RunRequest {
     pub is_acknowledged: bool,
     /// What follows a stop.
     pub after_stop: AfterStop,
+    /// Who answers prompts.
+    pub answers: Answers,
 }
 
 /// A run did not start.
@@ -137,7 +149,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {
         rig: bench.rig.as_ref().clone(),
-        limits: request.limits,
+        limits: request.plan.limits.tighten(request.limits),
         curve,
         plan: request.plan.clone(),
         is_homed: bench.is_homed,
@@ -148,6 +160,6 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         writer,
         path,
         bench.origin,
-        request.after_stop,
+        (request.after_stop, request.answers),
     ))
 }

@@ -13,7 +13,8 @@ use crate::report::{picture, text};
 use crate::workers::fit::{Fitted, fit_source};
 use clap::Args;
 use intervals::Intervals;
-use palpate_model::fit::{FitOptions, FitReport};
+use palpate_model::calibration::ForceUncertainty;
+use palpate_model::fit::{FitOptions, FitReport, Systematic};
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -57,6 +58,9 @@ pub struct FitArgs {
     /// Seed of the bootstrap, 1 without it
     #[arg(long, value_name = "SEED")]
     seed: Option<u64>,
+    /// Leave out what the calibration's own errors add to the intervals of a session
+    #[arg(long)]
+    no_systematic: bool,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -69,11 +73,17 @@ pub struct FitArgs {
 struct Recipe {
     options: FitOptions,
     columns: Option<ColumnNames>,
+    is_systematic: bool,
 }
 
 impl Recipe {
     fn fit(&self, path: &Path) -> Result<Fitted, Failure> {
-        fit_source(path, self.columns.as_ref(), &self.options).map_err(super::source_failure)
+        let fitted = fit_source(path, self.columns.as_ref(), &self.options);
+        let fitted = fitted.map_err(super::source_failure)?;
+        Ok(match self.is_systematic {
+            true => fitted.with_systematic(&self.options),
+            false => fitted,
+        })
     }
 }
 
@@ -83,6 +93,9 @@ struct FitOutput<'a> {
     report: &'a FitReport,
     #[serde(flatten)]
     intervals: &'a Intervals,
+    /// What the calibration adds; absent for tables and with `--no-systematic`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<Systematic>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -102,6 +115,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let recipe = Recipe {
         options: options(args)?,
         columns,
+        is_systematic: !args.no_systematic,
     };
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
@@ -133,7 +147,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             .file_name()
             .map_or(name.clone(), |name| name.to_string_lossy().into());
         let picture = match &fitted.result {
-            Ok(report) => picture::of_report(&short, &fitted.samples, report),
+            Ok(report) => {
+                let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
+                let uncertainty = uncertainty.and_then(Result::ok);
+                picture::of_report(&short, &fitted.samples, report, uncertainty.as_ref())
+            }
             Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
         };
         new_file::write("picture", Some(to), || picture)?;
@@ -146,6 +164,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let object = FitOutput {
         report: &report,
         intervals: &intervals,
+        systematic: fitted.systematic,
         seconds: fitted.seconds,
     };
     output.result(&object, || {

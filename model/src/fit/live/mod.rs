@@ -370,5 +370,6 @@ fn parameter(index: usize, value: f64, known: Option<(f64, f64)>) -> Parameter {
         std_error: known.map(|(error, _)| error),
         ci95: known.map(|(error, quantile)| [value - quantile * error, value + quantile * error]),
         is_fixed: false,
+        systematic_error: None,
     }
 }

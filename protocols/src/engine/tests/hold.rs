@@ -15,6 +15,7 @@ fn answer(relative: f64, is_identified: bool) -> Input {
             std_error: Some(half / 1.96),
             ci95: Some([1.02 - half, 1.02 + half]),
             is_fixed: false,
+            systematic_error: None,
         }],
         rmse_weighted_n: 0.02,
         samples: 1000,

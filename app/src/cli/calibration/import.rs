@@ -1,0 +1,198 @@
+//! `palpate calibration import` and `supersede`: a new document from a table or a file.
+
+use super::super::Failure;
+use super::super::new_file;
+use super::super::output::Output;
+use super::source::{Source, failure};
+use chrono::{DateTime, SecondsFormat, Utc};
+use clap::Args;
+use palpate_model::calibration::{Calibration, CurveKind};
+use palpate_model::units::Volts;
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::calibrations;
+use palpate_sessions::import::read_weights;
+use palpate_sessions::library_folder;
+use std::path::PathBuf;
+
+/// Arguments of `palpate calibration import`.
+#[derive(Debug, Args)]
+pub struct ImportArgs {
+    /// A table with columns mass_g,volts[,direction,repeat,noise_v,samples,waited_s], or a document (.json)
+    #[arg(value_name = "FILE")]
+    file: PathBuf,
+    /// What people call it; a table has no name of its own
+    #[arg(long)]
+    name: Option<String>,
+    /// Rig whose cell it is
+    #[arg(long)]
+    rig: Option<String>,
+    /// Serial number of the cell
+    #[arg(long)]
+    cell: Option<String>,
+    /// Excitation of the bridge in V
+    #[arg(long, value_name = "V")]
+    excitation: Option<f64>,
+    /// Who took it
+    #[arg(long)]
+    operator: Option<String>,
+    /// When it was taken, such as 2026-03-05T14:15:00Z; now, for a table without it
+    #[arg(long, value_name = "TIME")]
+    taken_at: Option<String>,
+    /// Tolerance in g of each weight; each mass more than the one before counts as one weight laid on it
+    #[arg(long, value_name = "G")]
+    tolerance: Option<f64>,
+    /// Last digit of the readings in V, where it matters
+    #[arg(long, value_name = "V")]
+    resolution: Option<f64>,
+    /// Signal of the empty cell before the first weight in V
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    zero_before: Option<f64>,
+    /// Signal of the empty cell after the last weight in V
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    zero_after: Option<f64>,
+    /// Days for which it is valid [default: 365; under heavy use take 182]
+    #[arg(long, value_name = "DAYS")]
+    valid_days: Option<u32>,
+    /// Curve: best (foretells weights left out), monotone, segments=N or polynomial=N; best for a table
+    #[arg(long, value_name = "KIND")]
+    curve: Option<CurveChoice>,
+    /// Who measured it on what, in words
+    #[arg(long, value_name = "WORDS")]
+    source: Option<String>,
+    /// Draw curve, residuals, sensitivity and uncertainty as a new SVG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `palpate calibration supersede`.
+#[derive(Debug, Args)]
+pub struct SupersedeArgs {
+    /// Name or id of the one whose place is taken
+    #[arg(value_name = "OLD")]
+    old: String,
+    #[command(flatten)]
+    pub new: ImportArgs,
+}
+
+/// Which curve an import asks for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum CurveChoice {
+    Best,
+    Monotone,
+    Segments(usize),
+    Polynomial(usize),
+}
+
+impl std::str::FromStr for CurveChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let wrong =
+            || "give best, monotone, segments=N or polynomial=N, as in segments=4".to_owned();
+        match text.split_once('=') {
+            None if text == "best" => Ok(Self::Best),
+            None if text == "monotone" => Ok(Self::Monotone),
+            Some((kind, count)) => {
+                let count: usize = count.parse().map_err(|_| wrong())?;
+                match kind {
+                    "segments" => Ok(Self::Segments(count)),
+                    "polynomial" => Ok(Self::Polynomial(count)),
+                    _ => Err(wrong()),
+                }
+            }
+            None => Err(wrong()),
+        }
+    }
+}
+
+pub(super) fn import(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
+    new_file::check("picture", args.picture.as_deref())?;
+    let library = library_folder().map_err(Failure::usage)?;
+    let kept = calibrations::save_calibration(&library, &document(args)?).map_err(failure)?;
+    let source = Source::kept(&kept);
+    super::tell(
+        "calibration import",
+        &source,
+        args.picture.as_deref(),
+        output,
+    )
+}
+
+pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Failure> {
+    new_file::check("picture", args.new.picture.as_deref())?;
+    let library = library_folder().map_err(Failure::usage)?;
+    let new = document(&args.new)?;
+    let kept = calibrations::supersede(&library, &args.old, &new).map_err(failure)?;
+    let (source, picture) = (Source::kept(&kept), args.new.picture.as_deref());
+    super::tell("calibration supersede", &source, picture, output)
+}
+
+fn now() -> String {
+    DateTime::<Utc>::from(wall_now()).to_rfc3339_opts(SecondsFormat::Secs, true)
+}
+
+/// The document that the arguments ask for.
+fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
+    let is_document = args.file.extension().is_some_and(|ending| ending == "json");
+    let mut new = if is_document {
+        calibrations::read_calibration(&args.file).map_err(failure)?
+    } else {
+        let table = read_weights(&args.file).map_err(Failure::usage)?;
+        let file = args.file.file_name().unwrap_or_default().to_string_lossy();
+        Calibration {
+            taken_at: Some(now()),
+            source: format!("imported from {file}"),
+            ..table
+        }
+    };
+    let word = |to: &mut String, from: &Option<String>| {
+        if let Some(from) = from {
+            to.clone_from(from);
+        }
+    };
+    word(&mut new.name, &args.name);
+    word(&mut new.rig, &args.rig);
+    word(&mut new.cell, &args.cell);
+    word(&mut new.operator, &args.operator);
+    word(&mut new.source, &args.source);
+    new.taken_at = args.taken_at.clone().or(new.taken_at);
+    new.excitation = args.excitation.map(Volts).or(new.excitation);
+    new.resolution = args.resolution.map(Volts).or(new.resolution);
+    new.zero_before = args.zero_before.map(Volts).or(new.zero_before);
+    new.zero_after = args.zero_after.map(Volts).or(new.zero_after);
+    new.valid_days = args.valid_days.or(new.valid_days);
+    if new.name.trim().is_empty() {
+        return Err(Failure::usage(
+            "the calibration has no name; give one with --name",
+        ));
+    }
+    if let Some(tolerance) = args.tolerance {
+        new = new
+            .with_stacked_weights(tolerance)
+            .map_err(Failure::usage)?;
+    }
+    let default = (!is_document).then_some(CurveChoice::Best);
+    if let Some(choice) = args.curve.or(default) {
+        new.curve = chosen(&new, choice)?;
+    }
+    Ok(new)
+}
+
+fn chosen(calibration: &Calibration, choice: CurveChoice) -> Result<CurveKind, Failure> {
+    let points = calibration.points().map_err(Failure::usage)?;
+    match choice {
+        CurveChoice::Monotone => Ok(CurveKind::Monotone),
+        CurveChoice::Polynomial(degree) => Ok(CurveKind::Polynomial { degree }),
+        CurveChoice::Segments(count) => CurveKind::best_segments(&points, count).ok_or_else(|| {
+            Failure::usage(format!(
+                "{count} straight segments are not possible through {} weights; give 1 to {}",
+                points.len(),
+                points.len() - 1
+            ))
+        }),
+        CurveChoice::Best => calibration.best_curve().map_err(Failure::usage),
+    }
+}

@@ -1,0 +1,206 @@
+//! `palpate calibration`: the documents that turn volts into newtons.
+
+mod import;
+pub(super) mod source;
+
+use super::Failure;
+use super::new_file;
+use super::output::Output;
+use crate::report::calibration as report;
+use clap::{Args, Subcommand};
+use palpate_model::calibration::{Bench, Calibration, KnownWeight};
+use palpate_model::units::Volts;
+use palpate_sessions::calibrations::Shelf;
+use palpate_sessions::library_folder;
+use serde::Serialize;
+use source::Source;
+use std::path::PathBuf;
+
+/// The commands on calibrations.
+#[derive(Debug, Subcommand)]
+pub enum CalibrationCommand {
+    /// List the calibrations of the library
+    List(ListArgs),
+    /// Tell what a calibration is like: curve, uncertainty, flat stretches
+    Show(ShowArgs),
+    /// Check a calibration with one known weight
+    Check(CheckArgs),
+    /// Store a new calibration from a table of weights or a document
+    Import(import::ImportArgs),
+    /// Store a new calibration in the place of an old one, which is kept
+    Supersede(import::SupersedeArgs),
+}
+
+/// Arguments of `palpate calibration list`.
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate calibration show`.
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// A name or id of the library, a file, or thesis for the table of the source thesis
+    #[arg(value_name = "NAME|FILE")]
+    calibration: String,
+    /// Draw curve, residuals, sensitivity and uncertainty as a new SVG file
+    #[arg(long, value_name = "FILE")]
+    picture: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate calibration check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// A name or id of the library, a file, or thesis
+    #[arg(value_name = "NAME|FILE")]
+    calibration: String,
+    /// Mass of the known weight in g
+    #[arg(long, value_name = "G")]
+    mass: f64,
+    /// Tolerance of its mass in g
+    #[arg(long, value_name = "G")]
+    tolerance: Option<f64>,
+    /// Signal with the weight in V
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    volts: f64,
+    /// Signal of the empty cell just before in V
+    #[arg(long, value_name = "V", allow_negative_numbers = true)]
+    tare: f64,
+    /// Largest error in percent of the weight [default: 1, as ASTM E4 asks]
+    #[arg(long, value_name = "PERCENT")]
+    limit: Option<f64>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+impl CalibrationCommand {
+    /// Whether it prints JSON.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::List(args) => args.json,
+            Self::Show(args) => args.json,
+            Self::Check(args) => args.json,
+            Self::Import(args) => args.json,
+            Self::Supersede(args) => args.new.json,
+        }
+    }
+}
+
+pub(super) fn run(command: &CalibrationCommand, output: &Output) -> Result<(), Failure> {
+    match command {
+        CalibrationCommand::List(_) => list(output),
+        CalibrationCommand::Show(args) => show(args, output),
+        CalibrationCommand::Check(args) => check(args, output),
+        CalibrationCommand::Import(args) => import::import(args, output),
+        CalibrationCommand::Supersede(args) => import::supersede(args, output),
+    }
+}
+
+#[derive(Serialize)]
+struct ListReport {
+    command: &'static str,
+    folder: PathBuf,
+    calibrations: Vec<report::Entry>,
+    unreadable: Vec<String>,
+}
+
+fn list(output: &Output) -> Result<(), Failure> {
+    let library = library_folder().map_err(Failure::usage)?;
+    let shelf = Shelf::open(&library);
+    let unreadable: Vec<String> = shelf.unreadable.iter().map(ToString::to_string).collect();
+    unreadable.iter().for_each(|reason| output.note(reason));
+    let entry = |kept| report::Entry::of(&shelf, kept, source::age_days(kept));
+    let found = ListReport {
+        command: "calibration list",
+        folder: library.join("calibrations"),
+        calibrations: shelf.kept.iter().map(entry).collect(),
+        unreadable,
+    };
+    output.result(&found, || report::list(&found.calibrations, &found.folder));
+    Ok(())
+}
+
+/// A calibration with all that is told of it.
+#[derive(Serialize)]
+struct ShowReport<'a> {
+    command: &'static str,
+    /// Its id in the library, null where it is not from there.
+    id: Option<&'a str>,
+    file: Option<&'a PathBuf>,
+    #[serde(flatten)]
+    told: &'a report::Told,
+    doubts: &'a [String],
+    document: &'a Calibration,
+}
+
+fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
+    new_file::check("picture", args.picture.as_deref())?;
+    let source = Source::find(&args.calibration)?;
+    tell("calibration show", &source, args.picture.as_deref(), output)
+}
+
+/// Prints and draws a calibration.
+fn tell(
+    command: &'static str,
+    source: &Source,
+    picture: Option<&std::path::Path>,
+    output: &Output,
+) -> Result<(), Failure> {
+    let told = report::Told::of(&source.calibration).map_err(Failure::failed)?;
+    let doubts = source.calibration.doubts(&Bench {
+        rig: &source.calibration.rig,
+        age_days: source.age_days,
+        ..Bench::default()
+    });
+    new_file::write("picture", picture, || {
+        report::picture(&source.calibration, &told)
+    })?;
+    let object = ShowReport {
+        command,
+        id: source.id.as_deref(),
+        file: source.file.as_ref(),
+        told: &told,
+        doubts: &doubts,
+        document: &source.calibration,
+    };
+    output.result(&object, || {
+        report::whole(&source.calibration, source.id.as_deref(), &told, &doubts)
+    });
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct CheckReport<'a> {
+    command: &'static str,
+    calibration: &'a str,
+    #[serde(flatten)]
+    result: &'a palpate_model::calibration::CheckResult,
+}
+
+fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+    let source = Source::find(&args.calibration)?;
+    let weight = KnownWeight {
+        mass_g: args.mass,
+        tolerance_g: args.tolerance,
+        volts: Volts(args.volts),
+        tare: Volts(args.tare),
+        limit_percent: args.limit,
+    };
+    let result = source.calibration.check(&weight).map_err(Failure::usage)?;
+    let object = CheckReport {
+        command: "calibration check",
+        calibration: &source.calibration.name,
+        result: &result,
+    };
+    output.result(&object, || report::check(&result));
+    match result.is_passed {
+        true => Ok(()),
+        false => Err(Failure::failed(&result.sentence)),
+    }
+}

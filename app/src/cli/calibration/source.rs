@@ -1,0 +1,74 @@
+//! Where a calibration comes from: the library, a file, or the source thesis.
+
+use super::super::Failure;
+use palpate_model::calibration::{Bench, Calibration};
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::calibrations::{self, Kept, LibraryError, Shelf, read_calibration};
+use palpate_sessions::library_folder;
+use std::path::{Path, PathBuf};
+
+/// What names the table of the source thesis.
+const THESIS: &str = "thesis";
+
+/// A calibration and where it is from.
+pub(in crate::cli) struct Source {
+    pub id: Option<String>,
+    pub file: Option<PathBuf>,
+    pub calibration: Calibration,
+    pub age_days: Option<i64>,
+}
+
+impl Source {
+    /// By a file's path, a name or id of the library, or `thesis`.
+    pub fn find(name: &str) -> Result<Self, Failure> {
+        let path = Path::new(name);
+        if path.is_file() {
+            let calibration = read_calibration(path).map_err(failure)?;
+            return Ok(Self::new(None, Some(path.into()), calibration));
+        }
+        let library = library_folder().map_err(Failure::usage)?;
+        let shelf = Shelf::open(&library);
+        match shelf.find(name) {
+            Ok(kept) => Ok(Self::kept(kept)),
+            Err(_) if name == THESIS => Ok(Self::new(None, None, Calibration::thesis())),
+            Err(err) => Err(failure(err)),
+        }
+    }
+
+    /// One of the library.
+    pub fn kept(kept: &Kept) -> Self {
+        let (id, path) = (kept.id.clone(), kept.path.clone());
+        Self::new(Some(id), Some(path), kept.calibration.clone())
+    }
+
+    fn new(id: Option<String>, file: Option<PathBuf>, calibration: Calibration) -> Self {
+        Self {
+            age_days: calibrations::age_days(&calibration, wall_now().into()),
+            id,
+            file,
+            calibration,
+        }
+    }
+
+    /// What speaks against using it on a rig.
+    pub fn doubts(&self, rig: &str) -> Vec<String> {
+        self.calibration.doubts(&Bench {
+            rig,
+            age_days: self.age_days,
+            ..Bench::default()
+        })
+    }
+}
+
+/// Days since one of the library was taken.
+pub(super) fn age_days(kept: &Kept) -> Option<i64> {
+    calibrations::age_days(&kept.calibration, wall_now().into())
+}
+
+/// Names and documents are the user's; the disk is not.
+pub(super) fn failure(err: LibraryError) -> Failure {
+    match err {
+        LibraryError::Io { .. } | LibraryError::Changed { .. } => Failure::failed(err),
+        _ => Failure::usage(err),
+    }
+}

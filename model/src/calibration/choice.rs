@@ -1,0 +1,190 @@
+//! Which kind of curve foretells a weight it has not seen.
+//!
+//! Each weight between the ends is left out in turn, with all its repeats in both directions; the curve through
+//! the others reads its force (leave-one-out cross-validation, Stone, J. R. Stat. Soc. B 36 (1974) 111-147). The
+//! first and the last weight are left out as well, but there the curve is only continued straight: that
+//! error is told apart and does not count.
+
+use super::curve::Curve;
+use super::document::Point;
+use super::kind::CurveKind;
+use super::quality::{Zeroed, rms};
+use crate::units::Newtons;
+use serde::Serialize;
+
+/// Straight segments are tried up to this many; the thesis drew "a few".
+const SEGMENTS_MAX: usize = 6;
+/// Degrees tried.
+const DEGREES: std::ops::RangeInclusive<usize> = 1..=super::curve::DEGREE_MAX;
+
+/// One kind of curve and what it misses.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Candidate {
+    /// The curve.
+    pub curve: CurveKind,
+    /// In words.
+    pub name: String,
+    /// Root mean square error in N of the forces read for weights left out between the ends.
+    pub left_out_rms_n: Option<f64>,
+    /// The largest of them in N, with its sign.
+    pub left_out_worst_n: Option<f64>,
+    /// Root mean square error in N where the first or the last weight is left out.
+    pub left_out_ends_rms_n: Option<f64>,
+    /// Read minus true force in N at each weight, all weights known to the curve.
+    pub residuals_n: Vec<f64>,
+    /// The same as signal in V: curve minus mean reading.
+    pub residuals_v: Vec<f64>,
+    /// Why it cannot be used, if so.
+    pub refused: Option<String>,
+}
+
+/// How one kind finds its curve for some points.
+enum Recipe {
+    Fixed(CurveKind),
+    Segments(usize),
+}
+
+impl Recipe {
+    /// The kind as this recipe makes it of these points.
+    fn kind(&self, points: &[Point]) -> Option<CurveKind> {
+        match self {
+            Self::Fixed(kind) => Some(kind.clone()),
+            // With a weight less there may be a segment less.
+            Self::Segments(count) => {
+                CurveKind::best_segments(points, (*count).min(points.len() - 1))
+            }
+        }
+    }
+}
+
+/// Every kind tried, the best first; those that cannot be used come last. The first one counts as chosen.
+///
+/// With fewer than four weights nothing can be compared, and the monotone curve stands alone.
+#[must_use]
+pub fn candidates(points: &[Point]) -> Vec<Candidate> {
+    let mut recipes = vec![Recipe::Fixed(CurveKind::Monotone)];
+    if points.len() >= 4 {
+        let all = points.len() - 1;
+        recipes.extend((1..=SEGMENTS_MAX.min(all)).map(Recipe::Segments));
+        if all > SEGMENTS_MAX {
+            recipes.push(Recipe::Segments(all));
+        }
+        recipes.extend(DEGREES.map(|degree| Recipe::Fixed(CurveKind::Polynomial { degree })));
+    }
+    let judged = recipes.iter().filter_map(|recipe| judge(recipe, points));
+    let mut candidates: Vec<Candidate> = judged.collect();
+    let score = |one: &Candidate| one.left_out_rms_n.unwrap_or(f64::INFINITY);
+    candidates.sort_by(|a, b| {
+        let unusable = |one: &Candidate| one.refused.is_some();
+        let order = unusable(a).cmp(&unusable(b));
+        order.then(score(a).total_cmp(&score(b)))
+    });
+    candidates
+}
+
+/// What a given kind misses at these points.
+#[must_use]
+pub fn judge_kind(kind: &CurveKind, points: &[Point]) -> Option<Candidate> {
+    let recipe = match kind {
+        CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
+        _ => Recipe::Fixed(kind.clone()),
+    };
+    judge_as(kind.clone(), &recipe, points)
+}
+
+fn judge(recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+    judge_as(recipe.kind(points)?, recipe, points)
+}
+
+fn judge_as(kind: CurveKind, recipe: &Recipe, points: &[Point]) -> Option<Candidate> {
+    let mut candidate = Candidate {
+        name: kind.to_string(),
+        curve: kind,
+        left_out_rms_n: None,
+        left_out_worst_n: None,
+        left_out_ends_rms_n: None,
+        residuals_n: Vec::new(),
+        residuals_v: Vec::new(),
+        refused: None,
+    };
+    let curve = match candidate.curve.through(points) {
+        Ok(curve) => curve,
+        Err(refusal) => {
+            candidate.refused = Some(refusal.to_string());
+            return Some(candidate);
+        }
+    };
+    let zeroed = Zeroed::of(&curve, points);
+    for point in points {
+        candidate
+            .residuals_n
+            .push(zeroed.force(point.volts).0 - point.newtons.0);
+        candidate
+            .residuals_v
+            .push(zeroed.signal(point.newtons).0 - point.volts.0);
+    }
+    match left_out(recipe, points) {
+        Ok(errors) => {
+            let ends = [0, points.len() - 1];
+            let (outer, inner): (Vec<_>, Vec<_>) =
+                errors.into_iter().partition(|(i, _)| ends.contains(i));
+            let values = |errors: Vec<(usize, f64)>| errors.into_iter().map(|(_, error)| error);
+            let inner: Vec<f64> = values(inner).collect();
+            candidate.left_out_rms_n = rms(inner.iter().copied());
+            candidate.left_out_worst_n =
+                inner.into_iter().max_by(|a, b| a.abs().total_cmp(&b.abs()));
+            candidate.left_out_ends_rms_n = rms(values(outer));
+        }
+        Err(reason) => candidate.refused = Some(reason),
+    }
+    Some(candidate)
+}
+
+/// Errors in N of every reading with its weight left out, with the index of the weight. The zero of the
+/// empty cell is known in any case, as it is from the tare.
+fn left_out(recipe: &Recipe, points: &[Point]) -> Result<Vec<(usize, f64)>, String> {
+    let mut errors = Vec::new();
+    if points.len() < 3 {
+        return Ok(errors);
+    }
+    for (i, out) in points.iter().enumerate() {
+        let mut others = points.to_vec();
+        others.remove(i);
+        let is_end = i == 0 || i == points.len() - 1;
+        let curve = recipe.kind(&others).map(|kind| kind.through(&others));
+        let curve: Curve = match curve {
+            Some(Ok(curve)) => curve,
+            _ if is_end => continue,
+            _ => {
+                return Err(format!(
+                    "it does not rise everywhere when {} g is left out",
+                    out.mass_g
+                ));
+            }
+        };
+        let zeroed = Zeroed::of(&curve, &others);
+        let error = |volts| zeroed.force(volts).0 - out.newtons.0;
+        errors.extend(out.readings.iter().map(|reading| (i, error(reading.volts))));
+    }
+    Ok(errors)
+}
+
+/// Errors in V at each weight with it left out, the mean of its readings; `None` at the ends and where the
+/// others make no curve.
+pub(super) fn left_out_volts(kind: &CurveKind, points: &[Point]) -> Vec<Option<f64>> {
+    let recipe = match kind {
+        CurveKind::Segments { through_g } => Recipe::Segments(through_g.len().saturating_sub(1)),
+        _ => Recipe::Fixed(kind.clone()),
+    };
+    let error = |i: usize| {
+        if i == 0 || i + 1 == points.len() || points.len() < 3 {
+            return None;
+        }
+        let mut others = points.to_vec();
+        let out = others.remove(i);
+        let curve = recipe.kind(&others)?.through(&others).ok()?;
+        let signal = Zeroed::of(&curve, &others).signal(Newtons(out.newtons.0));
+        Some(signal.0 - out.volts.0)
+    };
+    (0..points.len()).map(error).collect()
+}

@@ -1,0 +1,229 @@
+//! Whether a calibration may be relied on today: its age and its rig, and a check with one known weight.
+
+use super::uncertainty::ForceUncertainty;
+use super::{Calibration, CalibrationError, newtons_of};
+use crate::units::{Newtons, Volts};
+use serde::Serialize;
+use thiserror::Error;
+
+/// A warning comes so many days before the end.
+const WARNING_DAYS: i64 = 30;
+/// Voltages of the excitation this near, as a share, are the same: bridge amplifiers keep to 0.1 %.
+const EXCITATION_SHARE: f64 = 1e-3;
+/// Largest error of a known weight in percent. ASTM E4 asks testing machines for 1 % of the force.
+pub const CHECK_LIMIT_PERCENT: f64 = 1.0;
+
+/// What a calibration would be used on.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Bench<'a> {
+    /// Name of the rig.
+    pub rig: &'a str,
+    /// Serial number of its cell, where it is known.
+    pub cell: Option<&'a str>,
+    /// Excitation of the bridge, where it is known.
+    pub excitation: Option<Volts>,
+    /// Days since the calibration was taken; `None` if it does not say when.
+    pub age_days: Option<i64>,
+}
+
+/// One known weight on the cell.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct KnownWeight {
+    /// Its mass in g.
+    pub mass_g: f64,
+    /// Its tolerance in g, where it is stated.
+    pub tolerance_g: Option<f64>,
+    /// The signal with the weight.
+    pub volts: Volts,
+    /// The signal of the empty cell just before.
+    pub tare: Volts,
+    /// Largest error in percent of the weight; [`CHECK_LIMIT_PERCENT`] if none is given.
+    pub limit_percent: Option<f64>,
+}
+
+/// What came of a check.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct CheckResult {
+    /// Whether the error is within the limit.
+    pub is_passed: bool,
+    /// Weight in N.
+    pub weight_n: f64,
+    /// Force read in N.
+    pub force_n: f64,
+    /// Force minus weight in N.
+    pub error_n: f64,
+    /// The same in percent of the weight.
+    pub error_percent: f64,
+    /// Largest error allowed in N.
+    pub limit_n: f64,
+    /// Largest error allowed in percent.
+    pub limit_percent: f64,
+    /// Standard uncertainty in N of the error from calibration and weight, where it is stated.
+    pub uncertainty_n: Option<f64>,
+    /// One sentence for the operator.
+    pub sentence: String,
+    /// What weakens the answer, one sentence each.
+    pub doubts: Vec<String>,
+}
+
+/// A check could not be judged.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum CheckError {
+    /// The calibration is none.
+    #[error(transparent)]
+    Calibration(#[from] CalibrationError),
+    /// A number that cannot be.
+    #[error("the {what} of the check is {value}; {advice}")]
+    Number {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+        /// What to give.
+        advice: &'static str,
+    },
+}
+
+impl Calibration {
+    /// Why this calibration may not be right for that use, one sentence each; none if nothing speaks
+    /// against it.
+    #[must_use]
+    pub fn doubts(&self, bench: &Bench<'_>) -> Vec<String> {
+        let mut doubts = Vec::new();
+        let valid = i64::from(self.valid_days());
+        match bench.age_days {
+            None => doubts.push(format!(
+                "the calibration \"{}\" does not say when it was taken, so nobody knows whether it still holds; check it with one known weight",
+                self.name
+            )),
+            Some(age) if age < 0 => doubts.push(format!(
+                "the calibration \"{}\" is dated {} days ahead; check the clock of this computer",
+                self.name, -age
+            )),
+            Some(age) if age > valid => doubts.push(format!(
+                "the calibration \"{}\" is {age} days old and was valid for {valid}; take a new one",
+                self.name
+            )),
+            Some(age) if age > valid - WARNING_DAYS => doubts.push(format!(
+                "the calibration \"{}\" is valid for {} more day(s); plan a new one",
+                self.name,
+                valid - age
+            )),
+            Some(_) => {}
+        }
+        if !self.rig.is_empty() && self.rig != bench.rig {
+            doubts.push(format!(
+                "the calibration \"{}\" was taken on rig {}, and this is rig {}; take one on this rig",
+                self.name, self.rig, bench.rig
+            ));
+        }
+        if let Some(cell) = bench
+            .cell
+            .filter(|cell| !self.cell.is_empty() && *cell != self.cell)
+        {
+            doubts.push(format!(
+                "the calibration \"{}\" is of cell {}, and cell {cell} is mounted; take one of this cell",
+                self.name, self.cell
+            ));
+        }
+        if let (Some(then), Some(now)) = (self.excitation, bench.excitation)
+            && (then.0 - now.0).abs() > EXCITATION_SHARE * then.0.abs()
+        {
+            doubts.push(format!(
+                "the calibration \"{}\" was taken at an excitation of {then}, and it is {now} now; set it back or take a new calibration",
+                self.name
+            ));
+        }
+        doubts
+    }
+
+    /// Whether a known weight reads what it weighs.
+    pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, CheckError> {
+        let limit_percent = weight.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
+        let is_positive = |value: f64| value > 0.0 && value.is_finite();
+        for (what, value, is_right, advice) in [
+            (
+                "mass",
+                weight.mass_g,
+                is_positive(weight.mass_g),
+                "give grams above 0",
+            ),
+            (
+                "limit",
+                limit_percent,
+                is_positive(limit_percent),
+                "give percent above 0",
+            ),
+            (
+                "signal",
+                weight.volts.0,
+                weight.volts.is_finite(),
+                "read it again",
+            ),
+            (
+                "tare",
+                weight.tare.0,
+                weight.tare.is_finite(),
+                "read the empty cell again",
+            ),
+        ] {
+            if !is_right {
+                return Err(CheckError::Number {
+                    what,
+                    value,
+                    advice,
+                });
+            }
+        }
+        let curve = self.curve()?;
+        let uncertainty = ForceUncertainty::of(self)?;
+        let true_force = newtons_of(weight.mass_g);
+        let zero = curve.volts_from_newtons(Newtons(0.0));
+        let force = curve.newtons_from_volts(weight.volts - weight.tare + zero);
+        let error = force.0 - true_force.0;
+        let limit = limit_percent / 100.0 * true_force.0;
+        let own = uncertainty.sigma(true_force).map(|sigma| sigma.0);
+        // A rectangular distribution (JCGM 100:2008, 4.3.7).
+        let of_weight = weight.tolerance_g.map(|g| newtons_of(g).0 / 3f64.sqrt());
+        let sigma = own.map(|own| own.hypot(of_weight.unwrap_or(0.0)));
+        let mut doubts = Vec::new();
+        if curve.is_extrapolated(true_force) {
+            doubts.push(format!(
+                "{:.0} g is beyond the weights of the calibration, so the force is extrapolated",
+                weight.mass_g
+            ));
+        }
+        if let Some(sigma) = sigma.filter(|sigma| 2.0 * sigma > limit) {
+            doubts.push(format!(
+                "the calibration knows this force to {sigma:.3} N only (one standard uncertainty), so a limit of {limit:.3} N says little here; take a weight where the cell is more sensitive"
+            ));
+        }
+        let is_passed = error.abs() <= limit;
+        let percent = 100.0 * error / true_force.0;
+        let sentence = format!(
+            "{:.0} g reads {:.3} N instead of {:.3} N: {error:+.3} N or {percent:+.2} %, {} the limit of {limit_percent} %{}",
+            weight.mass_g,
+            force.0,
+            true_force.0,
+            if is_passed { "within" } else { "beyond" },
+            if is_passed {
+                ""
+            } else {
+                "; take a new calibration before the next run"
+            },
+        );
+        Ok(CheckResult {
+            is_passed,
+            weight_n: true_force.0,
+            force_n: force.0,
+            error_n: error,
+            error_percent: percent,
+            limit_n: limit,
+            limit_percent,
+            uncertainty_n: sigma,
+            sentence,
+            doubts,
+        })
+    }
+}

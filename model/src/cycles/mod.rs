@@ -1,0 +1,58 @@
+//! What repeated indentations of one specimen show: loops, their shift and decay, relaxation, creep, and the answer
+//! to a sine; and what a fitted body's prediction of a record is worth.
+//!
+//! Everything is measured on the record itself; no model is assumed but where a name says so. Standard errors hold
+//! for noise that does not remember. [`analyse`] does the cycles; [`sine`], [`creep`] and [`predict`] stand alone.
+
+mod creep;
+mod local;
+mod loops;
+mod predict;
+mod relaxation;
+mod sine;
+mod split;
+mod steady;
+
+pub use creep::{Creep, creep};
+pub use loops::{CycleAnalysis, LEVELS, LevelDepth, Stiffness, analyse, stiffness_at};
+pub use predict::{Prediction, PredictionError, predict};
+pub use relaxation::{Relaxation, relaxation};
+pub use sine::{Sinusoid, SinusoidError, sinusoid};
+pub use split::by_depth;
+pub use steady::{Change, Steadiness, SteadyRule};
+
+use crate::rig::Phase;
+use crate::units::{Depth, Newtons, Seconds};
+
+/// One sample of a record in cycles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CycleSample {
+    /// Time from the start of the record.
+    pub t: Seconds,
+    /// Depth from contact.
+    pub depth: Depth,
+    /// Force above tare.
+    pub force: Newtons,
+    /// Ramp, hold, creep or unload; other phases are between cycles.
+    pub phase: Phase,
+    /// Which cycle, from 1.
+    pub cycle: u32,
+}
+
+/// A measured number and its standard error, of one unit.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Estimate<T> {
+    /// The number.
+    pub value: T,
+    /// Its standard error, for noise that does not remember.
+    pub std_error: T,
+}
+
+impl<T> Estimate<T> {
+    fn of(unit: impl Fn(f64) -> T, [value, std_error]: [f64; 2]) -> Self {
+        Self {
+            value: unit(value),
+            std_error: unit(std_error),
+        }
+    }
+}

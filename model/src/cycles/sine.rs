@@ -1,0 +1,299 @@
+//! The force that answers a sine of depth: in phase, out of phase, and how much of it is no sine.
+
+use super::{CycleSample, Estimate};
+use crate::linalg::Triangle;
+use crate::units::{Depth, Newtons};
+use std::f64::consts::TAU;
+use thiserror::Error;
+
+/// Harmonics fitted: a cubic body answers a sine with three, the rest shows what is more.
+const HARMONICS: usize = 5;
+/// A constant, a drift, two for each harmonic, and the response.
+const COLUMNS: usize = 3 + 2 * HARMONICS;
+/// Samples a cycle needs so that the highest harmonic is no alias of another.
+const PER_CYCLE_MIN: f64 = 12.0;
+/// Cycles left out at the start, where as many again and one more remain: what the start from rest leaves decays
+/// with the relaxation time.
+const SETTLING: f64 = 1.0;
+/// Least share of the depth's motion that has the frequency.
+const MOTION_MIN: f64 = 0.05;
+
+/// What one frequency shows.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sinusoid {
+    /// The frequency, in Hz.
+    pub frequency: f64,
+    /// Whole cycles evaluated.
+    pub cycles: u32,
+    /// Mean depth.
+    pub depth_mean: Depth,
+    /// Amplitude of the depth at the frequency.
+    pub depth_amplitude: Depth,
+    /// Mean force.
+    pub force_mean: Newtons,
+    /// Amplitude of the force at the frequency.
+    pub force_amplitude: Estimate<Newtons>,
+    /// How far the force leads the depth, in degrees.
+    pub phase_degrees: Estimate<f64>,
+    /// Force in phase with depth, per depth, in N/mm.
+    pub storage: Estimate<f64>,
+    /// Force a quarter of a cycle ahead of depth, per depth, in N/mm.
+    pub loss: Estimate<f64>,
+    /// Total harmonic distortion of the force: the root of the sum of squares of harmonics 2 to 5 over the first, in
+    /// percent.
+    pub distortion_percent: f64,
+}
+
+/// A record holds no sine that could be evaluated.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SinusoidError {
+    /// The frequency is no frequency.
+    #[error("a frequency of {frequency} Hz is none; give a positive number")]
+    Frequency {
+        /// What was given, in Hz.
+        frequency: f64,
+    },
+    /// Less than one cycle.
+    #[error(
+        "the record holds {cycles:.2} cycles at {frequency} Hz; record at least one, better five"
+    )]
+    TooShort {
+        /// Cycles there are.
+        cycles: f64,
+        /// At this frequency in Hz.
+        frequency: f64,
+    },
+    /// Too few samples in a cycle.
+    #[error(
+        "{per_cycle:.1} samples in a cycle do not tell its harmonics apart; sample at least 12 times as fast as the sine"
+    )]
+    TooSparse {
+        /// Samples in a cycle.
+        per_cycle: f64,
+    },
+    /// The depth does not move at this frequency.
+    #[error("the depth does not move at {frequency} Hz; check the frequency")]
+    NoMotion {
+        /// The frequency in Hz.
+        frequency: f64,
+    },
+}
+
+/// Coefficients of one response and the standard error of those at the frequency.
+struct Fitted {
+    coefficients: [f64; COLUMNS],
+    error: f64,
+}
+
+/// Evaluates a record of a sine of known frequency in Hz, by least squares over whole cycles up to its end.
+pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, SinusoidError> {
+    if !(frequency > 0.0 && frequency.is_finite()) {
+        return Err(SinusoidError::Frequency { frequency });
+    }
+    let (from, last) = match samples {
+        [first, .., last] => (first.t.0, last.t.0),
+        _ => (0.0, 0.0),
+    };
+    // A sample's own interval counts to the record.
+    let interval = (last - from) / (samples.len() as f64 - 1.0).max(1.0);
+    let cycles = (last - from + interval) * frequency;
+    let per_cycle = samples.len() as f64 / cycles;
+    // A millionth forgives the rounding of times.
+    if cycles + 1e-6 < 1.0 || samples.len() < 2 {
+        return Err(SinusoidError::TooShort { cycles, frequency });
+    }
+    if per_cycle < PER_CYCLE_MIN {
+        return Err(SinusoidError::TooSparse { per_cycle });
+    }
+    let settling = if cycles + 1e-6 >= 2.0 * SETTLING + 1.0 {
+        SETTLING
+    } else {
+        0.0
+    };
+    let whole = (cycles - settling + 1e-6).floor();
+    let start = last + 0.5 * interval - whole / frequency;
+    let used = || samples.iter().filter(move |one| one.t.0 >= start);
+    let span = whole / frequency;
+    let fitted = |value: fn(&CycleSample) -> f64| {
+        fit(
+            used().map(|one| (one.t.0 - start, value(one))),
+            frequency,
+            span,
+        )
+        .ok_or(SinusoidError::NoMotion { frequency })
+    };
+    let (depth, force) = (fitted(|one| one.depth.0)?, fitted(|one| one.force.0)?);
+    let x = phasor(&depth.coefficients, 1);
+    let f = phasor(&force.coefficients, 1);
+    let amplitude = x[0].hypot(x[1]);
+    let depths = || used().map(|one| one.depth.0);
+    let range = depths().fold(f64::MIN, f64::max) - depths().fold(f64::MAX, f64::min);
+    // What so little of the motion has that frequency is no answer to it.
+    if amplitude <= MOTION_MIN * 0.5 * range {
+        return Err(SinusoidError::NoMotion { frequency });
+    }
+    // f / x in complex numbers.
+    let storage = (f[0] * x[0] + f[1] * x[1]) / (amplitude * amplitude);
+    let loss = (f[1] * x[0] - f[0] * x[1]) / (amplitude * amplitude);
+    let force_amplitude = f[0].hypot(f[1]);
+    let error = force.error / amplitude;
+    let harmonics = (2..=HARMONICS)
+        .map(|k| phasor(&force.coefficients, k))
+        .map(|[re, im]| re * re + im * im)
+        .sum::<f64>();
+    Ok(Sinusoid {
+        frequency,
+        cycles: whole as u32,
+        depth_mean: Depth(depth.coefficients[0]),
+        depth_amplitude: Depth(amplitude),
+        force_mean: Newtons(force.coefficients[0]),
+        force_amplitude: Estimate {
+            value: Newtons(force_amplitude),
+            std_error: Newtons(force.error),
+        },
+        phase_degrees: Estimate {
+            value: loss.atan2(storage).to_degrees(),
+            std_error: (force.error / force_amplitude).to_degrees(),
+        },
+        storage: Estimate {
+            value: storage,
+            std_error: error,
+        },
+        loss: Estimate {
+            value: loss,
+            std_error: error,
+        },
+        distortion_percent: 100.0 * harmonics.sqrt() / force_amplitude,
+    })
+}
+
+/// `a cos + b sin` of a harmonic as the complex number `a - ib`.
+fn phasor(coefficients: &[f64; COLUMNS], harmonic: usize) -> [f64; 2] {
+    [coefficients[2 * harmonic], -coefficients[2 * harmonic + 1]]
+}
+
+fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> Option<Fitted> {
+    let mut triangle = Triangle::<COLUMNS>::default();
+    let mut count = 0usize;
+    for (t, y) in points {
+        let mut row = [0.0; COLUMNS];
+        row[0] = 1.0;
+        row[1] = t / span - 0.5;
+        for k in 1..=HARMONICS {
+            let (sin, cos) = (TAU * (k as f64 * frequency * t).fract()).sin_cos();
+            (row[2 * k], row[2 * k + 1]) = (cos, sin);
+        }
+        row[COLUMNS - 1] = y;
+        triangle.push(row);
+        count += 1;
+    }
+    let coefficients = triangle.solve(COLUMNS - 1)?;
+    let free = count.checked_sub(COLUMNS - 1).filter(|free| *free > 0)?;
+    let variance = triangle.residual_sum() / free as f64;
+    let errors = triangle.inverse_diagonal(2)? + triangle.inverse_diagonal(3)?;
+    Some(Fitted {
+        coefficients,
+        error: (variance * 0.5 * errors).sqrt(),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::SplitMix;
+    use crate::rig::Phase;
+    use crate::units::Seconds;
+
+    /// A sine of depth about 10 mm from its turning point, and a force of it.
+    fn record(f: f64, seconds: f64, force: impl Fn(f64) -> f64) -> Vec<CycleSample> {
+        (0..(seconds * 1e3).round() as u32)
+            .map(|i| f64::from(i) * 1e-3)
+            .map(|t| CycleSample {
+                t: Seconds(t),
+                depth: Depth(10.0 - 0.5 * (TAU * f * t).cos()),
+                force: Newtons(force(t)),
+                phase: Phase::Hold,
+                cycle: 1,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn the_linear_kelvin_body_answers_by_its_formula() {
+        // F + tau F' = mu (x + s x'): stiffness mu (1 + i w s) / (1 + i w tau).
+        let (mu, s, tau) = (0.5, 3.0, 1.0);
+        for f in [0.05, 0.5, 2.0] {
+            let w = TAU * f;
+            let under = 1.0 + (w * tau).powi(2);
+            let (storage, loss) = (
+                mu * (1.0 + w * w * s * tau) / under,
+                mu * w * (s - tau) / under,
+            );
+            // x = 10 - 0.5 cos: its answer, and what the start leaves, which decays with tau.
+            let force = |t: f64| {
+                5.0 - 0.5 * (storage * (w * t).cos() - loss * (w * t).sin())
+                    + 1.0 * (-t / tau).exp()
+            };
+            let seconds = (20.0 / f).max(40.0);
+            let all = record(f, seconds, force);
+            let found = sinusoid(&all[20_000.min(all.len() / 2)..], f).unwrap();
+            assert!(
+                (found.storage.value - storage).abs() < 1e-8,
+                "{f}: {found:?}"
+            );
+            assert!((found.loss.value - loss).abs() < 1e-8, "{f}: {found:?}");
+            let degrees = (loss / storage).atan().to_degrees();
+            assert!((found.phase_degrees.value - degrees).abs() < 1e-6);
+            assert!((found.depth_amplitude.0 - 0.5).abs() < 1e-12);
+            assert!(found.distortion_percent < 1e-5);
+        }
+    }
+
+    #[test]
+    fn distortion_is_the_root_of_squares() {
+        let f = 1.0;
+        let found = sinusoid(
+            &record(f, 5.0, |t| {
+                let w = TAU * f * t;
+                2.0 + w.cos() + 0.03 * (2.0 * w).sin() + 0.04 * (3.0 * w).cos() + 0.1 * t
+            }),
+            f,
+        )
+        .unwrap();
+        assert!((found.distortion_percent - 5.0).abs() < 1e-9);
+        assert_eq!(found.cycles, 4);
+        // The depth starts at its least, the force at its most.
+        assert!((found.phase_degrees.value.abs() - 180.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn errors_are_those_of_the_noise() {
+        let (mut storages, mut phases) = (0.0, 0.0);
+        for seed in 0..100 {
+            let mut random = SplitMix::seeded(seed);
+            let noise: Vec<f64> = (0..6000).map(|_| 0.02 * random.normal()).collect();
+            let force = |t: f64| {
+                let w = TAU * t;
+                5.0 - 0.5 * (0.4 * w.cos() - 0.1 * w.sin()) + noise[(t * 1e3).round() as usize]
+            };
+            let found = sinusoid(&record(1.0, 6.0, force), 1.0).unwrap();
+            storages += ((found.storage.value - 0.4) / found.storage.std_error).powi(2);
+            let miss = found.phase_degrees.value - 0.25f64.atan().to_degrees();
+            phases += (miss / found.phase_degrees.std_error).powi(2);
+        }
+        // chi-squared of 100: four standard deviations are 57.
+        assert!((storages - 100.0).abs() < 57.0, "{storages}");
+        assert!((phases - 100.0).abs() < 57.0, "{phases}");
+    }
+
+    #[test]
+    fn refusals_say_what_is_missing() {
+        let all = record(1.0, 2.0, |_| 1.0);
+        let said = |samples: &[CycleSample], f: f64| sinusoid(samples, f).unwrap_err().to_string();
+        assert!(said(&all, 0.1).contains("0.20 cycles"));
+        assert!(said(&all, 200.0).contains("5.0 samples"));
+        assert!(said(&all, f64::NAN).contains("is none"));
+        assert!(said(&all, 7.0).contains("does not move"));
+        assert!(said(&[], 7.0).contains("cycles"));
+    }
+}

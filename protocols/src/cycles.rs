@@ -1,0 +1,256 @@
+//! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
+
+use crate::analysis::{SourceError, decisions, is_saturated, trusted_samples};
+use crate::engine::{Effect, Record};
+use palpate_model::cycles::{CycleSample, by_depth};
+use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
+use palpate_model::units::{Depth, Newtons, Position, Seconds};
+use palpate_sessions::import::{ColumnNames, read_table};
+use palpate_sessions::log::Session;
+use palpate_sessions::record::Row;
+use std::path::Path;
+
+/// A record in cycles, and what a reader should know about it.
+#[derive(Clone, Debug, Default)]
+pub struct CycleSource {
+    /// Every sample with known force and depth, in order of time. Depths count from the first contact found.
+    pub samples: Vec<CycleSample>,
+    /// How far, for each sample, the contact its cycle began from is from the first one; empty for a table.
+    pub contact_offsets: Vec<Depth>,
+    /// The sines that were run: frequency in Hz, and which of the samples.
+    pub sines: Vec<(f64, std::ops::Range<usize>)>,
+    /// Remarks, such as an interrupted recording.
+    pub notes: Vec<String>,
+}
+
+impl CycleSource {
+    /// The depth of a sample from the contact its own cycle began from.
+    #[must_use]
+    pub fn own_depth(&self, index: usize) -> Depth {
+        let offset = self.contact_offsets.get(index);
+        self.samples[index].depth - offset.copied().unwrap_or_default()
+    }
+}
+
+/// Reads a session folder, a session file or a table; `columns` names the columns of a table without a header.
+pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, SourceError> {
+    let is_session = path.is_dir() || path.extension().is_some_and(|name| name == "mcap");
+    if is_session || !path.exists() {
+        return of_session(&Session::open(path)?);
+    }
+    let table = read_table(path, columns)?;
+    let mut notes = table.notes;
+    notes.push("a table: its cycles, holds and ways back are told from the depth".into());
+    Ok(CycleSource {
+        samples: by_depth(&table.t, &table.depth, &table.force),
+        notes,
+        ..CycleSource::default()
+    })
+}
+
+/// What an analysis takes of a session. Forces at an end of the converter's range, and all after an interlock, are left out.
+pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
+    let decisions = decisions(session)?;
+    let trusted = trusted_samples(&decisions);
+    let contacts = contacts(&decisions);
+    let tick_secs = session.manifest.rig.tick().0;
+    let first_tick = session.rows.first().map_or(0, |row| row.tick);
+    let mut source = CycleSource {
+        notes: session.notes.clone(),
+        ..CycleSource::default()
+    };
+    let mut left_out = 0usize;
+    // Where each row went, to find the rows of a sine again.
+    let mut places = Vec::with_capacity(session.rows.len());
+    for (index, row) in session.rows.iter().enumerate() {
+        places.push(source.samples.len());
+        let (Some(force), Some(depth)) = (row.force, row.depth) else {
+            continue;
+        };
+        if index >= trusted || is_saturated(session, row) {
+            left_out += 1;
+            continue;
+        }
+        let offset = offset_at(&contacts, index);
+        source.contact_offsets.push(offset);
+        source.samples.push(CycleSample {
+            t: Seconds(row.tick.wrapping_sub(first_tick) as i64 as f64 * tick_secs),
+            depth: Depth(depth) + offset,
+            force: Newtons(force),
+            phase: row.phase,
+            cycle: row.cycle,
+        });
+    }
+    source.sines = oscillations(&decisions)
+        .filter_map(|(after, command)| {
+            let rows = motion_after(&session.rows, after)?;
+            let frequency = 1.0 / (f64::from(command.period_ticks) * tick_secs);
+            Some((frequency, places[rows.start]..places[rows.end - 1] + 1))
+        })
+        .filter(|(_, range)| range.end <= source.samples.len())
+        .collect();
+    if left_out > 0 {
+        source.notes.push(format!(
+            "{left_out} samples are left out: the converter was at the end of its range, or an interlock had tripped"
+        ));
+    }
+    if contacts.len() > 1 {
+        source.notes.push(format!(
+            "contact was found {} times; depths count from the first",
+            contacts.len()
+        ));
+    }
+    if source.samples.iter().any(|one| one.phase == Phase::Ramp) || !source.sines.is_empty() {
+        Ok(source)
+    } else {
+        Err(SourceError::Empty)
+    }
+}
+
+/// Contacts found, each after so many samples.
+fn contacts(decisions: &[(u64, Effect)]) -> Vec<(u64, Position)> {
+    decisions
+        .iter()
+        .filter_map(|(after, effect)| match effect {
+            Effect::Record(Record::ContactFound { position, .. }) => Some((*after, *position)),
+            _ => None,
+        })
+        .collect()
+}
+
+/// How far the contact that held at a sample was from the first one.
+fn offset_at(contacts: &[(u64, Position)], index: usize) -> Depth {
+    let before = contacts.partition_point(|(after, _)| *after <= index as u64);
+    match (contacts.first(), before.checked_sub(1)) {
+        (Some((_, first)), Some(latest)) => contacts[latest].1.depth_from(*first),
+        _ => Depth(0.0),
+    }
+}
+
+fn oscillations(decisions: &[(u64, Effect)]) -> impl Iterator<Item = (usize, Oscillation)> {
+    decisions.iter().filter_map(|(after, effect)| match effect {
+        Effect::Command(RigCommand::Oscillate(command)) => Some((*after as usize, *command)),
+        _ => None,
+    })
+}
+
+/// Rows of the first motion after so many samples; `None` if there is none.
+fn motion_after(rows: &[Row], after: usize) -> Option<std::ops::Range<usize>> {
+    let is_moving = |row: &Row| AxisStatus(row.status).has(AxisStatus::MOVING);
+    let later = rows.get(after..)?;
+    let start = after + later.iter().position(is_moving)?;
+    let count = rows[start..]
+        .iter()
+        .take_while(|row| is_moving(row))
+        .count();
+    Some(start..start + count)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::Nanos;
+    use palpate_sessions::record::{Entry, EntryKind};
+
+    fn recorded() -> Session {
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        Session::open(&sessions.join("ramp-hold-lab")).unwrap()
+    }
+
+    fn decided(effect: &Effect, after_sample: usize) -> Entry {
+        Entry {
+            kind: EntryKind::Decision,
+            order: u64::MAX,
+            after_sample: after_sample as u64,
+            now: Nanos::ZERO,
+            body: serde_json::to_value(effect).unwrap(),
+        }
+    }
+
+    #[test]
+    fn a_session_is_read_with_its_phases() {
+        let session = recorded();
+        let source = of_session(&session).unwrap();
+        let known = |phase: Phase| {
+            let rows = session.rows.iter().filter(|row| row.phase == phase);
+            rows.filter(|row| row.depth.is_some() && row.force.is_some())
+                .count()
+        };
+        let read = |phase: Phase| {
+            source
+                .samples
+                .iter()
+                .filter(|one| one.phase == phase)
+                .count()
+        };
+        for phase in [Phase::Ramp, Phase::Hold] {
+            assert!(read(phase) > 1000 && read(phase) == known(phase), "{phase}");
+        }
+        assert!(source.sines.is_empty() && source.contact_offsets.iter().all(|one| one.0 == 0.0));
+        assert!(source.samples.windows(2).all(|pair| pair[0].t < pair[1].t));
+    }
+
+    #[test]
+    fn a_second_contact_keeps_depths_comparable() {
+        let mut session = recorded();
+        let first = contacts(&decisions(&session).unwrap())[0].1;
+        let hold = session
+            .rows
+            .iter()
+            .position(|row| row.phase == Phase::Hold)
+            .unwrap();
+        let again = Effect::Record(Record::ContactFound {
+            position: first.moved_by(0.25),
+            std_error_mm: 0.01,
+        });
+        session.entries.push(decided(&again, hold));
+        let source = of_session(&session).unwrap();
+        let held = source
+            .samples
+            .iter()
+            .position(|one| one.phase == Phase::Hold)
+            .unwrap();
+        let depth = session.rows[hold].depth.unwrap();
+        assert!((source.samples[held].depth.0 - depth - 0.25).abs() < 1e-12);
+        assert!((source.own_depth(held).0 - depth).abs() < 1e-12);
+        assert!(source.contact_offsets[held - 1].0 == 0.0);
+        assert!(
+            source
+                .notes
+                .iter()
+                .any(|note| note.contains("found 2 times"))
+        );
+    }
+
+    #[test]
+    fn a_sine_is_the_motion_after_its_command() {
+        let mut session = recorded();
+        // The ramp stands for a sine: it is the motion that begins after the hold of the step before.
+        let ramp = session
+            .rows
+            .iter()
+            .position(|row| row.phase == Phase::Ramp)
+            .unwrap();
+        let command = Effect::Command(RigCommand::Oscillate(Oscillation {
+            amplitude_pulses: 10,
+            period_ticks: 500,
+            cycles: 3,
+            acceleration: palpate_model::MmPerS2(61.44),
+        }));
+        session.entries.push(decided(&command, ramp));
+        let source = of_session(&session).unwrap();
+        let [(frequency, range)] = &source.sines[..] else {
+            panic!("{:?}", source.sines);
+        };
+        let tick = session.manifest.rig.tick().0;
+        assert!((frequency * 500.0 * tick - 1.0).abs() < 1e-12);
+        let moving = session.rows[ramp..]
+            .iter()
+            .skip_while(|row| row.status & 1 == 0)
+            .take_while(|row| row.status & 1 == 1)
+            .count();
+        assert!(moving > 1000 && range.len() == moving);
+        let last = &source.samples[range.end - 1];
+        assert!(last.phase == Phase::Ramp && source.samples[range.end + 1].phase == Phase::Hold);
+    }
+}

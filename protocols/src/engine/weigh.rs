@@ -1,0 +1,55 @@
+//! One reading of a calibration: the signal under a known mass, once it has come to rest.
+
+use super::context::{Context, Progress};
+use super::input::Record;
+use crate::plans::Weigh;
+use palpate_model::calibration::{Settle, SettleRule, Settling};
+use palpate_model::rig::Reading;
+use palpate_model::units::Volts;
+
+/// Data of a reading in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Weighing {
+    plan: Weigh,
+    settling: Settling,
+}
+
+impl Weighing {
+    pub fn begin(cx: &mut Context<'_>, plan: Weigh) -> Self {
+        let rig = &cx.state.config.rig;
+        let count = Volts(rig.adc.map_or(0.0, |adc| adc.volts_per_count));
+        let rule = SettleRule {
+            window: plan.settle.window,
+            timeout: plan.settle.timeout,
+            ..SettleRule::for_noise(rig.tick(), rig.noise_expected, count)
+        };
+        // A weight was laid on or taken off: forces before and after do not compare.
+        cx.state.watch.forget_rate();
+        Self {
+            plan,
+            settling: Settling::new(rule),
+        }
+    }
+
+    pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
+        match self.settling.push(reading.volts) {
+            Settle::Waiting => Progress::Continue,
+            Settle::TimedOut(unsettled) => {
+                Progress::Fail(format!("weigh {} g: {unsettled}", self.plan.mass_g))
+            }
+            Settle::Settled(steady) => {
+                cx.record(Record::Weighed {
+                    mass_g: self.plan.mass_g,
+                    is_loading: self.plan.is_loading,
+                    repeat: self.plan.repeat,
+                    volts: steady.mean,
+                    noise: steady.noise,
+                    slope_v_per_s: steady.slope_v_per_s,
+                    samples: steady.samples,
+                    waited: steady.waited,
+                });
+                Progress::Done
+            }
+        }
+    }
+}

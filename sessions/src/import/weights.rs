@@ -1,0 +1,271 @@
+//! A table of weights and voltages: what somebody wrote down at the rig.
+
+use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, Direction, Series, SeriesStep};
+use palpate_model::units::Volts;
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Names under which each column is known, the first being the one to use.
+const MASS: &[&str] = &["mass_g", "weight_g", "weight", "mass", "g", "grams"];
+const VOLTS: &[&str] = &["volts", "signal_v", "v", "voltage", "volts_v"];
+const DIRECTION: &[&str] = &["direction"];
+const REPEAT: &[&str] = &["repeat"];
+const NOISE: &[&str] = &["noise_v", "noise"];
+const SAMPLES: &[&str] = &["samples"];
+const WAITED: &[&str] = &["waited_s"];
+
+/// A table of weights could not be read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum WeightsError {
+    /// The disk refused.
+    #[error("cannot read {} ({source}); check the path", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// No column of that kind.
+    #[error(
+        "the table has no column {wanted} in its first line; name its columns mass_g,volts and, where they are known, direction,repeat,noise_v,samples,waited_s"
+    )]
+    NoColumn {
+        /// The column.
+        wanted: &'static str,
+    },
+    /// A cell that is no number.
+    #[error("line {line} has \"{cell}\" for {column}, which is not {wanted}; correct it")]
+    Cell {
+        /// Line, counted from 1.
+        line: usize,
+        /// The column.
+        column: &'static str,
+        /// What stands there.
+        cell: String,
+        /// What should.
+        wanted: &'static str,
+    },
+    /// Falling masses without a direction.
+    #[error(
+        "line {line} has {mass_g} g after {before_g} g; add a column direction that says loading or unloading"
+    )]
+    Falling {
+        /// Line, counted from 1.
+        line: usize,
+        /// Its mass in g.
+        mass_g: f64,
+        /// The mass before in g.
+        before_g: f64,
+    },
+}
+
+/// One line of the table.
+struct Row {
+    line: usize,
+    direction: Option<Direction>,
+    repeat: Option<u32>,
+    step: SeriesStep,
+}
+
+/// Reads a table of weights as the series of a calibration that has no name yet.
+pub fn read_weights(path: &Path) -> Result<Calibration, WeightsError> {
+    let text = std::fs::read_to_string(path).map_err(|source| WeightsError::Io {
+        path: path.into(),
+        source,
+    })?;
+    parse_weights(&text)
+}
+
+/// As [`read_weights`], from text. Cells stand between commas, semicolons or tabs; lines that are empty or
+/// begin with `#` do not count.
+pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
+    let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
+    let mut lines = lines
+        .map(|(index, line)| (index + 1, line.trim()))
+        .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
+    let head = lines.next().map_or("", |(_, line)| line);
+    let mark = ['\t', ';', ',']
+        .into_iter()
+        .find(|mark| head.contains(*mark));
+    let mark = mark.unwrap_or(',');
+    let names: Vec<String> = head
+        .split(mark)
+        .map(|name| name.trim().trim_matches('"').to_ascii_lowercase())
+        .collect();
+    let place = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
+    let (Some(mass), Some(volts)) = (place(MASS), place(VOLTS)) else {
+        let wanted = if place(MASS).is_none() {
+            MASS[0]
+        } else {
+            VOLTS[0]
+        };
+        return Err(WeightsError::NoColumn { wanted });
+    };
+    let optional = [DIRECTION, REPEAT, NOISE, SAMPLES, WAITED].map(place);
+    let mut rows = Vec::new();
+    for (line, text) in lines {
+        let cells: Vec<&str> = text
+            .split(mark)
+            .map(|cell| cell.trim().trim_matches('"'))
+            .collect();
+        let cell = |place: usize| cells.get(place).copied().unwrap_or("");
+        let filled = |k: usize| optional[k].map(cell).filter(|cell| !cell.is_empty());
+        let real = |column, cell| number::<f64>(line, column, cell, "a number");
+        let direction = match filled(0).map(str::to_ascii_lowercase).as_deref() {
+            None => None,
+            Some("loading" | "up") => Some(Direction::Loading),
+            Some("unloading" | "down") => Some(Direction::Unloading),
+            Some(other) => {
+                return Err(WeightsError::Cell {
+                    line,
+                    column: DIRECTION[0],
+                    cell: other.to_owned(),
+                    wanted: "loading or unloading",
+                });
+            }
+        };
+        let count = |k: usize, column| {
+            let parse = |cell| number::<u32>(line, column, cell, "a whole number");
+            filled(k).map(parse).transpose()
+        };
+        let optional_real = |k: usize, column| filled(k).map(|cell| real(column, cell)).transpose();
+        rows.push(Row {
+            line,
+            direction,
+            repeat: count(1, REPEAT[0])?,
+            step: SeriesStep {
+                mass_g: real(MASS[0], cell(mass))?,
+                volts: Volts(real(VOLTS[0], cell(volts))?),
+                noise: optional_real(2, NOISE[0])?.map(Volts),
+                samples: count(3, SAMPLES[0])?.map(u64::from),
+                waited_s: optional_real(4, WAITED[0])?,
+                ..SeriesStep::default()
+            },
+        });
+    }
+    Ok(Calibration {
+        format: CALIBRATION_FORMAT,
+        series: series_of(rows)?,
+        ..Calibration::default()
+    })
+}
+
+fn number<T: std::str::FromStr>(
+    line: usize,
+    column: &'static str,
+    cell: &str,
+    wanted: &'static str,
+) -> Result<T, WeightsError> {
+    cell.parse().map_err(|_| WeightsError::Cell {
+        line,
+        column,
+        cell: cell.to_owned(),
+        wanted,
+    })
+}
+
+/// Rows into series: a new one where direction or repeat change, or where the masses begin again.
+fn series_of(rows: Vec<Row>) -> Result<Vec<Series>, WeightsError> {
+    let mut series: Vec<Series> = Vec::new();
+    for row in rows {
+        let direction = row.direction.unwrap_or(Direction::Loading);
+        let mass = row.step.mass_g;
+        let goes_on = match series.last() {
+            Some(last) if last.direction == direction => {
+                let before = last.steps.last().map_or(mass, |step| step.mass_g);
+                let first = last.steps.first().map_or(mass, |step| step.mass_g);
+                let is_same_repeat = row.repeat.is_none_or(|repeat| repeat == last.repeat);
+                let is_onward = match direction {
+                    Direction::Loading => mass > before,
+                    Direction::Unloading => mass < before,
+                };
+                if row.direction.is_none() && !is_onward && mass > first {
+                    return Err(WeightsError::Falling {
+                        line: row.line,
+                        mass_g: mass,
+                        before_g: before,
+                    });
+                }
+                is_same_repeat && is_onward
+            }
+            _ => false,
+        };
+        if !goes_on {
+            let before = series
+                .iter()
+                .filter(|one| one.direction == direction)
+                .count();
+            let number = u32::try_from(before + 1).unwrap_or(u32::MAX);
+            series.push(Series {
+                direction,
+                repeat: row.repeat.unwrap_or(number),
+                steps: Vec::new(),
+            });
+        }
+        if let Some(last) = series.last_mut() {
+            last.steps.push(row.step);
+        }
+    }
+    Ok(series)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn shape(calibration: &Calibration) -> Vec<(Direction, u32, usize)> {
+        let one = |series: &Series| (series.direction, series.repeat, series.steps.len());
+        calibration.series.iter().map(one).collect()
+    }
+
+    #[test]
+    fn plain_and_whole_tables_become_series() {
+        let plain =
+            parse_weights("mass_g,volts\n0,1.28\n140,1.60\n240,1.73\n0,1.29\n140,1.61\n").unwrap();
+        use Direction::{Loading, Unloading};
+        assert_eq!(shape(&plain), [(Loading, 1, 3), (Loading, 2, 2)]);
+        assert_eq!(plain.series[1].steps[0].volts, Volts(1.29));
+        let whole = "# bench\nDirection;Mass_g;Signal_V;samples;noise_v\n\
+            loading;0;1.0;2000;0.001\nloading;100;1.2;2000;0.001\n\n\
+            unloading;100;1.21;2000;0.001\nunloading;0;1.01;;\nup;0;1;1;0.1\n";
+        let whole = parse_weights(whole).unwrap();
+        assert_eq!(
+            shape(&whole),
+            [(Loading, 1, 2), (Unloading, 1, 2), (Loading, 2, 1)]
+        );
+        assert_eq!(whole.series[0].steps[1].samples, Some(2000));
+        assert_eq!(whole.series[1].steps[1].noise, None);
+        let repeats = "mass_g\tvolts\trepeat\n0\t1\t1\n50\t2\t1\n100\t3\t2\n";
+        assert_eq!(
+            shape(&parse_weights(repeats).unwrap()),
+            [(Loading, 1, 2), (Loading, 2, 1)]
+        );
+    }
+
+    #[test]
+    fn mistakes_name_line_and_cell() {
+        for (text, words) in [
+            ("", "no column mass_g"),
+            ("mass_g,force\n1,2", "no column volts"),
+            (
+                "mass_g,volts\n0,1\n100,one",
+                "line 3 has \"one\" for volts, which is not a number",
+            ),
+            ("mass_g,volts\n0", "line 2 has \"\" for volts"),
+            (
+                "mass_g,volts,direction\n0,1,sideways",
+                "\"sideways\" for direction, which is not loading",
+            ),
+            (
+                "mass_g,volts\n0,1\n100,2\n50,1.5",
+                "line 4 has 50 g after 100 g; add a column direction",
+            ),
+            ("mass_g,volts,repeat\n0,1,-1", "\"-1\" for repeat"),
+        ] {
+            let refusal = parse_weights(text).unwrap_err().to_string();
+            assert!(refusal.contains(words), "{text}: {refusal}");
+        }
+    }
+}

@@ -1,0 +1,365 @@
+//! What plans can ask for beside a ramp and hold, on the simulated rig.
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
+
+use palpate_drivers::Rig;
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
+use palpate_model::rig::{Limits, Phase};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record};
+use palpate_protocols::plans::{
+    FindContact, HoldForce, HoldRate, LoadTo, Plan, PlannedStep, Sine, Step,
+};
+use palpate_protocols::preview::preview;
+use palpate_tests::lab::Lab;
+
+fn rig(profile: SimProfile) -> SimRig {
+    SimRig::new(SimSettings {
+        profile,
+        seed: 3,
+        ..SimSettings::default()
+    })
+}
+
+fn set_up() -> Vec<Step> {
+    vec![
+        Step::SelfTest {
+            duration: Seconds(0.5),
+        },
+        Step::Home {
+            speed: MmPerS(9.0),
+            touch_speed: MmPerS(0.3),
+        },
+        Step::Tare {
+            duration: Seconds(1.0),
+        },
+        Step::FindContact(FindContact::default()),
+    ]
+}
+
+fn retract() -> Step {
+    Step::Retract {
+        speed: MmPerS(6.0),
+        clearance_mm: 10.0,
+    }
+}
+
+/// A set-up, steps, and a retract.
+fn plan(steps: Vec<Step>) -> Plan {
+    let all = set_up().into_iter().chain(steps).chain([retract()]);
+    Plan::of("test", 1, all.collect())
+}
+
+fn lab(profile: SimProfile, plan: Plan) -> Lab<SimRig> {
+    let rig = rig(profile);
+    let curve = rig.calibration().curve().unwrap();
+    Lab::new(rig, curve, plan)
+}
+
+fn finished(mut lab: Lab<SimRig>) -> Lab<SimRig> {
+    lab.run();
+    let outcome = lab.outcome.clone();
+    let outcome = outcome.unwrap_or_else(|| panic!("{:?}", lab.state().holding()));
+    assert_eq!(outcome.ending, EndingKind::Finish, "{}", outcome.reason);
+    lab
+}
+
+/// Cycles of preconditioning to a depth, as their file writes them out.
+fn cycles(count: u32, rest: f64) -> Plan {
+    let mut plan = plan(Vec::new());
+    let last = plan.steps.pop().unwrap();
+    for cycle in 1..=count {
+        let steps = [
+            Step::Ramp {
+                speed: MmPerS(1.5),
+                depth: Depth(12.0),
+            },
+            Step::Unload {
+                speed: MmPerS(1.5),
+                clearance_mm: 0.0,
+            },
+            Step::Rest {
+                duration: Seconds(rest),
+            },
+        ];
+        plan.steps.extend(steps.map(|step| PlannedStep {
+            cycle,
+            checkpoint: matches!(step, Step::Rest { .. }).then(|| format!("after cycle {cycle}")),
+            ..step.into()
+        }));
+    }
+    plan.steps.push(last);
+    plan
+}
+
+#[test]
+fn cycles_last_as_long_as_the_preview_says() {
+    let plan = cycles(10, 20.0);
+    let rig = rig(SimProfile::Ideal);
+    let curve = rig.calibration().curve().unwrap();
+    let limits = Limits::for_travel(rig.description().travel);
+    let expected = preview(&plan, rig.description(), &limits, &curve, false);
+    let tick = rig.description().tick().0;
+    let lab = finished(Lab::new(rig, curve, plan.clone()));
+    let first = lab.ticks_of(4).unwrap().0;
+    let last = lab.ticks_of(plan.steps.len() - 1).unwrap().0;
+    // From the first indentation to the begin of the retract.
+    let known: f64 = expected.steps[4..plan.steps.len() - 1]
+        .iter()
+        .map(|step| {
+            assert!(step.is_exact, "{step:?}");
+            step.expected.0
+        })
+        .sum();
+    let took = (last - first) as f64;
+    assert!(
+        (took - known / tick).abs() <= 1.0,
+        "{took} {}",
+        known / tick
+    );
+    for cycle in 1..=10 {
+        let own = |phase| {
+            let own = lab
+                .seen
+                .iter()
+                .filter(|seen| (seen.cycle, seen.phase) == (cycle, phase));
+            own.count()
+        };
+        // 12 mm at 1.5 mm/s are 8 s and the ramps of the profile.
+        assert!(
+            (8000..8040).contains(&own(Phase::Ramp)),
+            "{}",
+            own(Phase::Ramp)
+        );
+        assert!((8000..8040).contains(&own(Phase::Unload)));
+        assert_eq!(own(Phase::Rest), 20_000);
+    }
+}
+
+#[test]
+fn a_force_is_reached_and_not_passed() {
+    for (brake, most) in [(None, 0.06), (Some(Newtons(0.5)), 0.03)] {
+        let load = LoadTo {
+            speed: MmPerS(1.5),
+            force: Newtons(2.0),
+            depth_max: Depth(35.0),
+            brake,
+        };
+        let lab = finished(lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)])));
+        let reached = lab.records.iter().find_map(|(_, record)| match record {
+            Record::ForceReached { force, .. } => Some(*force),
+            _ => None,
+        });
+        // At rest the tissue already relaxes, so the force may be a little below the target.
+        let miss = reached.unwrap().0 - 2.0;
+        assert!(miss.abs() < most, "{brake:?}: {miss}");
+    }
+}
+
+#[test]
+fn a_force_that_is_not_there_ends_the_run() {
+    let load = LoadTo {
+        speed: MmPerS(3.0),
+        force: Newtons(5.0),
+        depth_max: Depth(8.0),
+        brake: None,
+    };
+    let mut lab = lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)]));
+    lab.run();
+    let reason = &lab.state().holding().unwrap().reason;
+    assert!(reason.contains("was not reached before"), "{reason}");
+}
+
+#[test]
+fn force_is_kept_while_the_tissue_creeps() {
+    let load = LoadTo {
+        speed: MmPerS(1.5),
+        force: Newtons(1.5),
+        depth_max: Depth(35.0),
+        brake: None,
+    };
+    let creep = HoldForce {
+        force: Newtons(1.5),
+        duration: Seconds(20.0),
+        speed: MmPerS(3.0),
+        depth_max: Depth(40.0),
+    };
+    let steps = vec![Step::LoadTo(load), Step::HoldForce(creep)];
+    let lab = finished(lab(SimProfile::Ideal, plan(steps)));
+    let creep: Vec<_> = lab
+        .seen
+        .iter()
+        .filter(|seen| seen.phase == Phase::Creep)
+        .collect();
+    let mean = |part: &[&palpate_tests::lab::Seen], of: fn(&palpate_tests::lab::Seen) -> f64| {
+        part.iter().map(|seen| of(seen)).sum::<f64>() / part.len() as f64
+    };
+    let force = |seen: &palpate_tests::lab::Seen| seen.derived.force.unwrap().0;
+    let depth = |seen: &palpate_tests::lab::Seen| seen.derived.depth.unwrap().0;
+    // While the tissue relaxes fast, corrections come a little late; then a pulse of 0.015 mm in tissue of up to
+    // 0.8 N/mm is the grain.
+    for (index, second) in creep[2000..].chunks(1000).enumerate() {
+        let miss = mean(second, force) - 1.5;
+        assert!(
+            miss.abs() < if index < 8 { 0.05 } else { 0.02 },
+            "second {index}: {miss}"
+        );
+    }
+    let crept = mean(&creep[19_000..], depth) - mean(&creep[..1000], depth);
+    assert!(crept > 0.3, "{crept}");
+}
+
+#[test]
+fn a_hold_ends_when_the_force_is_steady() {
+    let steps = vec![
+        Step::Ramp {
+            speed: MmPerS(3.0),
+            depth: Depth(15.0),
+        },
+        Step::Hold {
+            duration: Seconds(300.0),
+            until: None,
+            // 0.01 N/min over 10 s, as Mach-1 ends its holds.
+            rate: Some(HoldRate {
+                below_n_per_s: 0.01 / 60.0,
+                over: Seconds(10.0),
+            }),
+        },
+    ];
+    let lab = finished(lab(SimProfile::Ideal, plan(steps)));
+    let held = lab.records.iter().find_map(|(_, record)| match record {
+        Record::HoldSteady { held, .. } => Some(held.0),
+        _ => None,
+    });
+    assert!((10.0..120.0).contains(&held.unwrap()), "{held:?}");
+}
+
+#[test]
+fn a_sine_comes_back_to_where_it_began() {
+    let sine = Sine {
+        amplitude_mm: 1.5,
+        frequency_hz: 0.5,
+        cycles: 4,
+    };
+    let steps = vec![
+        Step::Ramp {
+            speed: MmPerS(3.0),
+            depth: Depth(8.0),
+        },
+        Step::Sine(sine),
+    ];
+    let lab = finished(lab(SimProfile::Ideal, plan(steps)));
+    let depths: Vec<f64> = lab
+        .seen
+        .iter()
+        .filter(|seen| seen.phase == Phase::Sine)
+        .map(|seen| seen.derived.depth.unwrap().0)
+        .collect();
+    let deepest = depths.iter().copied().fold(0.0, f64::max);
+    assert!(
+        (deepest - depths[0] - 3.0).abs() < 0.016,
+        "{deepest} {}",
+        depths[0]
+    );
+    assert!((depths[depths.len() - 1] - depths[0]).abs() < 0.016);
+}
+
+#[test]
+fn home_is_where_it_was() {
+    let check = Step::CheckHome {
+        speed: MmPerS(9.0),
+        touch_speed: MmPerS(0.3),
+    };
+    let mut plan = plan(Vec::new());
+    plan.steps.push(check.into());
+    let lab = finished(lab(SimProfile::Lab, plan));
+    let missed = lab.records.iter().find_map(|(_, record)| match record {
+        Record::HomeChecked { missed_pulses } => Some(*missed_pulses),
+        _ => None,
+    });
+    assert!(missed.unwrap().abs() <= 1, "{missed:?}");
+}
+
+/// Pauses as soon as a step has begun, waits, goes on; the time of the paused run without the pause.
+fn paused_at(step_index: usize, plan: &Plan) -> (Lab<SimRig>, bool) {
+    let mut lab = lab(SimProfile::Ideal, plan.clone());
+    lab.operator(Operator::Start);
+    let reached = |state: &palpate_protocols::engine::State| {
+        let (index, started) = state.step_progress();
+        index == step_index && started > palpate_model::Nanos::ZERO
+    };
+    assert!(lab.run_until(Seconds(1e4), reached));
+    for _ in 0..60 {
+        lab.advance();
+    }
+    lab.operator(Operator::Pause);
+    lab.run_until(Seconds(3.0), |_| false);
+    let is_paused = matches!(lab.state().pause(), PauseView::Paused { .. });
+    assert!(is_paused || lab.state().step_progress().0 <= step_index + 1);
+    lab.operator(Operator::Resume);
+    let can_go_on = lab.state().pause() == PauseView::None;
+    if !can_go_on {
+        lab.operator(Operator::Finish);
+    }
+    assert!(lab.run_until(Seconds(1e4), |_| false));
+    (lab, can_go_on)
+}
+
+#[test]
+fn every_step_can_be_paused_and_only_measurements_do_not_go_on() {
+    let plan = cycles(2, 3.0);
+    let undisturbed = finished(lab(SimProfile::Ideal, plan.clone()));
+    for (index, planned) in plan.steps.iter().enumerate() {
+        let (lab, can_go_on) = paused_at(index, &plan);
+        let name = planned.step.phase();
+        let outcome = lab
+            .outcome
+            .as_ref()
+            .unwrap_or_else(|| panic!("{name}: {:?}", lab.state().holding()));
+        assert_eq!(
+            outcome.ending,
+            EndingKind::Finish,
+            "{name}: {}",
+            outcome.reason
+        );
+        let is_measuring = matches!(planned.step, Step::Ramp { .. } | Step::Unload { .. });
+        assert_eq!(can_go_on, !is_measuring, "{name}");
+        if !can_go_on {
+            assert!(outcome.reason.contains("early"), "{}", outcome.reason);
+            continue;
+        }
+        // Whatever was measured after the pause is measured as if there had been none.
+        for step_index in 4..plan.steps.len() - 1 {
+            if step_index == index {
+                continue;
+            }
+            let length =
+                |lab: &Lab<SimRig>| lab.ticks_of(step_index).map(|(first, last)| last - first);
+            let (now, before) = (length(&lab).unwrap(), length(&undisturbed).unwrap());
+            assert!(
+                now.abs_diff(before) <= 1,
+                "{name}, step {step_index}: {now} {before}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_pause_asked_for_comes_at_its_checkpoint() {
+    let plan = cycles(3, 3.0);
+    let mut lab = lab(SimProfile::Ideal, plan.clone());
+    lab.operator(Operator::Start);
+    assert!(lab.run_until(Seconds(1e3), |state| state.phase() == Phase::Unload));
+    let (index, name) = plan
+        .checkpoints_from(lab.state().step_progress().0)
+        .next()
+        .unwrap();
+    assert_eq!(name, "after cycle 1");
+    lab.operator(Operator::PauseAfter { step_index: index });
+    assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Paused));
+    assert_eq!(lab.state().step_progress().0, index);
+    let at = lab.state().derived().depth.unwrap();
+    assert!(at.0.abs() < 0.02, "{at}");
+    lab.operator(Operator::Resume);
+    assert!(lab.run_until(Seconds(1e4), |_| false));
+    assert_eq!(lab.outcome.unwrap().ending, EndingKind::Finish);
+}

@@ -1,0 +1,359 @@
+//! Random plans, faults and operators: however a run goes, it ends with the axis stopped, its limits kept but for
+//! the way of the brake, and a reason. A few hundred here; `scripts/soak runs` for a hundred thousand.
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
+
+use palpate_drivers::Rig;
+use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
+use palpate_model::Nanos;
+use palpate_model::random::SplitMix;
+use palpate_model::rig::{HandAction, Limits, RigCommand};
+use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+use palpate_protocols::engine::{EndingKind, Operator};
+use palpate_protocols::plans::{
+    Action, FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, Monitor, OnFailure, OnTimeout,
+    Plan, PlannedStep, Prompt, Settle, Side, Sine, Source, Step, Weigh,
+};
+use palpate_tests::lab::Lab;
+
+/// Runs in the test suite: about ten seconds.
+const RUNS: u64 = 300;
+
+fn share(random: &mut SplitMix) -> f64 {
+    random.below(1 << 20) as f64 / f64::from(1 << 20)
+}
+
+fn between(random: &mut SplitMix, low: f64, high: f64) -> f64 {
+    low + (high - low) * share(random)
+}
+
+/// A speed the rig can make.
+fn speed(random: &mut SplitMix, most: f64) -> MmPerS {
+    MmPerS(((between(random, 0.3, most) / 0.03).round()) * 0.03)
+}
+
+fn any_step(random: &mut SplitMix) -> Step {
+    match random.below(14) {
+        0 => Step::Jog {
+            distance_mm: between(random, -30.0, 30.0),
+            speed: speed(random, 20.0),
+        },
+        1 => Step::Rest {
+            duration: Seconds(between(random, 0.0, 0.5)),
+        },
+        2 => Step::Prompt(Prompt {
+            message: "do something".into(),
+            timeout: Seconds(between(random, 0.0, 1.0)),
+            on_timeout: [OnTimeout::Stop, OnTimeout::Continue][random.below(2)],
+            hand: [
+                None,
+                Some(HandAction::Unmount),
+                Some(HandAction::Mount { specimen: 5 }),
+                Some(HandAction::LoadCell { mass_g: 240.0 }),
+            ][random.below(4)],
+        }),
+        3 => Step::Weigh(Weigh {
+            mass_g: 0.0,
+            is_loading: true,
+            repeat: 1,
+            settle: Settle {
+                window: Seconds(0.1),
+                timeout: Seconds(0.5),
+            },
+        }),
+        4 => Step::CheckHome {
+            speed: MmPerS(9.0),
+            touch_speed: MmPerS(0.9),
+        },
+        5 | 6 => Step::Ramp {
+            speed: speed(random, 20.0),
+            depth: Depth(between(random, 0.5, 30.0)),
+        },
+        7 => Step::Hold {
+            duration: Seconds(between(random, 0.0, 1.0)),
+            until: Some(HoldUntil::parse("tau=50%").unwrap()),
+            rate: Some(HoldRate {
+                below_n_per_s: 1.0,
+                over: Seconds(0.3),
+            }),
+        },
+        8 => Step::Unload {
+            speed: speed(random, 10.0),
+            clearance_mm: between(random, 0.0, 2.0),
+        },
+        9 | 10 => Step::LoadTo(LoadTo {
+            speed: speed(random, 10.0),
+            force: Newtons(between(random, 0.2, 3.0)),
+            depth_max: Depth(between(random, 5.0, 40.0)),
+            brake: [None, Some(Newtons(0.1))][random.below(2)],
+        }),
+        11 => Step::HoldForce(HoldForce {
+            force: Newtons(between(random, 0.2, 2.0)),
+            duration: Seconds(1.0),
+            speed: MmPerS(3.0),
+            depth_max: Depth(40.0),
+        }),
+        12 => Step::Sine(Sine {
+            amplitude_mm: between(random, 0.1, 5.0),
+            frequency_hz: between(random, 0.2, 5.0),
+            cycles: 2,
+        }),
+        _ => Step::Retract {
+            speed: speed(random, 20.0),
+            clearance_mm: between(random, 0.0, 10.0),
+        },
+    }
+}
+
+fn any_plan(random: &mut SplitMix) -> Plan {
+    let mut steps = vec![
+        Step::SelfTest {
+            duration: Seconds(0.1),
+        },
+        Step::Home {
+            speed: MmPerS(9.0),
+            touch_speed: MmPerS(0.9),
+        },
+        Step::Tare {
+            duration: Seconds(0.1),
+        },
+    ];
+    if random.below(4) > 0 {
+        steps.push(Step::FindContact(FindContact {
+            approach_speed: MmPerS(6.0),
+            retreat_mm: 1.0,
+            pass_speed: MmPerS(0.6),
+            recovery: Seconds(0.3),
+            ..FindContact::default()
+        }));
+    }
+    let count = 1 + random.below(5);
+    steps.extend((0..count).map(|_| any_step(random)));
+    let mut plan = Plan::of("random", 1, steps);
+    for planned in &mut plan.steps {
+        let on_failure = [OnFailure::Abort, OnFailure::Retry(2), OnFailure::Skip][random.below(3)];
+        *planned = PlannedStep {
+            cycle: random.below(3) as u32,
+            on_failure,
+            ..planned.clone()
+        };
+    }
+    let actions = [
+        Action::Note,
+        Action::Pause,
+        Action::Stop,
+        Action::Retract,
+        Action::Halt,
+    ];
+    plan.monitors = (0..random.below(3))
+        .map(|_| {
+            let threshold = between(random, 0.1, 3.0);
+            Monitor {
+                source: [
+                    Source::Force,
+                    Source::Depth,
+                    Source::Volts,
+                    Source::Position,
+                ][random.below(4)],
+                side: Side::Above,
+                threshold,
+                resume: 0.8 * threshold,
+                settle: Seconds(0.1),
+                action: actions[random.below(actions.len())],
+                message: "tripped".into(),
+            }
+        })
+        .collect();
+    plan
+}
+
+fn any_fault(random: &mut SplitMix) -> ScriptedFault {
+    let kinds = [
+        FaultKind::Silent,
+        FaultKind::Late(Nanos::from_millis(30)),
+        FaultKind::NotANumber,
+        FaultKind::Stuck,
+        FaultKind::Saturated(Rail::High),
+        FaultKind::Saturated(Rail::Low),
+        FaultKind::Noisy(Volts(0.05)),
+        FaultKind::SignalJump(Volts(0.4)),
+        FaultKind::SignalJump(Volts(-0.3)),
+        FaultKind::LostSteps(200),
+        FaultKind::RefuseCommands,
+        FaultKind::Disconnect,
+        FaultKind::Reset,
+        FaultKind::UnannouncedReset,
+    ];
+    let kind = kinds[random.below(kinds.len())];
+    let at = Nanos::from_seconds(Seconds(between(random, 0.0, 20.0)));
+    let lasts = Nanos::from_seconds(Seconds(between(random, 0.001, 1.0)));
+    match random.below(2) {
+        0 => ScriptedFault::from(at, kind),
+        _ => ScriptedFault::during(at, lasts, kind),
+    }
+}
+
+fn any_choice(random: &mut SplitMix, plan: &Plan) -> Operator {
+    let step_index = random.below(plan.steps.len() + 1);
+    [
+        Operator::Pause,
+        Operator::Pause,
+        Operator::PauseAfter { step_index },
+        Operator::Resume,
+        Operator::Resume,
+        Operator::Resume,
+        Operator::Finish,
+        Operator::Confirm,
+        Operator::Decline,
+        Operator::Start,
+        Operator::Retract,
+        Operator::Close,
+        Operator::Stop,
+        Operator::Abort,
+        Operator::Halt,
+    ][random.below(15)]
+}
+
+/// Whether the truth about force and position can be hidden from the engine, or the axis from its commands.
+fn is_blinding(fault: Option<&ScriptedFault>) -> bool {
+    fault.is_some_and(|fault| {
+        !matches!(
+            fault.kind,
+            FaultKind::Silent | FaultKind::Late(_) | FaultKind::NotANumber
+        )
+    })
+}
+
+fn one_run(seed: u64) -> EndingKind {
+    let mut random = SplitMix::seeded(seed);
+    let settings = SimSettings {
+        profile: [SimProfile::Lab, SimProfile::Ideal][random.below(2)],
+        seed,
+        ..SimSettings::default()
+    };
+    let sim = SimRig::new(settings);
+    let curve = sim.calibration().curve().unwrap();
+    let plan = any_plan(&mut random);
+    let fault = (random.below(2) == 0).then(|| any_fault(&mut random));
+    let limits = Limits {
+        force_max: Newtons(between(&mut random, 0.6, 3.0)),
+        ..Limits::for_travel(Position(between(&mut random, 40.0, 75.0)))
+    };
+    let about = format!("seed {seed}, {fault:?}, {:?}", plan.steps);
+    let rig = FaultyRig::new(sim, fault.into_iter().collect(), seed);
+    let mut lab = Lab::new(rig, curve, plan.clone())
+        .within(limits)
+        .forgetful();
+    lab.is_answering = random.below(4) > 0;
+    lab.operator(Operator::Start);
+    let acceleration = lab.rig.description().acceleration.0;
+    let (mut worst_force, mut worst_travel) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+    let end = Nanos::from_seconds(Seconds(60.0));
+    let interferes = random.below(2) == 0;
+    let mut fastest = 0.1f64;
+    while lab.outcome.is_none() && lab.state().holding().is_none() && lab.now < end {
+        lab.advance();
+        if interferes && random.below(4000) == 0 {
+            let choice = any_choice(&mut random, &plan);
+            lab.operator(choice);
+        }
+        let truth = lab.rig.inner().truth();
+        // What the axis still does when the limit is seen: the way of the brake, the answer, and the 0.1 mm that
+        // the age of a sample may cost.
+        fastest = fastest.max(lab.state().derived().velocity.0.abs());
+        let speed = fastest;
+        let way = speed * speed / (2.0 * acceleration) + 0.012 * speed + 0.1;
+        let beyond = truth.position_counted().0 - limits.travel_max.0 - way;
+        if lab.state().is_homed() {
+            worst_travel = worst_travel.max(beyond);
+        }
+        // Tissue is nowhere stiffer than 2 N/mm here; noise of 0.02 N five times over.
+        if lab.state().tare().is_some() {
+            worst_force = worst_force.max(truth.force.0 - limits.force_max.0 - 2.0 * way - 0.1);
+        }
+    }
+    // A pause or a question may wait for ever; the operator is there.
+    if lab.outcome.is_none() && lab.state().holding().is_none() {
+        lab.operator(Operator::Stop);
+        assert!(
+            lab.run_until(Seconds(6.0), |_| false),
+            "does not stop: {about}"
+        );
+    }
+    if !is_blinding(fault.as_ref()) {
+        assert!(worst_travel <= 0.0, "{worst_travel} mm too far: {about}");
+        assert!(worst_force <= 0.0, "{worst_force} N too much: {about}");
+    }
+    if lab.outcome.is_none() {
+        lab.operator([Operator::Retract, Operator::Close][random.below(2)]);
+        assert!(lab.run_until(Seconds(60.0), |_| false), "no end: {about}");
+        lab.operator(Operator::Close);
+    }
+    let outcome = lab
+        .outcome
+        .clone()
+        .unwrap_or_else(|| panic!("no outcome: {about}"));
+    assert!(!outcome.reason.is_empty(), "{about}");
+    let is_deaf = fault.is_some_and(|fault| {
+        matches!(
+            fault.kind,
+            FaultKind::Disconnect | FaultKind::RefuseCommands
+        )
+    });
+    if outcome.ending != EndingKind::Finish {
+        let is_stop = |command: &RigCommand| command.is_stopping();
+        let stopped = lab.commands.iter().any(|(_, command)| is_stop(command));
+        assert!(stopped, "no stop was sent: {about}");
+    }
+    if !is_deaf {
+        let end = lab.now + Nanos::from_millis(400);
+        while lab.now < end {
+            lab.advance();
+        }
+        let before = lab.rig.inner().truth();
+        let end = lab.now + Nanos::from_millis(200);
+        while lab.now < end {
+            lab.advance();
+        }
+        let after = lab.rig.inner().truth();
+        assert_eq!(before.position, after.position, "still moves: {about}");
+        assert!(!lab.state().is_motion_possible(), "{about}");
+    }
+    outcome.ending
+}
+
+#[test]
+fn whatever_happens_the_axis_stops_with_a_reason() {
+    let runs = match std::env::var("PALPATE_RANDOM_RUNS") {
+        Ok(count) => count.parse().unwrap(),
+        Err(_) => RUNS,
+    };
+    let threads = std::thread::available_parallelism().unwrap().get() as u64;
+    let counts: Vec<[u64; 5]> = std::thread::scope(|scope| {
+        let works: Vec<_> = (0..threads)
+            .map(|own| {
+                scope.spawn(move || {
+                    let mut counts = [0; 5];
+                    for seed in (own..runs).step_by(threads as usize) {
+                        counts[one_run(seed) as usize] += 1;
+                    }
+                    counts
+                })
+            })
+            .collect();
+        works.into_iter().map(|work| work.join().unwrap()).collect()
+    });
+    let total = |kind: EndingKind| counts.iter().map(|own| own[kind as usize]).sum::<u64>();
+    let kinds = [
+        EndingKind::Finish,
+        EndingKind::Stop,
+        EndingKind::Abort,
+        EndingKind::Halt,
+        EndingKind::Interlock,
+    ];
+    for kind in kinds {
+        println!("{kind}: {} of {runs}", total(kind));
+        // Every way of ending is tried.
+        assert!(total(kind) > 0, "{kind}");
+    }
+}
