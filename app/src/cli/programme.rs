@@ -4,7 +4,9 @@ use super::Failure;
 use super::output::Output;
 use super::rig::RigArgs;
 use crate::report::programme::Page;
-use palpate_protocols::programme::{Done, Event, Laboratory, Programme, RunError, run as carry_out};
+use palpate_protocols::programme::{
+    Done, Event, Laboratory, Programme, RunError, run as carry_out,
+};
 use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
@@ -132,7 +134,12 @@ fn going(view: &RunView, left: f64) -> String {
 }
 
 /// Writes the page and the calibration and tells where they are.
-fn leave(programme: &Programme, folder: &Path, done: &Done, output: &Output) -> Result<(), Failure> {
+fn leave(
+    programme: &Programme,
+    folder: &Path,
+    done: &Done,
+    output: &Output,
+) -> Result<(), Failure> {
     let bar = output.count_bar(programme.tasks.len() as u64);
     let page = Page::of(programme, folder, &done.progress, &mut |task| {
         bar.inc(1);
@@ -169,7 +176,9 @@ fn read_programme(file: &Path, text: &str) -> Result<Programme, Failure> {
     let beside = |name: &str| {
         let path = file.parent().unwrap_or(Path::new(".")).join(name);
         read(&path).map_err(|err| {
-            format!("'{name}' is neither a built-in protocol nor a file beside the programme ({err})")
+            format!(
+                "'{name}' is neither a built-in protocol nor a file beside the programme ({err})"
+            )
         })
     };
     Programme::read(text, &beside)
@@ -181,7 +190,8 @@ fn with_settings(args: &RigArgs, simulated: &BTreeMap<String, String>) -> Result
     let mut args = args.clone();
     let usual = RigArgs::default();
     for (name, value) in simulated {
-        let wrong = |err: &dyn std::fmt::Display| Failure::usage(format!("[simulated] {name}: {err}"));
+        let wrong =
+            |err: &dyn std::fmt::Display| Failure::usage(format!("[simulated] {name}: {err}"));
         match name.as_str() {
             "preconditioning" if args.preconditioning == usual.preconditioning => {
                 args.preconditioning = value.parse().map_err(|err| wrong(&err))?;

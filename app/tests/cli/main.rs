@@ -1,7 +1,7 @@
 //! The command line as a user meets it: whole commands, their exit codes and their sentences.
 
-mod calibration;
 mod analyse;
+mod calibration;
 mod disk;
 mod extremes;
 mod fit;
