@@ -186,8 +186,8 @@ pub(super) const WORDS: [Word; 17] = [
         keys: &[key(
             "for",
             Kind::Time,
-            Need::Usual("1 s"),
-            "whole mains cycles: whole seconds",
+            Need::Usual("4 s"),
+            "whole mains cycles: whole seconds; from 2 s on the drift is told too",
         )],
         build: |args| {
             Ok(Step::Tare {
