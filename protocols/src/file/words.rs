@@ -3,8 +3,8 @@
 use super::args::Args;
 use super::quantity::Kind;
 use crate::plans::{
-    FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Prompt, Settle, Sine, Step,
-    Weigh,
+    FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Press, Prompt, Settle, Sine,
+    Step, Weigh,
 };
 use palpate_model::rig::HandAction;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -81,7 +81,7 @@ pub(super) const COMMON: [Key; 3] = [
     ),
 ];
 
-const CONTACT_KEYS: [Key; 7] = [
+const CONTACT_KEYS: [Key; 9] = [
     key("speed", Kind::Speed, Need::Optional, "of the first pass"),
     key(
         "criterion",
@@ -121,6 +121,24 @@ const CONTACT_KEYS: [Key; 7] = [
         Kind::Length,
         Need::Optional,
         "widest accepted standard error of the position found",
+    ),
+    ranged(
+        Range::From0,
+        key(
+            "press_force",
+            Kind::Force,
+            Need::Optional,
+            "force to which the first pass goes on to learn how the tissue answers; `0 N` ends it at the criterion",
+        ),
+    ),
+    ranged(
+        Range::From0,
+        key(
+            "press_dwell",
+            Kind::Time,
+            Need::Optional,
+            "time at the end of each pass while the force relaxes",
+        ),
     ),
 ];
 
@@ -168,8 +186,8 @@ pub(super) const WORDS: [Word; 17] = [
         keys: &[key(
             "for",
             Kind::Time,
-            Need::Usual("1 s"),
-            "whole mains cycles: whole seconds",
+            Need::Usual("4 s"),
+            "whole mains cycles: whole seconds; from 2 s on the drift is told too",
         )],
         build: |args| {
             Ok(Step::Tare {
@@ -517,6 +535,13 @@ fn find(args: &Args) -> Result<FindContact, String> {
     ] {
         *field = args.maybe(name).unwrap_or(*field);
     }
+    let usual = Press::default();
+    let force = args.maybe("press_force").unwrap_or(usual.force.0);
+    let dwell = args.maybe("press_dwell").unwrap_or(usual.dwell.0);
+    search.press = (force > 0.0).then_some(Press {
+        force: Newtons(force),
+        dwell: Seconds(dwell),
+    });
     Ok(search)
 }
 
