@@ -11,5 +11,6 @@ pub mod engine;
 pub mod file;
 pub mod plans;
 pub mod preview;
+pub mod programme;
 pub mod replay;
 pub mod runner;

@@ -14,6 +14,7 @@ pub mod calibrations;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;
