@@ -1,7 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
-mod calibration;
 mod analyse;
+mod calibration;
 mod export;
 mod extremes;
 mod fit;

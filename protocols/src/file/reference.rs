@@ -19,6 +19,9 @@ pub fn reference() -> String {
             word.about,
             word.keys,
         );
+        if word.name == "find-contact" {
+            text.push_str(&usual_search());
+        }
     }
     section(
         &mut text,
