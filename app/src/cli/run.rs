@@ -2,27 +2,93 @@
 
 use super::Failure;
 use super::output::Output;
-use super::rig::RigArgs;
+use super::protocol::{ValueArgs, pair};
+use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
-use palpate_protocols::plans::{HoldUntil, RampHold};
+use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
-/// The protocols.
+/// Arguments of `palpate run`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct RunArgs {
+    #[command(subcommand)]
+    command: Option<RunCommand>,
+    #[command(flatten)]
+    protocol: ProtocolArgs,
+}
+
+impl RunArgs {
+    /// Whether one JSON object is wanted.
+    #[must_use]
+    pub fn is_json(&self) -> bool {
+        match &self.command {
+            Some(RunCommand::RampHold(args)) => args.json,
+            None => self.protocol.json,
+        }
+    }
+}
+
+/// Protocols with arguments of their own.
 #[derive(Debug, Subcommand)]
 pub enum RunCommand {
     /// Find the tissue, indent at constant speed, hold while the force relaxes
     RampHold(RampHoldArgs),
+}
+
+/// Arguments of `palpate run NAME|FILE`.
+#[derive(Debug, Args)]
+pub struct ProtocolArgs {
+    /// A built-in protocol ('palpate protocol list') or a protocol file
+    #[arg(value_name = "NAME|FILE", required = true)]
+    protocol: Option<String>,
+    #[command(flatten)]
+    values: ValueArgs,
+    /// What the protocol asks for, such as specimen.storage="saline, 4 C"; may be repeated
+    #[arg(long, value_name = "KEY=ANSWER", value_parser = pair)]
+    ask: Vec<(String, String)>,
+    #[command(flatten)]
+    how: HowArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// On which rig, into which folder, by whom.
+#[derive(Debug, Args)]
+struct HowArgs {
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Who runs it
+    #[arg(long, default_value = "")]
+    operator: String,
+    /// What is indented
+    #[arg(long, default_value = "")]
+    specimen: String,
+    /// With which probe
+    #[arg(long, default_value = "blunt 12 mm probe")]
+    indenter: String,
+    /// Accept what the preview asks to acknowledge; it is recorded
+    #[arg(long)]
+    acknowledge: bool,
+    /// Only tell what would happen
+    #[arg(long)]
+    preview: bool,
 }
 
 /// Arguments of `palpate run ramp-hold`.
@@ -44,25 +110,7 @@ pub struct RampHoldArgs {
     #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
     unload: Option<f64>,
     #[command(flatten)]
-    rig: RigArgs,
-    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
-    #[arg(long)]
-    out: Option<PathBuf>,
-    /// Who runs it
-    #[arg(long, default_value = "")]
-    operator: String,
-    /// What is indented
-    #[arg(long, default_value = "")]
-    specimen: String,
-    /// With which probe
-    #[arg(long, default_value = "blunt 12 mm probe")]
-    indenter: String,
-    /// Accept what the preview asks to acknowledge; it is recorded
-    #[arg(long)]
-    acknowledge: bool,
-    /// Only tell what would happen
-    #[arg(long)]
-    preview: bool,
+    how: HowArgs,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -91,7 +139,14 @@ struct RunReport {
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
-pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
+    match &args.command {
+        Some(RunCommand::RampHold(args)) => run_ramp_hold(args, output),
+        None => run_protocol(&args.protocol, output),
+    }
+}
+
+fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     let params = RampHold {
         speed: MmPerS(args.speed),
         depth: Depth(args.depth),
@@ -99,19 +154,76 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         until: args.hold_until,
         unload: args.unload.map(MmPerS),
     };
-    let bench = super::rig::open(&args.rig)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let bench = super::rig::open(&args.how.rig)?;
+    carry_out(params.plan(), bench, &args.how, output)
+}
+
+/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told.
+fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
+    let Some(name) = &args.protocol else {
+        return Err(Failure::usage(
+            "name a protocol; 'palpate protocol list' tells which there are",
+        ));
+    };
+    let bench = super::rig::open(&args.how.rig)?;
+    let (protocol, written, _) =
+        super::protocol::sound(name, &args.values.values(), &bench, output)?;
+    let mut answers: BTreeMap<String, String> = args.ask.iter().cloned().collect();
+    let how = &args.how;
+    for (key, told) in [
+        ("operator", &how.operator),
+        ("specimen", &how.specimen),
+        ("indenter", &how.indenter),
+    ] {
+        if !told.is_empty() {
+            answers.entry(key.into()).or_insert_with(|| told.clone());
+        }
+    }
+    if !how.preview {
+        protocol.check_answers(&answers).map_err(|reason| {
+            Failure::usage(format!(
+                "{reason}; add --ask operator=Ada or the like for each"
+            ))
+        })?;
+    }
+    let mut plan = written.plan;
+    let mut labels = Labels::default();
+    for (key, label) in [
+        ("operator", &mut labels.operator),
+        ("specimen", &mut labels.specimen),
+        ("indenter", &mut labels.indenter),
+    ] {
+        *label = answers.remove(key).unwrap_or_default();
+    }
+    if let Some(source) = &mut plan.source {
+        source.answers = answers;
+    }
+    carry_out_for(plan, bench, how, labels, output)
+}
+
+fn carry_out(plan: Plan, bench: OpenRig, how: &HowArgs, output: &Output) -> Result<(), Failure> {
+    let labels = Labels {
+        operator: how.operator.clone(),
+        specimen: how.specimen.clone(),
+        indenter: how.indenter.clone(),
+    };
+    carry_out_for(plan, bench, how, labels, output)
+}
+
+fn carry_out_for(
+    plan: Plan,
+    bench: OpenRig,
+    how: &HowArgs,
+    labels: Labels,
+    output: &Output,
+) -> Result<(), Failure> {
     let request = RunRequest {
-        plan: params.plan(),
+        plan,
         calibration: bench.calibration,
         limits: bench.limits,
-        out: args.out.clone(),
-        labels: Labels {
-            operator: args.operator.clone(),
-            specimen: args.specimen.clone(),
-            indenter: args.indenter.clone(),
-        },
-        is_acknowledged: args.acknowledge,
+        out: how.out.clone(),
+        labels,
+        is_acknowledged: how.acknowledge,
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
     };
@@ -123,14 +235,14 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         &curve,
         false,
     );
-    if args.preview {
+    if how.preview {
         output.result(&preview, || preview_text(&preview));
         return match preview.refusals.first() {
             Some(refusal) => Err(Failure::usage(refusal)),
             None => Ok(()),
         };
     }
-    if let Err(reason) = preview.verdict(args.acknowledge) {
+    if let Err(reason) = preview.verdict(how.acknowledge) {
         let hint = if preview.refusals.is_empty() {
             "; add --acknowledge to accept this"
         } else {
@@ -143,7 +255,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(bench.rig, args.rig.time_scale, Some(first), move || {
+    let runner = Runner::start(bench.rig, how.rig.time_scale, Some(first), move || {
         // A full channel already says what this would say.
         let _ = wake.try_send(());
     })
