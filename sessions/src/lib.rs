@@ -10,6 +10,7 @@
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
+pub mod about;
 pub mod calibrations;
 pub mod export;
 pub mod folder;
@@ -22,6 +23,7 @@ mod schema;
 pub mod text;
 pub mod trade;
 
+pub use about::{About, AboutError, Labels};
 pub use calibrations::{
     Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
 };

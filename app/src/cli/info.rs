@@ -3,6 +3,8 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
+use palpate_model::rig::SignalFacts;
+use palpate_sessions::About;
 use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -28,6 +30,8 @@ struct Info<'a> {
     operator: &'a str,
     specimen: &'a str,
     indenter: &'a str,
+    about: &'a About,
+    signal: Option<&'a SignalFacts>,
     rig: &'a str,
     rig_settings: &'a std::collections::BTreeMap<String, String>,
     plan: &'a serde_json::Value,
@@ -55,6 +59,8 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         operator: &manifest.operator,
         specimen: &manifest.specimen,
         indenter: &manifest.indenter,
+        about: &manifest.about,
+        signal: manifest.signal.as_ref(),
         rig: &manifest.rig.identity,
         rig_settings: &manifest.rig.settings,
         plan: &manifest.plan,
@@ -98,13 +104,20 @@ fn text(info: &Info<'_>) -> String {
         format!("operator   {}", or_dash(info.operator)),
         format!("specimen   {}", or_dash(info.specimen)),
         format!("indenter   {}", or_dash(info.indenter)),
-        format!("rig        {}", info.rig),
     ];
+    lines.extend(
+        info.about
+            .lines()
+            .iter()
+            .map(|(key, value)| format!("           {key} {value}")),
+    );
+    lines.push(format!("rig        {}", info.rig));
     lines.extend(
         info.rig_settings
             .iter()
             .map(|(key, value)| format!("           {key} {value}")),
     );
+    lines.extend(info.signal.map(signal_text));
     lines.push(format!(
         "written by palpate {}, engine {}",
         info.software_version, info.engine_version
@@ -137,4 +150,17 @@ fn text(info: &Info<'_>) -> String {
     }
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
     lines.join("\n")
+}
+
+fn signal_text(signal: &SignalFacts) -> String {
+    let range = signal.range_v.map_or(String::new(), |[low, high]| {
+        format!(", range {low:.3} to {high:.3} V")
+    });
+    let count = signal.resolution_v.map_or(String::new(), |volts| {
+        format!(", one count {:.3} mV", volts * 1e3)
+    });
+    format!(
+        "signal     {:.2} Hz{range}{count}\n           filter {}\n           {}",
+        signal.sample_rate_hz, signal.filter, signal.aliasing
+    )
 }

@@ -11,6 +11,7 @@ use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
+use palpate_sessions::About;
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -57,6 +58,9 @@ pub struct RampHoldArgs {
     /// With which probe
     #[arg(long, default_value = "blunt 12 mm probe")]
     indenter: String,
+    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    about: Vec<String>,
     /// Accept what the preview asks to acknowledge; it is recorded
     #[arg(long)]
     acknowledge: bool,
@@ -99,17 +103,14 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         until: args.hold_until,
         unload: args.unload.map(MmPerS),
     };
+    let labels = labels(args)?;
     let bench = super::rig::open(&args.rig)?;
     let request = RunRequest {
         plan: params.plan(),
         calibration: bench.calibration,
         limits: bench.limits,
         out: args.out.clone(),
-        labels: Labels {
-            operator: args.operator.clone(),
-            specimen: args.specimen.clone(),
-            indenter: args.indenter.clone(),
-        },
+        labels,
         is_acknowledged: args.acknowledge,
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
@@ -159,6 +160,23 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         return Err(Failure::failed("the runner ended without a run"));
     };
     report(view, output)
+}
+
+/// Who and what, as told by the arguments.
+fn labels(args: &RampHoldArgs) -> Result<Labels, Failure> {
+    let mut labels = Labels {
+        operator: args.operator.clone(),
+        specimen: args.specimen.clone(),
+        indenter: args.indenter.clone(),
+        about: About::default(),
+    };
+    for pair in &args.about {
+        labels
+            .tell_pair(pair)
+            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+    }
+    labels.check().map_err(Failure::usage)?;
+    Ok(labels)
 }
 
 /// The first signal stops, the second halts.

@@ -11,6 +11,7 @@ pub mod path;
 pub mod phase;
 pub mod profile;
 pub mod reading;
+pub mod signal;
 
 pub use command::{MoveTo, Oscillation, RigCommand};
 pub use course::Course;
@@ -23,3 +24,4 @@ pub use path::{PathError, PathTracker};
 pub use phase::Phase;
 pub use profile::Profile;
 pub use reading::{AxisStatus, Reading};
+pub use signal::SignalFacts;
