@@ -163,9 +163,10 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) => Failure::usage(err),
-        SourceError::Empty | SourceError::Calibration { .. } | SourceError::Decision { .. } => {
-            Failure::failed(err)
-        }
+        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Edits(_)
+        | SourceError::Empty
+        | SourceError::Calibration { .. }
+        | SourceError::Decision { .. } => Failure::failed(err),
     }
 }
