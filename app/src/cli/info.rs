@@ -4,7 +4,9 @@ use super::Failure;
 use super::output::Output;
 use clap::Args;
 use palpate_model::rig::SignalFacts;
+use palpate_protocols::edited;
 use palpate_sessions::About;
+use palpate_sessions::edits::{Change, Edit, Verdict};
 use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -43,11 +45,15 @@ struct Info<'a> {
     ending: Option<&'a str>,
     reason: Option<&'a str>,
     time_use_s: Option<&'a [(String, f64)]>,
+    verdict: Option<Verdict>,
+    verdict_reason: Option<&'a str>,
+    edits: &'a [Edit],
     notes: &'a [String],
 }
 
 pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
-    let session = Session::open(&args.session).map_err(super::read_failure)?;
+    let edited = edited::open(&args.session).map_err(super::source_failure)?;
+    let (session, edits) = (edited.session, edited.edits);
     let manifest = &session.manifest;
     let info = Info {
         command: "info",
@@ -72,6 +78,9 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         ending: session.end.as_ref().map(|end| end.outcome.as_str()),
         reason: session.end.as_ref().map(|end| end.reason.as_str()),
         time_use_s: session.end.as_ref().map(|end| end.time_use.as_slice()),
+        verdict: edits.verdict().map(|(verdict, _)| verdict),
+        verdict_reason: edits.verdict().map(|(_, edit)| edit.reason.as_str()),
+        edits: &edits.all,
         notes: &session.notes,
     };
     output.result(&info, || text(&info));
@@ -148,6 +157,7 @@ fn text(info: &Info<'_>) -> String {
             .collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
+    lines.extend(info.edits.iter().map(edit_text));
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
     lines.join("\n")
 }
@@ -163,4 +173,20 @@ fn signal_text(signal: &SignalFacts) -> String {
         "signal     {:.2} Hz{range}{count}\n           filter {}\n           {}",
         signal.sample_rate_hz, signal.filter, signal.aliasing
     )
+}
+
+fn edit_text(edit: &Edit) -> String {
+    let at = edit.at.format("%Y-%m-%d %H:%M:%SZ");
+    let what = match edit.change {
+        Change::Verdict { verdict } => verdict.to_string(),
+        Change::Contact {
+            number,
+            position_mm,
+            was_mm,
+        } => format!(
+            "contact {number} at {:.3} mm instead of {:.3} mm",
+            position_mm.0, was_mm.0
+        ),
+    };
+    format!("edit       {at} {}: {what}: {}", edit.by, edit.reason)
 }

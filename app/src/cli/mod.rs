@@ -13,6 +13,7 @@ mod rig;
 mod run;
 mod select;
 mod trade;
+mod verdict;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -52,6 +53,10 @@ enum Command {
     Export(export::ExportArgs),
     /// Tell what a session contains
     Info(info::InfoArgs),
+    /// Say what a session is worth: valid, suspect or rejected
+    Verdict(verdict::VerdictArgs),
+    /// Correct where a session found contact; its log stays as it is
+    CorrectContact(verdict::CorrectArgs),
 }
 
 /// Why a command did not do what was asked.
@@ -129,6 +134,8 @@ pub fn main() -> ExitCode {
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
+        Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
+        Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -73,7 +73,7 @@ pub struct RampHoldArgs {
 }
 
 /// A finite number, or one sentence.
-fn number(text: &str) -> Result<f64, String> {
+pub(super) fn number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("this is not a finite number; write it like 0.75".into()),
