@@ -76,6 +76,7 @@ impl WorkbenchApp {
             .calibration
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
+        let plots = PlotCache::for_calibration(&options.calibration);
         let wake = ctx.clone();
         let runner = Runner::start(options.rig, options.scale, None, move || {
             wake.request_repaint_after(FRAME_IDLE);
@@ -105,7 +106,7 @@ impl WorkbenchApp {
                 .map_err(|err| err.to_string()),
             ports,
             dialog: PathDialog::default(),
-            plots: PlotCache::default(),
+            plots,
             refitter: Refitter::default(),
             time_view: TimeView::default(),
             screen: Screen::default(),

@@ -17,6 +17,7 @@ pub mod edits;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;

@@ -1,5 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
+mod analyse;
+mod calibration;
 mod export;
 mod extremes;
 mod fit;
@@ -39,6 +41,9 @@ enum Command {
     Run(run::RunCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
+    /// Tell what the cycles of a record show: loops, shift, decay, relaxation
+    #[command(alias = "analyze")]
+    Analyse(analyse::AnalyseArgs),
     /// Compare model families and recommend the cheapest that will do
     Select(select::SelectArgs),
     /// Propose the shortest protocol that will tell what is wanted
@@ -49,6 +54,9 @@ enum Command {
     Replay(replay::ReplayArgs),
     /// Test numerical stability at the extremes, every family, integrator and fit
     Extremes(extremes::ExtremesArgs),
+    /// Keep, show and check load-cell calibrations
+    #[command(subcommand)]
+    Calibration(calibration::CalibrationCommand),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -127,11 +135,15 @@ pub fn main() -> ExitCode {
             with(args.json, |out| run::run(&args, out))
         }
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
+        Some(Command::Analyse(args)) => with(args.json, |out| analyse::run(&args, out)),
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
+        Some(Command::Calibration(command)) => {
+            with(command.is_json(), |out| calibration::run(&command, out))
+        }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),

@@ -1,6 +1,8 @@
 //! Which rig, at which pace: shared by every command that needs one.
 
 use super::Failure;
+use super::calibration::source::Source;
+use super::output::Output;
 use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
@@ -46,6 +48,9 @@ pub struct RigArgs {
     /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
+    /// Read forces with this calibration: a name or id of the library, or a file
+    #[arg(long, value_name = "NAME|FILE")]
+    pub calibration: Option<String>,
     /// Session seconds per second, or max
     #[arg(long, default_value = "1")]
     pub time_scale: TimeScale,
@@ -64,6 +69,7 @@ impl Default for RigArgs {
             thickness: SimThickness::default(),
             compliance: SimCompliance::default(),
             preconditioning: SimPreconditioning::default(),
+            calibration: None,
             time_scale: TimeScale::Factor(1.0),
         }
     }
@@ -93,6 +99,8 @@ pub struct OpenRig {
     pub rig: Box<dyn Rig>,
     /// Volts to newtons of its load cell.
     pub calibration: Calibration,
+    /// What speaks against that calibration, one sentence each.
+    pub doubts: Vec<String>,
     /// Interlock thresholds.
     pub limits: Limits,
     /// Keeps other programs off a rig that has a name of its own.
@@ -109,9 +117,22 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         None => None,
     };
     let limits = Limits::for_travel(rig.description().travel);
+    // The built-in one belongs to its rig.
+    let (calibration, doubts) = match &args.calibration {
+        None => (
+            palpate_drivers::sim::calibration(settings.profile),
+            Vec::new(),
+        ),
+        Some(name) => {
+            let source = Source::find(name)?;
+            let doubts = source.doubts(&rig.description().name);
+            (source.calibration, doubts)
+        }
+    };
     Ok(OpenRig {
         rig,
-        calibration: palpate_drivers::sim::calibration(settings.profile),
+        calibration,
+        doubts,
         limits,
         _lock: lock,
     })
@@ -128,9 +149,12 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
     let OpenRig {
         rig,
         calibration,
+        doubts,
         limits,
         _lock,
     } = open(args)?;
+    let output = Output::text();
+    doubts.iter().for_each(|doubt| output.note(doubt));
     let scale = args.time_scale;
     run_window(WindowOptions {
         rig,

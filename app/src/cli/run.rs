@@ -105,6 +105,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     };
     let labels = labels(args)?;
     let bench = super::rig::open(&args.rig)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let request = RunRequest {
         plan: params.plan(),
         calibration: bench.calibration,

@@ -1,7 +1,7 @@
 //! Force over depth, from the moment contact is known.
 
 use super::points::PlotCache;
-use super::style::quiet;
+use super::style::{band_of, quiet};
 use crate::theme::Tokens;
 use eframe::egui::Ui;
 use egui_plot::{Plot, PlotPoints, Points};
@@ -18,6 +18,9 @@ pub fn force_depth_ui(ui: &mut Ui, cache: &PlotCache, depth_mm: f64) {
         .include_y(0.0)
         .include_y(0.5);
     plot.show(ui, |plot_ui| {
+        for band in cache.force_depth.bands("calibration") {
+            plot_ui.add(band.fill_color(band_of(tokens)));
+        }
         for line in cache.force_depth.lines("force") {
             plot_ui.line(line.color(tokens.series));
         }

@@ -1,7 +1,7 @@
 //! Force over session time: phases shaded, the interlock's limit drawn.
 
 use super::points::{PlotCache, phase_spans};
-use super::style::quiet;
+use super::style::{band_of, quiet};
 use crate::theme::Tokens;
 use crate::workers::fit::ExactFit;
 use eframe::egui::{Align2, Color32, Ui, Vec2b};
@@ -84,6 +84,9 @@ pub fn force_time_ui(
                 .style(LineStyle::dashed_dense())
                 .allow_hover(false),
         );
+        for band in cache.force_time.bands("calibration") {
+            plot_ui.add(band.fill_color(band_of(tokens)));
+        }
         for line in cache.force_time.lines("force") {
             plot_ui.line(line.color(tokens.series));
         }

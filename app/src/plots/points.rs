@@ -1,8 +1,10 @@
 //! The live trace as the points a plot borrows. Converted when the trace changed, never per frame.
 
-use egui_plot::{Line, PlotPoint, PlotPoints};
+use egui_plot::{FilledArea, Line, PlotPoint, PlotPoints};
+use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
+use palpate_model::units::Newtons;
 use palpate_protocols::runner::RunView;
 use std::ops::Range;
 use std::sync::Arc;
@@ -11,12 +13,18 @@ use std::sync::Arc;
 /// that and says so.
 const STRETCHES_MAX: usize = 64;
 
+/// The band around a force reaches so many standard uncertainties of its calibration either way: about 95 %
+/// (JCGM 100:2008, 6.3.3).
+const BAND_SIGMAS: f64 = 2.0;
+
 /// Points of one line, in stretches without gaps.
 #[derive(Debug, Default)]
 pub(super) struct Series {
     points: Vec<PlotPoint>,
     stretches: Vec<Range<usize>>,
     is_cut: bool,
+    /// Abscissa, lower and upper edge of the band at each point; empty where no uncertainty is stated.
+    band: [Vec<f64>; 3],
 }
 
 impl Series {
@@ -53,6 +61,37 @@ impl Series {
         })
     }
 
+    /// Finds the band around the points, whose ordinates are forces.
+    fn set_band(&mut self, uncertainty: Option<&ForceUncertainty>) {
+        self.band.iter_mut().for_each(Vec::clear);
+        for point in &self.points {
+            let Some(sigma) = uncertainty.and_then(|own| own.sigma(Newtons(point.y))) else {
+                return;
+            };
+            let half = BAND_SIGMAS * sigma.0;
+            for (edge, value) in self
+                .band
+                .iter_mut()
+                .zip([point.x, point.y - half, point.y + half])
+            {
+                edge.push(value);
+            }
+        }
+    }
+
+    /// One band per stretch; none where no uncertainty is stated.
+    pub fn bands(&self, name: &'static str) -> impl Iterator<Item = FilledArea> {
+        let whole = self.stretches.iter().enumerate();
+        let stretches = whole.filter(|(_, range)| range.end <= self.band[0].len());
+        stretches.map(move |(i, range)| {
+            let [x, low, high] = &self.band;
+            let part = |edge: &Vec<f64>| edge[range.clone()].to_vec();
+            FilledArea::new(name, &part(x), &part(low), &part(high))
+                .id((name, i))
+                .allow_hover(false)
+        })
+    }
+
     /// The newest point.
     pub fn last(&self) -> Option<PlotPoint> {
         self.points.last().copied()
@@ -72,9 +111,20 @@ pub struct PlotCache {
     pub(super) force_depth: Series,
     pub(super) samples_per_bucket: u64,
     conversions: u64,
+    /// Of the forces drawn; `None` where their calibration cannot tell.
+    uncertainty: Option<ForceUncertainty>,
 }
 
 impl PlotCache {
+    /// A cache for forces read with this calibration.
+    #[must_use]
+    pub fn for_calibration(calibration: &Calibration) -> Self {
+        Self {
+            uncertainty: ForceUncertainty::of(calibration).ok(),
+            ..Self::default()
+        }
+    }
+
     /// Takes over a run's history, if it changed.
     pub fn update(&mut self, run: Option<&RunView>) {
         let Some(run) = run else {
@@ -94,6 +144,8 @@ impl PlotCache {
         self.force_time.set(&points, |point| [point.t, point.force]);
         self.force_depth
             .set(&points, |point| [point.depth, point.force]);
+        self.force_time.set_band(self.uncertainty.as_ref());
+        self.force_depth.set_band(self.uncertainty.as_ref());
         self.samples_per_bucket = trace.samples_per_bucket();
         self.conversions += 1;
         self.trace = Some(Arc::clone(trace));
@@ -134,7 +186,7 @@ pub(super) fn phase_spans(run: &RunView) -> impl Iterator<Item = PhaseSpan> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::units::{Depth, Newtons, Seconds};
+    use palpate_model::units::{Depth, Seconds};
 
     fn point(t: f64, depth: f64, force: f64) -> TracePoint {
         TracePoint { t, depth, force }
@@ -173,6 +225,31 @@ mod tests {
         cache.force_time.set(&trace, |point| [point.t, point.force]);
         assert_eq!(cache.force_time.lengths().len(), STRETCHES_MAX);
         assert!(cache.remark().unwrap().contains("too many gaps"));
+    }
+
+    #[test]
+    fn the_band_is_as_wide_as_the_calibration_is_unsure() {
+        let mut trace = LiveTrace::new(100);
+        for i in 0..10 {
+            let force = Newtons(f64::from(i));
+            trace.push(Seconds(f64::from(i)), Depth(f64::from(i)), force);
+        }
+        let thesis = Calibration::thesis();
+        let mut cache = PlotCache::for_calibration(&thesis);
+        cache.convert(&Arc::new(trace.clone()));
+        let sigma = ForceUncertainty::of(&thesis)
+            .unwrap()
+            .sigma(Newtons(4.0))
+            .unwrap();
+        let [x, low, high] = &cache.force_time.band;
+        assert_eq!((x.len(), x[4]), (10, 4.0));
+        assert!((high[4] - low[4] - 4.0 * sigma.0).abs() < 1e-12);
+        assert_eq!(cache.force_depth.bands("band").count(), 1);
+        // What states nothing has no band.
+        let line = Calibration::linear("line", palpate_model::units::Volts(1.0), 0.1, Newtons(9.0));
+        let mut cache = PlotCache::for_calibration(&line);
+        cache.convert(&Arc::new(trace));
+        assert_eq!(cache.force_time.bands("band").count(), 0);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
 
 use crate::theme::Tokens;
-use eframe::egui::{Rangef, vec2};
+use eframe::egui::{Color32, Rangef, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
 
 /// Labelled steps across the width and up the height of a plot, at most.
@@ -10,6 +10,11 @@ const STEPS_UP: f64 = 6.0;
 
 /// Unlabelled lines between two labelled ones.
 const MINOR_PER_MAJOR: f64 = 5.0;
+
+/// The band of a force's calibration: the ink of the force, thin enough for the grid to show through.
+pub(super) fn band_of(tokens: &Tokens) -> Color32 {
+    tokens.series.gamma_multiply(0.18)
+}
 
 /// Gives a plot the common look.
 pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {

@@ -1,6 +1,9 @@
 //! Results as people read them: the strings of a fit and of a selection that window, command line and
 //! pictures share, the pictures themselves, and the page of the extremes.
 
+pub mod calibration;
+mod calibration_plot;
+pub mod cycles;
 pub mod extremes;
 pub mod family;
 pub mod picture;

@@ -5,7 +5,9 @@ use super::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
 use super::text::{ParameterText, quality};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
+use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitReport, FitSample};
+use palpate_model::units::Newtons;
 
 /// Width of a picture in px.
 pub(super) const WIDTH: f64 = 960.0;
@@ -17,9 +19,15 @@ pub(super) const LINE: f64 = 20.0;
 /// Letters that fit into a line of sentences: sans-serif letters are about half as wide as high.
 const LETTERS: usize = 120;
 
-/// The picture of a fit that was made. `source` is what was fitted, for the title.
+/// The picture of a fit that was made. `source` is what was fitted, for the title; around the force lies the band
+/// of twice its calibration's standard uncertainty, where that is stated.
 #[must_use]
-pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> String {
+pub fn of_report(
+    source: &str,
+    samples: &[FitSample],
+    report: &FitReport,
+    uncertainty: Option<&ForceUncertainty>,
+) -> String {
     let modelled = report.predict(samples);
     let span = span(samples);
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
@@ -42,8 +50,18 @@ pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> Str
         source,
         &format!("{}; {}", report.model, quality(report)),
     );
-    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &[&measured, &fitted]);
+    let band = band(&fitted, uncertainty);
+    let inside = [&measured, &fitted, &band[0], &band[1]].map(Vec::as_slice);
+    let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &inside);
     upper.axes(&mut svg, ["", "force (N)"], look());
+    let [above, below] = band.map(|edge| {
+        edge.iter()
+            .map(|point| upper.at(*point))
+            .collect::<Vec<_>>()
+    });
+    if !above.is_empty() {
+        svg.band(&above, &below, LIGHT.series);
+    }
     // Wide under narrow, so that both are seen where they agree.
     upper.line(&mut svg, &measured, LIGHT.series, 2.6);
     upper.line(&mut svg, &fitted, LIGHT.limit, 1.4);
@@ -56,6 +74,17 @@ pub fn of_report(source: &str, samples: &[FitSample], report: &FitReport) -> Str
         y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
     }
     svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
+}
+
+/// Upper and lower edge of the band around a force over time; empty where no uncertainty is stated.
+fn band(force: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) -> [Vec<[f64; 2]>; 2] {
+    [2.0, -2.0].map(|sigmas| {
+        let edge = |&[t, force]: &[f64; 2]| {
+            let sigma = uncertainty?.sigma(Newtons(force))?;
+            Some([t, force + sigmas * sigma.0])
+        };
+        force.iter().filter_map(edge).collect()
+    })
 }
 
 /// The picture of a fit that was refused, with the sentence that says why.
@@ -164,7 +193,7 @@ mod tests {
     use super::*;
     use palpate_model::fit::{FitOptions, fit};
     use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-    use palpate_model::{Depth, Newtons, Seconds};
+    use palpate_model::{Depth, Seconds};
 
     fn record(force_of: impl Fn(usize, f64) -> f64) -> Vec<FitSample> {
         let mut state = KelvinState::at_rest();
@@ -190,7 +219,7 @@ mod tests {
         let samples = record(|i, force| force + 0.05 * (i as f64 * 0.01).sin());
         let report = fit(&samples, &FitOptions::default()).unwrap();
         assert!(report.sentences().count() > 0);
-        let picture = of_report("S & T <1>", &samples, &report);
+        let picture = of_report("S & T <1>", &samples, &report, None);
         assert!(picture.contains("S &amp; T &lt;1&gt;"));
         for parameter in &report.parameters {
             let text = ParameterText::of(parameter);
@@ -201,6 +230,10 @@ mod tests {
         for sentence in report.sentences() {
             assert!(picture.contains(&wrap(sentence, LETTERS)[0]), "{sentence}");
         }
+        assert!(!picture.contains("<polygon"));
+        let thesis = ForceUncertainty::of(&palpate_model::calibration::Calibration::thesis());
+        let banded = of_report("S", &samples, &report, thesis.as_ref().ok());
+        assert_eq!(banded.matches("<polygon").count(), 1);
         // Three curves of at most two points a pixel, and nothing that is not a number.
         assert!(!picture.contains("NaN") && !picture.contains("inf"));
         assert!(

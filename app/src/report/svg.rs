@@ -109,6 +109,30 @@ impl Svg {
         ));
     }
 
+    /// A rectangle between two corners.
+    pub fn rectangle(&mut self, [left, top]: [f64; 2], [right, bottom]: [f64; 2], color: Color32) {
+        self.push(&format!(
+            "<rect x=\"{left:.1}\" y=\"{top:.1}\" width=\"{:.1}\" height=\"{:.1}\" fill=\"{}\" fill-opacity=\"0.5\"/>",
+            right - left,
+            bottom - top,
+            hex(color)
+        ));
+    }
+
+    /// A band between an upper and a lower edge.
+    pub fn band(&mut self, upper: &[[f64; 2]], lower: &[[f64; 2]], color: Color32) {
+        let mut list = String::new();
+        for [x, y] in upper.iter().chain(lower.iter().rev()) {
+            // Writing to a string does not fail.
+            let _ = write!(list, "{x:.1},{y:.1} ");
+        }
+        self.push(&format!(
+            "<polygon points=\"{}\" fill=\"{}\" fill-opacity=\"0.18\"/>",
+            list.trim_end(),
+            hex(color)
+        ));
+    }
+
     pub fn dot(&mut self, [x, y]: [f64; 2], color: Color32, radius: f64) {
         self.push(&format!(
             "<circle cx=\"{x:.1}\" cy=\"{y:.1}\" r=\"{radius}\" fill=\"{}\"/>",
@@ -181,6 +205,13 @@ impl Panel {
     pub fn line(&self, svg: &mut Svg, points: &[[f64; 2]], color: Color32, width: f64) {
         let placed: Vec<[f64; 2]> = points.iter().map(|point| self.at(*point)).collect();
         svg.line(&placed, color, width);
+    }
+
+    /// Everything between two x, from top to bottom.
+    pub fn shade(&self, svg: &mut Svg, [from, to]: [f64; 2], color: Color32) {
+        let [_, top, _, bottom] = self.place;
+        let [left, right] = [from, to].map(|x| self.at([x, 0.0])[0]);
+        svg.rectangle([left, top], [right, bottom], color);
     }
 
     /// Grid, numbers and names of the axes.

@@ -19,6 +19,10 @@ pub struct Prediction {
     pub peak: Newtons,
     /// Root mean square of the error over all measured samples.
     pub rms: Newtons,
+    /// Mean error: a fit gives every recording an offset of its own, a prediction has none.
+    pub mean: Newtons,
+    /// Standard deviation of the error about its mean: what is wrong with the shape.
+    pub sd: Newtons,
     /// Largest error, with its sign, and when it was. A single sample: noise is in it.
     pub worst: (Newtons, Seconds),
     /// Error at the turning point, from a line through the last fiftieth of the way in.
@@ -89,6 +93,9 @@ pub fn predict(
     let too_few = || PredictionError::TooFew { measured: turn };
     let (at_peak, peak) = last_of(&errors[..=turn]).ok_or_else(too_few)?;
     let square: f64 = errors.iter().map(|(_, error)| error * error).sum();
+    let count = errors.len() as f64;
+    let mean = errors.iter().map(|(_, error)| error).sum::<f64>() / count;
+    let about: f64 = errors.iter().map(|(_, error)| (error - mean).powi(2)).sum();
     let worst = errors.iter().copied().fold(errors[0], |worst, one| {
         if one.1.abs() > worst.1.abs() {
             one
@@ -98,7 +105,9 @@ pub fn predict(
     });
     Ok(Prediction {
         peak: Newtons(peak),
-        rms: Newtons((square / errors.len() as f64).sqrt()),
+        rms: Newtons((square / count).sqrt()),
+        mean: Newtons(mean),
+        sd: Newtons((about / count).sqrt()),
         worst: (Newtons(worst.1), worst.0.t),
         at_peak,
         at_end: last_of(&errors[turn + 1..]).map(|(end, _)| end),
@@ -158,6 +167,10 @@ mod tests {
         assert!((off.worst.0.0 - 0.1).abs() < 1e-12 && off.worst.1.0 > 20.0 / 0.75);
         // From 20 mm, 26.68 s, on: 6333 of 9001 samples.
         assert!((off.rms.0 - 0.1 * (6333.0f64 / 9001.0).sqrt()).abs() < 1e-4);
+        // sqrt(p (1 - p)) of a step of 0.1 N.
+        let share = 6333.0 / 9001.0;
+        assert!((off.mean.0 - 0.1 * share).abs() < 1e-4);
+        assert!((off.sd.0 - 0.1 * (share * (1.0f64 - share)).sqrt()).abs() < 1e-4);
         assert!((off.percent(Newtons(0.1)) - 10.0 / off.peak.0).abs() < 1e-12);
     }
 

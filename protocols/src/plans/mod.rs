@@ -9,6 +9,7 @@ pub mod step;
 use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 
 pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
@@ -33,6 +34,19 @@ pub struct Plan {
     /// Limits tighter than the rig's.
     #[serde(default, skip_serializing_if = "PlanLimits::is_none")]
     pub limits: PlanLimits,
+    /// The file it was written out from; none for a plan made by the program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<PlanSource>,
+}
+
+/// Which text a plan was written out from, and with which values.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct PlanSource {
+    /// CRC-32 of the text, eight hexadecimal digits.
+    pub crc32: String,
+    /// Value of every parameter, as it was written.
+    pub values: BTreeMap<String, String>,
 }
 
 /// One step at its place in the plan.
@@ -123,6 +137,7 @@ impl Plan {
             steps: steps.into_iter().map(PlannedStep::from).collect(),
             monitors: Vec::new(),
             limits: PlanLimits::default(),
+            source: None,
         }
     }
 

@@ -90,7 +90,8 @@ impl std::str::FromStr for CurveChoice {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let wrong = || "give best, monotone, segments=N or polynomial=N, as in segments=4".to_owned();
+        let wrong =
+            || "give best, monotone, segments=N or polynomial=N, as in segments=4".to_owned();
         match text.split_once('=') {
             None if text == "best" => Ok(Self::Best),
             None if text == "monotone" => Ok(Self::Monotone),
@@ -112,7 +113,12 @@ pub(super) fn import(args: &ImportArgs, output: &Output) -> Result<(), Failure> 
     let library = library_folder().map_err(Failure::usage)?;
     let kept = calibrations::save_calibration(&library, &document(args)?).map_err(failure)?;
     let source = Source::kept(&kept);
-    super::tell("calibration import", &source, args.picture.as_deref(), output)
+    super::tell(
+        "calibration import",
+        &source,
+        args.picture.as_deref(),
+        output,
+    )
 }
 
 pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Failure> {
@@ -164,7 +170,9 @@ fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
         ));
     }
     if let Some(tolerance) = args.tolerance {
-        new = new.with_stacked_weights(tolerance).map_err(Failure::usage)?;
+        new = new
+            .with_stacked_weights(tolerance)
+            .map_err(Failure::usage)?;
     }
     let default = (!is_document).then_some(CurveChoice::Best);
     if let Some(choice) = args.curve.or(default) {

@@ -13,6 +13,7 @@ use crate::report::{picture, text};
 use crate::workers::fit::{Fitted, fit_source};
 use clap::Args;
 use intervals::Intervals;
+use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitOptions, FitReport, Systematic};
 use palpate_protocols::analysis::{SourceError, Stretch, Wanted};
 use palpate_sessions::import::ColumnNames;
@@ -170,7 +171,11 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             .file_name()
             .map_or(name.clone(), |name| name.to_string_lossy().into());
         let picture = match &fitted.result {
-            Ok(report) => picture::of_report(&short, &fitted.samples, report),
+            Ok(report) => {
+                let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
+                let uncertainty = uncertainty.and_then(Result::ok);
+                picture::of_report(&short, &fitted.samples, report, uncertainty.as_ref())
+            }
             Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
         };
         new_file::write("picture", Some(to), || picture)?;

@@ -1,0 +1,419 @@
+//! A calibration as people read it: a list, a page of text, and the answer of a check. Its picture is in
+//! [`super::calibration_plot`].
+
+pub use super::calibration_plot::picture;
+use super::text::in_columns;
+use palpate_model::calibration::{
+    Calibration, CalibrationError, Candidate, CheckResult, CurveKind, ForceUncertainty, Quality,
+    Term, candidates, judge_kind,
+};
+use palpate_model::units::Newtons;
+use palpate_sessions::calibrations::{Kept, Shelf};
+use serde::Serialize;
+use std::path::Path;
+
+/// One line of a list.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Entry {
+    /// Its id.
+    pub id: String,
+    /// Its name.
+    pub name: String,
+    /// The rig whose cell it is.
+    pub rig: String,
+    /// The cell's serial number.
+    pub cell: String,
+    /// When it was taken.
+    pub taken_at: Option<String>,
+    /// Days since then.
+    pub age_days: Option<i64>,
+    /// Days for which it is valid.
+    pub valid_days: u32,
+    /// Whether it is the one in force for its rig.
+    pub is_in_force: bool,
+    /// The one that took its place.
+    pub superseded_by: Option<String>,
+}
+
+impl Entry {
+    /// The line of one that is kept.
+    #[must_use]
+    pub fn of(shelf: &Shelf, kept: &Kept, age_days: Option<i64>) -> Self {
+        let document = &kept.calibration;
+        let in_force = shelf.in_force(&document.rig);
+        Self {
+            id: kept.id.clone(),
+            name: document.name.clone(),
+            rig: document.rig.clone(),
+            cell: document.cell.clone(),
+            taken_at: document.taken_at.clone(),
+            age_days,
+            valid_days: document.valid_days(),
+            is_in_force: in_force.is_some_and(|one| one.id == kept.id),
+            superseded_by: shelf.successor(&kept.id).map(str::to_owned),
+        }
+    }
+
+    fn state(&self) -> String {
+        let is_old = self
+            .age_days
+            .is_some_and(|age| age > i64::from(self.valid_days));
+        match (&self.superseded_by, is_old, self.is_in_force) {
+            (Some(by), _, _) => format!("superseded by {by}"),
+            (None, true, _) => "expired".to_owned(),
+            (None, false, true) => "in force".to_owned(),
+            (None, false, false) => "older than the one in force".to_owned(),
+        }
+    }
+}
+
+/// The list of a library.
+#[must_use]
+pub fn list(entries: &[Entry], folder: &Path) -> String {
+    if entries.is_empty() {
+        return format!(
+            "no calibration in {}; store one with 'palpate calibration import'",
+            folder.display()
+        );
+    }
+    let mut lines = vec![
+        ["id", "name", "rig", "cell", "age", "state"]
+            .map(String::from)
+            .to_vec(),
+    ];
+    lines.extend(entries.iter().map(|one| {
+        let age = one
+            .age_days
+            .map_or("not stated".to_owned(), |age| format!("{age} d"));
+        vec![
+            one.id.clone(),
+            one.name.clone(),
+            one.rig.clone(),
+            one.cell.clone(),
+            age,
+            one.state(),
+        ]
+    }));
+    in_columns(&lines)
+}
+
+/// The uncertainty of one force and where it comes from, in N.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Budget {
+    /// The force.
+    pub force_n: f64,
+    /// All terms together; null where nothing is stated.
+    pub uncertainty_n: Option<f64>,
+    /// Every term; null where it is not stated.
+    pub terms: Vec<BudgetTerm>,
+}
+
+/// One term of it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct BudgetTerm {
+    /// Where it comes from.
+    pub term: Term,
+    /// Its standard uncertainty in N; null where it is not stated.
+    pub uncertainty_n: Option<f64>,
+}
+
+/// All that is told of a calibration.
+#[derive(Clone, Debug, Serialize)]
+pub struct Told {
+    /// What it is like.
+    pub quality: Quality,
+    /// Every curve tried, the best first.
+    pub candidates: Vec<Candidate>,
+    /// The curve in use.
+    pub chosen: Option<Candidate>,
+    /// Uncertainty at each weight and half-way to the next.
+    pub budget: Vec<Budget>,
+    /// The same as a function.
+    #[serde(skip)]
+    pub uncertainty: ForceUncertainty,
+}
+
+impl Told {
+    /// Finds all of it.
+    pub fn of(calibration: &Calibration) -> Result<Self, CalibrationError> {
+        let points = calibration.points()?;
+        let uncertainty = ForceUncertainty::of(calibration)?;
+        let mut forces: Vec<f64> = points.iter().map(|point| point.newtons.0).collect();
+        forces.extend(
+            points
+                .windows(2)
+                .map(|pair| 0.5 * (pair[0].newtons.0 + pair[1].newtons.0)),
+        );
+        forces.sort_by(f64::total_cmp);
+        let budget = |&force_n: &f64| Budget {
+            force_n,
+            uncertainty_n: uncertainty.sigma(Newtons(force_n)).map(|sigma| sigma.0),
+            terms: Term::ALL
+                .map(|term| BudgetTerm {
+                    term,
+                    uncertainty_n: uncertainty
+                        .term_sigma(term, Newtons(force_n))
+                        .map(|sigma| sigma.0),
+                })
+                .to_vec(),
+        };
+        Ok(Self {
+            quality: calibration.quality()?,
+            candidates: candidates(&points),
+            chosen: judge_kind(&calibration.curve, &points),
+            budget: forces.iter().map(budget).collect(),
+            uncertainty,
+        })
+    }
+}
+
+/// The page of a calibration.
+#[must_use]
+pub fn whole(
+    calibration: &Calibration,
+    id: Option<&str>,
+    told: &Told,
+    doubts: &[String],
+) -> String {
+    let mut parts = vec![head(calibration, id)];
+    parts.push(points(&told.quality));
+    parts.push(curves(calibration, told));
+    parts.push(spread(&told.quality));
+    if told.uncertainty.is_stated() {
+        parts.push(budget(told));
+    }
+    let sentences = told.quality.findings.iter().chain(doubts);
+    parts.push(
+        sentences
+            .map(|one| format!("- {one}"))
+            .collect::<Vec<_>>()
+            .join("\n"),
+    );
+    parts.retain(|part| !part.is_empty());
+    parts.join("\n\n")
+}
+
+fn head(calibration: &Calibration, id: Option<&str>) -> String {
+    let mut lines = vec![calibration.name.clone()];
+    let mut fact = |name: &str, value: String| {
+        if !value.is_empty() {
+            lines.push(format!("  {name:<12} {value}"));
+        }
+    };
+    fact("id", id.unwrap_or_default().to_owned());
+    fact("source", calibration.source.clone());
+    fact("taken", calibration.taken_at.clone().unwrap_or_default());
+    fact("operator", calibration.operator.clone());
+    fact("rig", calibration.rig.clone());
+    fact("cell", calibration.cell.clone());
+    fact(
+        "excitation",
+        calibration
+            .excitation
+            .map_or(String::new(), |volts| volts.to_string()),
+    );
+    fact(
+        "supersedes",
+        calibration.supersedes.clone().unwrap_or_default(),
+    );
+    fact("curve", calibration.curve.to_string());
+    lines.join("\n")
+}
+
+fn points(quality: &Quality) -> String {
+    let some = |value: Option<f64>, digits: usize| {
+        value.map_or("-".to_owned(), |value| format!("{value:.digits$}"))
+    };
+    let heads = [
+        "mass (g)",
+        "force (N)",
+        "signal (V)",
+        "readings",
+        "residual (mN)",
+        "V/N",
+        "load - unload (mV)",
+        "u (N)",
+    ];
+    let mut lines = vec![heads.map(String::from).to_vec()];
+    lines.extend(quality.points.iter().map(|one| {
+        vec![
+            format!("{:.1}", one.mass_g),
+            format!("{:.3}", one.force_n),
+            format!("{:.5}", one.signal_v),
+            one.readings.to_string(),
+            // A curve that meets its points leaves nothing but rounding.
+            format!("{:.1}", one.residual_n * 1e3 + 0.0),
+            format!("{:.4}", one.sensitivity_v_per_n),
+            some(one.hysteresis_v.map(|volts| volts * 1e3), 2),
+            some(one.uncertainty_n, 3),
+        ]
+    }));
+    in_columns(&lines)
+}
+
+fn curves(calibration: &Calibration, told: &Told) -> String {
+    let newtons = |value: Option<f64>| value.map_or("-".to_owned(), |value| format!("{value:.3}"));
+    let heads = [
+        "curve",
+        "left out, rms (N)",
+        "worst (N)",
+        "ends, rms (N)",
+        "residuals, rms (mN)",
+        "",
+    ];
+    let mut lines = vec![heads.map(String::from).to_vec()];
+    let is_chosen = |one: &Candidate| one.curve == calibration.curve;
+    let own = told
+        .chosen
+        .iter()
+        .filter(|_| !told.candidates.iter().any(is_chosen));
+    for one in told.candidates.iter().chain(own) {
+        let square: f64 = one
+            .residuals_n
+            .iter()
+            .map(|residual| residual * residual)
+            .sum();
+        let count = one.residuals_n.len().max(1) as f64;
+        if let Some(reason) = &one.refused {
+            lines.push(vec![one.name.clone(), reason.clone()]);
+            continue;
+        }
+        let through = match &one.curve {
+            CurveKind::Segments { through_g } => {
+                let masses: Vec<String> = through_g.iter().map(|mass| mass.to_string()).collect();
+                format!("through {} g", masses.join(", "))
+            }
+            _ => String::new(),
+        };
+        let mark = if is_chosen(one) { "in use " } else { "" };
+        lines.push(vec![
+            one.name.clone(),
+            newtons(one.left_out_rms_n),
+            newtons(one.left_out_worst_n),
+            newtons(one.left_out_ends_rms_n),
+            format!("{:.1}", (square / count).sqrt() * 1e3),
+            format!("{mark}{through}"),
+        ]);
+    }
+    in_columns(&lines)
+}
+
+fn spread(quality: &Quality) -> String {
+    let mut lines = Vec::new();
+    lines.push(match &quality.hysteresis {
+        Some(one) => format!(
+            "hysteresis: at most {:.2} mV or {:.3} N, rms {:.2} mV or {:.3} N",
+            one.max_v * 1e3,
+            one.max_n,
+            one.rms_v * 1e3,
+            one.rms_n
+        ),
+        None => "hysteresis: not taken; go down again weight by weight".to_owned(),
+    });
+    lines.push(match quality.repeatability_v {
+        Some(volts) => format!(
+            "repeatability: {:.2} mV from reading to reading",
+            volts * 1e3
+        ),
+        None => "repeatability: not taken; repeat the series".to_owned(),
+    });
+    lines.push(match (quality.zero_shift_v, quality.zero_shift_n) {
+        (Some(volts), Some(newtons)) => {
+            format!("zero shift: {:+.2} mV or {newtons:+.3} N", volts * 1e3)
+        }
+        _ => "zero shift: not taken; read the empty cell before and after".to_owned(),
+    });
+    lines.join("\n")
+}
+
+/// The uncertainty by its terms, those that are stated.
+fn budget(told: &Told) -> String {
+    let stated: Vec<Term> = Term::ALL
+        .into_iter()
+        .filter(|term| !told.uncertainty.not_stated().contains(term))
+        .collect();
+    let mut heads = vec!["force (N)".to_owned(), "u (N)".to_owned()];
+    heads.extend(stated.iter().map(|term| term.word().to_owned()));
+    let mut lines = vec![heads];
+    lines.extend(told.budget.iter().map(|one| {
+        let number = |value: Option<f64>| format!("{:.4}", value.unwrap_or_default());
+        let mut line = vec![format!("{:.3}", one.force_n), number(one.uncertainty_n)];
+        let own = one.terms.iter().filter(|own| stated.contains(&own.term));
+        line.extend(own.map(|own| number(own.uncertainty_n)));
+        line
+    }));
+    in_columns(&lines)
+}
+
+/// The answer of a check.
+#[must_use]
+pub fn check(result: &CheckResult) -> String {
+    let verdict = if result.is_passed { "passed" } else { "FAILED" };
+    let own = result
+        .uncertainty_n
+        .map_or("not stated by the calibration".to_owned(), |sigma| {
+            format!("{sigma:.3} N from calibration and weight")
+        });
+    let mut lines = vec![
+        format!("{verdict}: {}", result.sentence),
+        format!("  standard uncertainty of this error: {own}"),
+    ];
+    lines.extend(result.doubts.iter().map(|doubt| format!("- {doubt}")));
+    lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::calibration::KnownWeight;
+    use palpate_model::units::Volts;
+
+    #[test]
+    fn the_page_tells_every_weight_every_curve_and_every_finding() {
+        let thesis = Calibration::thesis();
+        let told = Told::of(&thesis).unwrap();
+        let page = whole(&thesis, Some("id-1"), &told, &["a doubt".into()]);
+        for weight in &told.quality.points {
+            assert!(
+                page.contains(&format!("{:.1} ", weight.mass_g)),
+                "{}",
+                weight.mass_g
+            );
+        }
+        for one in &told.candidates {
+            assert!(page.contains(&one.name), "{}", one.name);
+        }
+        for sentence in &told.quality.findings {
+            assert!(page.contains(sentence), "{sentence}");
+        }
+        assert!(page.contains("hysteresis: not taken") && page.contains("- a doubt"));
+        assert!(page.contains("digits of the readings") && !page.contains("NaN"));
+        assert_eq!(page.matches("in use").count(), 1);
+    }
+
+    #[test]
+    fn a_straight_line_of_two_points_has_a_page_too() {
+        let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
+        let told = Told::of(&line).unwrap();
+        let page = whole(&line, None, &told, &[]);
+        assert!(
+            page.contains("monotone interpolation") && !page.contains("NaN"),
+            "{page}"
+        );
+        assert!(!picture(&line, &told).contains("NaN"));
+    }
+
+    #[test]
+    fn a_check_says_what_it_found() {
+        let weight = KnownWeight {
+            mass_g: 840.0,
+            tolerance_g: Some(0.1),
+            volts: Volts(2.60),
+            tare: Volts(1.28),
+            limit_percent: None,
+        };
+        let text = check(&Calibration::thesis().check(&weight).unwrap());
+        assert!(text.starts_with("FAILED: 840 g reads"), "{text}");
+        assert!(text.contains("from calibration and weight"), "{text}");
+    }
+}

@@ -1,0 +1,121 @@
+//! An analysis of cycles as people and machines read it: a table, one JSON object, a picture.
+
+mod json;
+mod plot;
+mod text;
+
+pub use json::object;
+pub use plot::picture;
+pub use text::whole;
+
+use palpate_model::cycles::{
+    CycleAnalysis, CycleSample, Prediction, PredictionError, Sinusoid, SinusoidError, Steadiness,
+    SteadyRule, analyse, predict, sinusoid,
+};
+use palpate_model::fit::FitSample;
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, Newtons};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_protocols::cycles::CycleSource;
+
+/// What is asked of an analysis.
+#[derive(Clone, Debug, Default)]
+pub struct Question {
+    /// Depth of the stiffness; 80 % of the first cycle's depth without it.
+    pub at: Option<Depth>,
+    /// When cycles count as steady.
+    pub rule: SteadyRule,
+    /// Frequency in Hz of a record that is one sine.
+    pub frequency: Option<f64>,
+    /// A body fitted elsewhere whose prediction is compared.
+    pub body: Option<ModifiedKelvin>,
+}
+
+/// Everything found in one record.
+#[derive(Clone, Debug)]
+pub struct CycleReport {
+    /// What was analysed.
+    pub name: String,
+    /// Its samples.
+    pub source: CycleSource,
+    /// Every way in with what belongs to it.
+    pub cycles: Vec<CycleAnalysis>,
+    /// Changes between them.
+    pub steadiness: Steadiness,
+    /// The rule by which they were judged.
+    pub rule: SteadyRule,
+    /// The sines, or why one could not be evaluated.
+    pub sines: Vec<Result<Sinusoid, SinusoidError>>,
+    /// For each cycle, where a body was given, what it predicts.
+    pub predictions: Vec<Result<Prediction, PredictionError>>,
+}
+
+impl CycleReport {
+    /// Analyses a record.
+    #[must_use]
+    pub fn of(name: String, source: CycleSource, question: &Question) -> Self {
+        let sines = match question.frequency {
+            Some(frequency) => vec![sinusoid(&source.samples, frequency)],
+            None => {
+                let runs = source.sines.iter();
+                runs.map(|(frequency, range)| sinusoid(&source.samples[range.clone()], *frequency))
+                    .collect()
+            }
+        };
+        // A table that is one sine has no ways in worth a name.
+        let cycles = match question.frequency {
+            Some(_) => Vec::new(),
+            None => analyse(&source.samples, question.at),
+        };
+        let predictions = match &question.body {
+            Some(body) => cycles
+                .iter()
+                .map(|one| prediction(body, &source, one))
+                .collect(),
+            None => Vec::new(),
+        };
+        Self {
+            steadiness: question.rule.judge(&cycles),
+            rule: question.rule,
+            name,
+            source,
+            cycles,
+            sines,
+            predictions,
+        }
+    }
+
+    /// Samples of the n-th cycle analysed.
+    fn samples(&self, index: usize) -> impl Iterator<Item = &CycleSample> + Clone {
+        let cycle = &self.cycles[index];
+        let end = cycle.start.0 + cycle.duration.0;
+        self.source
+            .samples
+            .iter()
+            .filter(move |one| one.t.0 >= cycle.start.0 && one.t.0 <= end)
+    }
+}
+
+/// The way in and the hold of one cycle, predicted: what the body knows, which knows no way back.
+fn prediction(
+    body: &ModifiedKelvin,
+    source: &CycleSource,
+    cycle: &CycleAnalysis,
+) -> Result<Prediction, PredictionError> {
+    let end = cycle.start.0 + cycle.duration.0;
+    let samples: Vec<FitSample> = source
+        .samples
+        .iter()
+        .enumerate()
+        .filter(|(_, one)| one.t.0 >= cycle.start.0 && one.t.0 <= end)
+        .filter(|(_, one)| matches!(one.phase, Phase::Ramp | Phase::Hold))
+        .map(|(index, one)| FitSample {
+            t: one.t,
+            depth: source.own_depth(index),
+            force: one.force,
+            // Every sample counts alike.
+            sigma: Newtons(1.0),
+        })
+        .collect();
+    predict(body, &samples)
+}

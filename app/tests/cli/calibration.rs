@@ -1,0 +1,240 @@
+//! `palpate calibration` as a user meets it.
+
+use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use palpate_model::calibration::Calibration;
+use std::fmt::Write;
+use std::fs;
+use std::path::Path;
+
+/// A table of the simulated lab cell, up and down, with readings of five digits.
+fn table(folder: &Path, name: &str, shift: f64) {
+    let steps = Calibration::thesis().steps;
+    let mut text = "mass_g,volts,direction\n".to_owned();
+    for step in &steps {
+        writeln!(text, "{},{:.5},loading", step.mass_g, step.volts.0 + shift).expect("a table");
+    }
+    for step in steps.iter().rev() {
+        // 1 mV of hysteresis in the middle.
+        let gap = 1e-3 * (step.mass_g / 1040.0) * (1.0 - step.mass_g / 1040.0) * 4.0;
+        writeln!(
+            text,
+            "{},{:.5},unloading",
+            step.mass_g,
+            step.volts.0 + gap + shift
+        )
+        .expect("a table");
+    }
+    fs::write(folder.join(name), text).expect("a table");
+}
+
+#[test]
+fn a_calibration_is_imported_listed_checked_used_and_superseded() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "cell.csv", 0.0);
+    let import = [
+        "calibration",
+        "import",
+        "cell.csv",
+        "--name",
+        "bench",
+        "--rig",
+        "sim",
+    ];
+    let more = [
+        "--tolerance",
+        "0.05",
+        "--taken-at",
+        "2020-01-01T00:00:00Z",
+        "--json",
+    ];
+    let made = palpate(
+        at,
+        &[&import[..], &more, &["--picture", "cell.svg"]].concat(),
+    );
+    succeeded(&made);
+    let made = json(&made);
+    let id = made["id"].as_str().unwrap().to_owned();
+    assert!(id.starts_with("20200101-bench-"), "{id}");
+    let finding = made["quality"]["findings"][0].as_str().unwrap();
+    assert!(finding.starts_with("from 340 g to 640 g"), "{finding}");
+    assert!(made["candidates"].as_array().unwrap().len() > 8);
+    let worst = made["quality"]["hysteresis"]["max_v"].as_f64().unwrap();
+    assert!((9e-4..1.01e-3).contains(&worst), "{worst}");
+    assert!(
+        fs::read_to_string(at.join("cell.svg"))
+            .unwrap()
+            .contains("flat stretch")
+    );
+
+    let again = palpate(at, &[&import[..], &more].concat());
+    assert_eq!(again.status.code(), Some(2));
+    assert!(stderr(&again).contains("already"), "{}", stderr(&again));
+
+    // In date it is not, and every use says so.
+    let run = short_run(at, "session", &["--calibration", "bench"]);
+    succeeded(&run);
+    assert!(
+        stderr(&run).contains("was valid for 365"),
+        "{}",
+        stderr(&run)
+    );
+    let fit = palpate(at, &["fit", "session", "--json"]);
+    succeeded(&fit);
+    let fit = json(&fit);
+    assert_eq!(fit["systematic"]["calibration"], "bench");
+    let terms = fit["systematic"]["parameters"][0]["terms"]
+        .as_array()
+        .unwrap();
+    let names: Vec<&str> = terms
+        .iter()
+        .map(|one| one["term"].as_str().unwrap())
+        .collect();
+    assert!(
+        names.contains(&"weights") && names.contains(&"hysteresis"),
+        "{names:?}"
+    );
+    let tau = &fit["parameters"][0];
+    assert!(tau["systematic_error"].as_f64().unwrap() > 0.0, "{tau}");
+    let plain = json(&palpate(
+        at,
+        &["fit", "session", "--json", "--no-systematic"],
+    ));
+    assert!(
+        plain.get("systematic").is_none()
+            && plain["parameters"][0].get("systematic_error").is_none()
+    );
+    assert_eq!(plain["parameters"][0]["std_error"], tau["std_error"]);
+
+    table(at, "newer.csv", 0.01);
+    let newer = [
+        "calibration",
+        "supersede",
+        "bench",
+        "newer.csv",
+        "--name",
+        "bench",
+        "--rig",
+        "sim",
+    ];
+    succeeded(&palpate(at, &newer));
+    let list = json(&palpate(at, &["calibration", "list", "--json"]));
+    let list = list["calibrations"].as_array().unwrap();
+    assert_eq!(list.len(), 2);
+    let old = list.iter().find(|one| one["id"] == id.as_str()).unwrap();
+    let new = list.iter().find(|one| one["id"] != id.as_str()).unwrap();
+    assert_eq!(old["superseded_by"], new["id"]);
+    assert_eq!(
+        (&new["is_in_force"], &old["is_in_force"]),
+        (&true.into(), &false.into())
+    );
+    let shown = palpate(at, &["calibration", "show", "bench"]);
+    assert!(
+        stdout(&shown).contains(&format!("supersedes   {id}")),
+        "{}",
+        stdout(&shown)
+    );
+}
+
+#[test]
+fn a_check_passes_fails_and_refuses() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let check = |volts: &str, mass: &str| {
+        let args = ["--mass", mass, "--volts", volts, "--tare", "1.28", "--json"];
+        palpate(
+            at,
+            &[&["calibration", "check", "thesis"][..], &args].concat(),
+        )
+    };
+    let passed = check("2.551", "840");
+    succeeded(&passed);
+    assert_eq!(json(&passed)["is_passed"], true);
+    let failed = check("2.60", "840");
+    assert_eq!(failed.status.code(), Some(1));
+    let first = stdout(&failed)
+        .lines()
+        .next()
+        .unwrap_or_default()
+        .to_owned();
+    let first: serde_json::Value = serde_json::from_str(&first).unwrap();
+    assert_eq!(first["is_passed"], false);
+    assert_eq!(check("2.55", "-1").status.code(), Some(2));
+}
+
+#[test]
+fn mistakes_get_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, "cell.csv", 0.0);
+    fs::write(at.join("poor.csv"), "mass_g,volts\n0,1.2\n100,lots\n").unwrap();
+    for (args, words) in [
+        (&["show", "nothing"][..], "no calibration \"nothing\""),
+        (&["import", "cell.csv"], "has no name"),
+        (
+            &["import", "poor.csv", "--name", "p"],
+            "line 3 has \"lots\" for volts",
+        ),
+        (
+            &["import", "none.csv", "--name", "p"],
+            "cannot read none.csv",
+        ),
+        (
+            &[
+                "import",
+                "cell.csv",
+                "--name",
+                "p",
+                "--curve",
+                "polynomial=5",
+            ],
+            "does not rise everywhere",
+        ),
+        (
+            &[
+                "import",
+                "cell.csv",
+                "--name",
+                "p",
+                "--curve",
+                "segments=11",
+            ],
+            "not possible through 11 weights",
+        ),
+        (
+            &["import", "cell.csv", "--name", "p", "--curve", "spline"],
+            "give best, monotone",
+        ),
+        (
+            &["import", "cell.csv", "--name", "p", "--tolerance", "-1"],
+            "tolerance",
+        ),
+        (
+            &["import", "cell.csv", "--name", "p", "--taken-at", "monday"],
+            "no RFC 3339 time",
+        ),
+        (
+            &["supersede", "none", "cell.csv", "--name", "p"],
+            "no calibration \"none\"",
+        ),
+    ] {
+        let output = palpate(at, &[&["calibration"][..], args].concat());
+        assert_eq!(
+            output.status.code(),
+            Some(2),
+            "{args:?}: {}",
+            stderr(&output)
+        );
+        assert!(
+            stderr(&output).contains(words),
+            "{args:?}: {}",
+            stderr(&output)
+        );
+    }
+    let list = palpate(at, &["calibration", "list"]);
+    assert!(
+        stdout(&list).contains("store one with"),
+        "{}",
+        stdout(&list)
+    );
+}

@@ -1,0 +1,204 @@
+//! The keys of one step or monitor, read by their table: kinds, ranges, what is unknown and what is missing.
+
+use super::problem::{Problems, nearest, suggestion};
+use super::quantity::{Given, Kind, What};
+use super::scope::Scope;
+use super::tree::Table;
+use super::words::{Key, Need, Range};
+
+/// Longest time, in s: a day is longer than any specimen lasts.
+const TIME_MAX: f64 = 86_400.0;
+/// Largest of everything else, in the unit of its kind: longer than any slider, stronger than any cell here.
+const SIZE_MAX: f64 = 1000.0;
+/// Largest mass, in g: the weight that is as strong.
+const MASS_MAX: f64 = 100_000.0;
+/// Largest count.
+pub(super) const COUNT_MAX: f64 = 10_000.0;
+
+/// What to do about steps below another [table]: everything belongs to the last one above it.
+pub(super) const STEPS_HINT: &str = "write [procedure] on a line above it";
+
+/// Values of keys that were checked.
+pub(super) struct Args(Vec<(&'static str, Given)>);
+
+impl Args {
+    /// Reads the keys of a table. `what` names it in sentences, `besides` are keys that are read elsewhere.
+    pub fn read(
+        table: &Table,
+        what: &str,
+        keys: &[&'static [Key]],
+        besides: &[&'static str],
+        scope: &Scope,
+        problems: &mut Problems,
+    ) -> Self {
+        let all = || keys.iter().copied().flatten();
+        let mut args = Vec::new();
+        // A key that is only misspelt is told once, not as unknown and as missing too.
+        let mut meant = Vec::new();
+        for entry in &table.entries {
+            if besides.contains(&entry.key.as_str()) {
+                continue;
+            }
+            let Some(key) = all().find(|key| key.name == entry.key) else {
+                let known: Vec<&str> = besides
+                    .iter()
+                    .copied()
+                    .chain(all().map(|key| key.name))
+                    .collect();
+                meant.extend(nearest(&entry.key, known.iter().copied()));
+                let hint = match entry.key.as_str() {
+                    "steps" => STEPS_HINT.into(),
+                    key => suggestion(key, &known),
+                };
+                problems.error(
+                    entry.line,
+                    format!("{what} has no key '{}'; {hint}", entry.key),
+                );
+                continue;
+            };
+            let value = scope
+                .value(&entry.node, key.kind)
+                .and_then(|given| checked(key, given))
+                .map_err(|why| format!("'{}' of {what}: {why}", key.name));
+            match problems.take(entry.line, value) {
+                // "none" is as good as no key where a key may be left out.
+                Some(given) if given.what == What::None && key.kind != Kind::Flag => match key.need
+                {
+                    Need::Required if !table.entries.iter().any(|entry| entry.key == "only_if") => {
+                        problems.error(
+                            entry.line,
+                            format!(
+                                "'{}' of {what} cannot be none; give {}",
+                                key.name,
+                                key.kind.example()
+                            ),
+                        );
+                    }
+                    _ => {}
+                },
+                Some(given) => args.push((key.name, given)),
+                None => {}
+            }
+        }
+        for key in all() {
+            if table.get(key.name).is_some() && !matches!(key.need, Need::Usual(_)) {
+                continue;
+            }
+            match key.need {
+                Need::Required if meant.contains(&key.name) => {}
+                Need::Required => problems.error(
+                    table.line,
+                    format!(
+                        "{what} needs '{}': {}; write {} = {}",
+                        key.name,
+                        key.about,
+                        key.name,
+                        key.kind.example()
+                    ),
+                ),
+                Need::Usual(text) if !args.iter().any(|(name, _)| *name == key.name) => {
+                    args.push((key.name, Given::of_text(text)));
+                }
+                Need::Usual(_) | Need::Optional => {}
+            }
+        }
+        Self(args)
+    }
+
+    fn get(&self, key: &str) -> Option<&Given> {
+        let found = self.0.iter().find(|(name, _)| *name == key);
+        found.map(|(_, given)| given)
+    }
+
+    pub fn has(&self, key: &str) -> bool {
+        self.get(key).is_some()
+    }
+
+    pub fn maybe(&self, key: &str) -> Option<f64> {
+        match self.get(key)?.what {
+            What::Number(_, number) => Some(number),
+            _ => None,
+        }
+    }
+
+    pub fn number(&self, key: &str) -> Result<f64, String> {
+        self.maybe(key)
+            .ok_or_else(|| format!("'{key}' has no value"))
+    }
+
+    pub fn count(&self, key: &str) -> Result<u32, String> {
+        // Counts were checked to be whole and small.
+        self.number(key).map(|number| number as u32)
+    }
+
+    pub fn maybe_text(&self, key: &str) -> Option<&str> {
+        self.get(key).map(|given| given.text.as_str())
+    }
+
+    pub fn text(&self, key: &str) -> Result<&str, String> {
+        self.maybe_text(key)
+            .ok_or_else(|| format!("'{key}' has no value"))
+    }
+
+    pub fn is_true(&self, key: &str) -> bool {
+        self.get(key)
+            .is_some_and(|given| given.what == What::Flag(true))
+    }
+
+    /// Whether the key is there and says no.
+    pub fn is_no(&self, key: &str) -> bool {
+        self.get(key)
+            .is_some_and(|given| matches!(given.what, What::Flag(false) | What::None))
+    }
+}
+
+/// A value of the right kind and within the range of its key.
+fn checked(key: &Key, given: Given) -> Result<Given, String> {
+    match key.kind {
+        _ if given.what == What::None => Ok(given),
+        // Anything that is there, beside false, counts as yes.
+        Kind::Flag if key.name == "only_if" => Ok(given),
+        Kind::Flag => match given.what {
+            What::Flag(_) => Ok(given),
+            _ => Err(given.is_not(Kind::Flag)),
+        },
+        Kind::Text => match key.range {
+            Range::OneOf(words) if !words.contains(&given.text.as_str()) => Err(format!(
+                "'{}' is not possible; {}",
+                given.text,
+                suggestion(&given.text, words)
+            )),
+            _ if given.text.trim().is_empty() => Err("it says nothing; write a text".into()),
+            _ => Ok(given),
+        },
+        kind => {
+            let number = given.number(kind)?;
+            check_range(kind, key.range, number)
+                .map_err(|why| format!("{} is not possible; {why}", given.text))?;
+            Ok(given)
+        }
+    }
+}
+
+/// Whether a number of a kind is within a range, or what to give.
+pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), String> {
+    let most = match kind {
+        Kind::Time => TIME_MAX,
+        Kind::Count => COUNT_MAX,
+        Kind::Mass => MASS_MAX,
+        _ => SIZE_MAX,
+    };
+    let (is_within, least) = match range {
+        Range::Above0 => (number > 0.0, "more than 0"),
+        Range::From0 => (number >= 0.0, "0"),
+        Range::Any | Range::OneOf(_) => (number >= -most, "less"),
+    };
+    if is_within && number <= most {
+        return Ok(());
+    }
+    let unit = kind.unit();
+    Err(match range {
+        Range::Any | Range::OneOf(_) => format!("give -{most} to {most} {unit}"),
+        _ => format!("give {least} and at most {most} {unit}"),
+    })
+}

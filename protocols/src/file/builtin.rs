@@ -1,0 +1,37 @@
+//! The protocols that come with the program: files like any other, and the examples to copy.
+
+use super::Protocol;
+use super::problem::Problem;
+
+macro_rules! built_in {
+    ($($name:literal)*) => {
+        /// Name and text of every built-in protocol, in the order of a day's work.
+        pub const BUILT_IN: &[(&str, &str)] = &[
+            $(($name, include_str!(concat!("../../builtin/", $name, ".toml")))),*
+        ];
+    };
+}
+
+built_in! {
+    "load-cell-calibration"
+    "zeroing"
+    "check-home"
+    "stiff-surface"
+    "preconditioning"
+    "preconditioning-force"
+    "ramp-hold"
+    "validation-series"
+    "relaxation-series"
+    "multi-step-relaxation"
+    "creep"
+    "sine"
+    "frequency-sweep"
+    "free-jog"
+}
+
+/// The built-in protocol of a name, `None` if there is none.
+#[must_use]
+pub fn built_in(name: &str) -> Option<Result<Protocol, Vec<Problem>>> {
+    let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
+    Some(Protocol::read(text))
+}

@@ -1,0 +1,204 @@
+//! What is wrong with a protocol: where, what, what to do.
+
+use serde::Serialize;
+use std::fmt;
+
+/// Problems told of one file. More would hide the first.
+pub const PROBLEMS_MAX: usize = 20;
+
+/// How bad it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Severity {
+    /// The protocol cannot run.
+    Error,
+    /// It can, but perhaps not as meant.
+    Warning,
+}
+
+/// One thing that is wrong, as a sentence.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize)]
+pub struct Problem {
+    /// Line of the file, from 1; 0 where it is not in the file.
+    pub line: u32,
+    /// How bad.
+    pub severity: Severity,
+    /// What is wrong and what to do.
+    pub message: String,
+}
+
+impl Problem {
+    /// Something that keeps the protocol from running.
+    #[must_use]
+    pub fn error(line: u32, message: impl Into<String>) -> Self {
+        Self {
+            line,
+            severity: Severity::Error,
+            message: message.into(),
+        }
+    }
+
+    /// Something to look at.
+    #[must_use]
+    pub fn warning(line: u32, message: impl Into<String>) -> Self {
+        Self {
+            severity: Severity::Warning,
+            ..Self::error(line, message)
+        }
+    }
+
+    /// Whether it keeps the protocol from running.
+    #[must_use]
+    pub fn is_error(&self) -> bool {
+        self.severity == Severity::Error
+    }
+}
+
+impl fmt::Display for Problem {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.line > 0 {
+            write!(f, "line {}: ", self.line)?;
+        }
+        if self.severity == Severity::Warning {
+            f.write_str("warning: ")?;
+        }
+        f.write_str(&self.message)
+    }
+}
+
+/// The problems found so far: each once, and not too many.
+#[derive(Debug, Default)]
+pub(super) struct Problems {
+    found: Vec<Problem>,
+    dropped: usize,
+    /// How often something was wrong, repeats included.
+    count: usize,
+}
+
+impl Problems {
+    pub fn error(&mut self, line: u32, message: impl Into<String>) {
+        self.push(Problem::error(line, message));
+    }
+
+    /// The pass of a loop finds what the pass before found: it is told once.
+    pub fn push(&mut self, problem: Problem) {
+        self.count += 1;
+        if self.found.contains(&problem) {
+            return;
+        }
+        if self.found.len() < PROBLEMS_MAX {
+            self.found.push(problem);
+        } else {
+            self.dropped += 1;
+        }
+    }
+
+    /// The value, or its problem put down.
+    pub fn take<T>(&mut self, line: u32, result: Result<T, String>) -> Option<T> {
+        result.map_err(|message| self.error(line, message)).ok()
+    }
+
+    /// How often something was wrong, for comparing before and after.
+    pub fn count(&self) -> usize {
+        self.count
+    }
+
+    pub fn has_errors(&self) -> bool {
+        self.found.iter().any(Problem::is_error)
+    }
+
+    /// Whether there is no use in looking on.
+    pub fn is_full(&self) -> bool {
+        self.dropped > 0
+    }
+
+    /// All of them in the order of the text.
+    pub fn into_list(mut self) -> Vec<Problem> {
+        self.found.sort_by_key(|problem| problem.line);
+        if self.dropped > 0 {
+            let message = "there are more problems than these; correct these and check again";
+            self.found.push(Problem::error(0, message));
+        }
+        self.found
+    }
+}
+
+/// The known word nearest to one that is not known, if it is near.
+pub(super) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+    let near = known
+        .into_iter()
+        .map(|candidate| (distance(word, candidate), candidate));
+    let best = near.min_by_key(|(distance, _)| *distance)?;
+    // Half of a short word may be wrong, never more than three letters.
+    (best.0 <= (best.1.chars().count() / 2).clamp(1, 3)).then_some(best.1)
+}
+
+/// "; did you mean 'x'?" or, with nothing near, the list of what is known.
+pub(super) fn suggestion(word: &str, known: &[&str]) -> String {
+    match nearest(word, known.iter().copied()) {
+        Some(near) => format!("did you mean '{near}'?"),
+        None if known.is_empty() => "there is none here".into(),
+        None => format!("choose from {}", known.join(", ")),
+    }
+}
+
+/// Edits between two words (Levenshtein 1966), `-` and `_` taken for the same.
+fn distance(a: &str, b: &str) -> usize {
+    let letters = |word: &str| -> Vec<char> {
+        let same = |letter| if letter == '_' { '-' } else { letter };
+        word.to_lowercase().chars().take(40).map(same).collect()
+    };
+    let (a, b) = (letters(a), letters(b));
+    let mut row: Vec<usize> = (0..=b.len()).collect();
+    for (i, from) in a.iter().enumerate() {
+        let mut diagonal = row[0];
+        row[0] = i + 1;
+        for (j, to) in b.iter().enumerate() {
+            let replaced = diagonal + usize::from(from != to);
+            diagonal = row[j + 1];
+            row[j + 1] = replaced.min(row[j] + 1).min(diagonal + 1);
+        }
+    }
+    row[b.len()]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn near_words_are_found_and_far_ones_are_not() {
+        let known = ["ramp", "retract", "rest", "find-contact"];
+        for (word, near) in [
+            ("rmap", Some("ramp")),
+            ("find_contact", Some("find-contact")),
+            ("Ramp", Some("ramp")),
+            ("retrat", Some("retract")),
+            ("calibrate", None),
+        ] {
+            assert_eq!(nearest(word, known), near, "{word}");
+        }
+        assert_eq!(distance("kitten", "sitting"), 3);
+        assert!(suggestion("zzzzzz", &known).contains("choose from ramp"));
+    }
+
+    #[test]
+    fn problems_are_told_once_and_not_without_end() {
+        let mut problems = Problems::default();
+        for _ in 0..3 {
+            problems.error(7, "twice");
+        }
+        for line in 0..100 {
+            problems.error(line, "each");
+        }
+        assert!(problems.is_full());
+        let list = problems.into_list();
+        assert_eq!(list.len(), PROBLEMS_MAX + 1);
+        assert_eq!(
+            list.iter()
+                .filter(|problem| problem.message == "twice")
+                .count(),
+            1
+        );
+    }
+}

@@ -1,0 +1,357 @@
+//! The steps of a protocol written out: loops unrolled, names replaced by values.
+
+use super::args::{Args, COUNT_MAX};
+use super::problem::{Problems, suggestion};
+use super::quantity::{Given, Kind, What};
+use super::scope::Scope;
+use super::tree::{Node, Table, Value};
+use super::words::{COMMON, Key, Need, Range, WORDS};
+use crate::plans::{OnFailure, PlannedStep};
+
+/// Steps and passes of loops in one plan. A day of steps of ten seconds each.
+pub(super) const STEPS_MAX: usize = 10_000;
+
+/// Loops in one another.
+const LOOPS_MAX: usize = 6;
+
+/// Keys of a loop, beside what it runs through.
+pub(super) const LOOP_KEYS: [Key; 5] = [
+    loop_key(
+        "as",
+        Kind::Text,
+        "name for the number of the pass, from 1: `$name` in values, `{name}` in texts",
+    ),
+    loop_key(
+        "reverse",
+        Kind::Flag,
+        "`true` runs through the values backwards",
+    ),
+    loop_key(
+        "cycle",
+        Kind::Flag,
+        "`true`: each pass is one repeat of the measurement; repeats are numbered 1, 2, 3 through the whole plan",
+    ),
+    loop_key(
+        "checkpoint",
+        Kind::Text,
+        "name of a place behind each pass where the run may pause",
+    ),
+    loop_key(
+        "only_if",
+        Kind::Flag,
+        "leaves the loop out where this is `false` or `\"none\"`",
+    ),
+];
+
+const fn loop_key(name: &'static str, kind: Kind, about: &'static str) -> Key {
+    Key {
+        name,
+        kind,
+        range: Range::Any,
+        need: Need::Optional,
+        about,
+    }
+}
+
+/// A step with the line it came from.
+pub(super) struct Placed {
+    pub planned: PlannedStep,
+    pub line: u32,
+}
+
+/// Writes out the steps.
+pub(super) fn write_out(
+    procedure: &Node,
+    scope: &mut Scope,
+    problems: &mut Problems,
+) -> Vec<Placed> {
+    let mut writer = Writer {
+        scope,
+        problems,
+        steps: Vec::new(),
+        passes: 0,
+        cycles: 0,
+        is_too_long: false,
+    };
+    writer.steps(procedure, 0, 0);
+    writer.steps
+}
+
+struct Writer<'a> {
+    scope: &'a mut Scope,
+    problems: &'a mut Problems,
+    steps: Vec<Placed>,
+    passes: usize,
+    /// Repeats of the measurement so far.
+    cycles: u32,
+    is_too_long: bool,
+}
+
+impl Writer<'_> {
+    fn steps(&mut self, list: &Node, cycle: u32, depth: usize) {
+        let Value::List(items) = &list.value else {
+            return self.problems.error(
+                list.line,
+                "'steps' must be a list in brackets, such as steps = [ { do = \"tare\" } ]",
+            );
+        };
+        for item in items {
+            if self.is_too_long || self.problems.is_full() {
+                return;
+            }
+            let Value::Table(table) = &item.value else {
+                self.problems.error(
+                    item.line,
+                    format!(
+                        "{} is no step; write {{ do = \"ramp\", ... }} in braces",
+                        item.kind()
+                    ),
+                );
+                continue;
+            };
+            let is_loop = ["repeat", "for_each"].map(|key| table.get(key).is_some());
+            let is_step = table.get("do").is_some();
+            match is_loop {
+                [false, false] if !is_step && table.get("steps").is_some() => {
+                    self.problems.error(
+                        item.line,
+                        "a loop needs 'repeat' or 'for_each'; write repeat = 10",
+                    );
+                }
+                [false, false] => self.step(table, cycle),
+                [true, true] => self.problems.error(
+                    item.line,
+                    "a loop has 'repeat' or 'for_each', not both; put one loop into the other",
+                ),
+                _ if is_step => {
+                    self.problems.error(item.line, "one step cannot repeat itself; put it into a loop: { repeat = 10, steps = [ { do = ... } ] }");
+                }
+                _ => self.run_loop(table, cycle, depth),
+            }
+        }
+    }
+
+    fn step(&mut self, table: &Table, cycle: u32) {
+        let known = WORDS.map(|word| word.name);
+        let name = match table.get("do").map(|node| &node.value) {
+            Some(Value::Text(name)) => name.as_str(),
+            _ => {
+                return self.problems.error(
+                    table.line,
+                    "a step must say what to do; write do = \"ramp\" or repeat = 10",
+                );
+            }
+        };
+        let Some(word) = WORDS.iter().find(|word| word.name == name) else {
+            return self.problems.error(
+                table.line,
+                format!("there is no step '{name}'; {}", suggestion(name, &known)),
+            );
+        };
+        let before = self.problems.count();
+        let what = format!("'{name}'");
+        let args = Args::read(
+            table,
+            &what,
+            &[word.keys, &COMMON],
+            &["do"],
+            self.scope,
+            self.problems,
+        );
+        let on_failure = args.text("on_failure").and_then(on_failure);
+        let on_failure = self.problems.take(
+            table.line,
+            on_failure.map_err(|why| format!("'on_failure' of {what}: {why}")),
+        );
+        if args.is_no("only_if") || self.problems.count() > before {
+            return;
+        }
+        let built = (word.build)(&args).map_err(|why| format!("{what}: {why}"));
+        let (Some(step), Some(on_failure)) = (self.problems.take(table.line, built), on_failure)
+        else {
+            return;
+        };
+        if !self.has_room(table.line) {
+            return;
+        }
+        let planned = PlannedStep {
+            step,
+            cycle,
+            checkpoint: args.maybe_text("checkpoint").map(str::to_owned),
+            on_failure,
+        };
+        self.steps.push(Placed {
+            planned,
+            line: table.line,
+        });
+    }
+
+    fn run_loop(&mut self, table: &Table, cycle: u32, depth: usize) {
+        if depth == LOOPS_MAX {
+            let message = format!(
+                "loops can stand in one another {LOOPS_MAX} deep, not deeper; write some steps out"
+            );
+            return self.problems.error(table.line, message);
+        }
+        let Some(steps) = table.get("steps") else {
+            return self.problems.error(
+                table.line,
+                "a loop needs steps; write steps = [ { do = \"ramp\", ... } ]",
+            );
+        };
+        let besides = ["repeat", "for_each", "steps"];
+        // The name of a checkpoint may use the loop's own names, so it is read in each pass.
+        let without_name = Table {
+            line: table.line,
+            entries: table
+                .entries
+                .iter()
+                .filter(|entry| entry.key != "checkpoint")
+                .cloned()
+                .collect(),
+        };
+        let args = Args::read(
+            &without_name,
+            "a loop",
+            &[&LOOP_KEYS],
+            &besides,
+            self.scope,
+            self.problems,
+        );
+        let Some((name, mut values)) = self.values(table) else {
+            return;
+        };
+        if args.is_no("only_if") {
+            return;
+        }
+        if args.is_true("reverse") {
+            values.reverse();
+        }
+        let number = args.maybe_text("as").unwrap_or_default();
+        let outside = self.scope.len();
+        for name in [name.as_str(), number]
+            .into_iter()
+            .filter(|name| !name.is_empty())
+        {
+            if self.scope.has(name) {
+                let message = format!("the name '{name}' is taken already; give the loop another");
+                return self.problems.error(table.line, message);
+            }
+        }
+        let count = values.len();
+        for (pass, value) in (1..).zip(values) {
+            self.passes += 1;
+            if self.is_too_long || self.problems.is_full() || !self.has_room(table.line) {
+                return;
+            }
+            if !name.is_empty() {
+                self.scope.push(&name, value);
+            }
+            if !number.is_empty() {
+                self.scope.push(number, Given::count(pass));
+            }
+            let cycle = if args.is_true("cycle") {
+                self.cycles += 1;
+                self.cycles
+            } else {
+                cycle
+            };
+            let begun = self.steps.len();
+            self.steps(steps, cycle, depth + 1);
+            if let Some(node) = table.get("checkpoint") {
+                let named = self.scope.value(node, Kind::Text);
+                let named = self.problems.take(
+                    node.line,
+                    named.map_err(|why| format!("'checkpoint' of a loop: {why}")),
+                );
+                if let Some(last) = self.steps[begun..].last_mut() {
+                    last.planned.checkpoint = named.map(|given| given.text);
+                }
+            }
+            self.scope.shorten(outside);
+        }
+        if count > 0 && matches!(&steps.value, Value::List(items) if items.is_empty()) {
+            self.problems.error(
+                table.line,
+                "the loop has no steps; put some between its brackets or take it out",
+            );
+        }
+    }
+
+    /// What a loop runs through: the name of its values and the values; numbers have no name but `as`.
+    fn values(&mut self, table: &Table) -> Option<(String, Vec<Given>)> {
+        if let Some(node) = table.get("repeat") {
+            let count = self
+                .scope
+                .value(node, Kind::Count)
+                .and_then(|given| given.number(Kind::Count));
+            let count = count.map_err(|why| format!("'repeat' of a loop: {why}"));
+            let count = self.problems.take(node.line, count)?;
+            if !(1.0..=COUNT_MAX).contains(&count) {
+                let message = format!(
+                    "a loop cannot be repeated {count} times; give 1 to {COUNT_MAX}, or take it out"
+                );
+                self.problems.error(node.line, message);
+                return None;
+            }
+            return Some((
+                String::new(),
+                (0..count as u32).map(|_| Given::count(0)).collect(),
+            ));
+        }
+        let node = table.get("for_each")?;
+        let entry = match &node.value {
+            Value::Table(variables) if variables.entries.len() == 1 => &variables.entries[0],
+            _ => {
+                let message = "'for_each' needs one name and its values, such as for_each = { speed = [\"0.75 mm/s\", \"1.5 mm/s\"] }";
+                self.problems.error(node.line, message);
+                return None;
+            }
+        };
+        let values = self
+            .scope
+            .list(&entry.node)
+            .map_err(|why| format!("the values of '{}': {why}", entry.key));
+        let values = self.problems.take(entry.line, values)?;
+        if let Some(odd) = values
+            .iter()
+            .find(|value| matches!(value.what, What::List(_) | What::None))
+        {
+            let message = format!(
+                "the values of '{}': '{}' is no single value; write each by itself",
+                entry.key, odd.text
+            );
+            self.problems.error(entry.line, message);
+            return None;
+        }
+        Some((entry.key.clone(), values))
+    }
+
+    fn has_room(&mut self, line: u32) -> bool {
+        if self.steps.len() < STEPS_MAX && self.passes <= STEPS_MAX {
+            return true;
+        }
+        if !self.is_too_long {
+            self.is_too_long = true;
+            let message = format!(
+                "written out the protocol has more than {STEPS_MAX} steps; repeat less or split it"
+            );
+            self.problems.error(line, message);
+        }
+        false
+    }
+}
+
+fn on_failure(text: &str) -> Result<OnFailure, String> {
+    let form = "write \"abort\", \"skip\" or \"retry 2\"";
+    match text.split_once(' ').unwrap_or((text, "")) {
+        ("abort", "") => Ok(OnFailure::Abort),
+        ("skip", "") => Ok(OnFailure::Skip),
+        // A specimen that fails nine times will fail the tenth.
+        ("retry", count) => match count.trim().parse() {
+            Ok(count @ 1..=9) => Ok(OnFailure::Retry(count)),
+            _ => Err("a step can be tried again 1 to 9 times; write \"retry 2\"".into()),
+        },
+        _ => Err(format!("'{text}' is not known; {form}")),
+    }
+}

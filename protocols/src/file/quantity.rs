@@ -1,0 +1,369 @@
+//! Values with units, as people write them: `0.75 mm/s`, `3 min`, `0.01 N/min`.
+
+use super::problem::suggestion;
+use super::tree::{Node, Value};
+use serde::Serialize;
+
+/// What kind of value a key or a parameter takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Kind {
+    /// In mm/s.
+    Speed,
+    /// Depth, distance or position in mm.
+    Length,
+    /// In N.
+    Force,
+    /// In s.
+    Time,
+    /// In g.
+    Mass,
+    /// In Hz.
+    Frequency,
+    /// Force over time in N/s.
+    ForceRate,
+    /// In V.
+    Voltage,
+    /// A whole number without a unit.
+    Count,
+    /// `true` or `false`.
+    Flag,
+    /// Words.
+    Text,
+}
+
+/// Units of each kind: the first is the one numbers are kept in. A unit is `times / over` of it; both are whole
+/// numbers, so that decimal values stay what they say.
+const UNITS: [(Kind, &str, &[(&str, f64, f64)]); 8] = [
+    (
+        Kind::Speed,
+        "a speed",
+        &[
+            ("mm/s", 1.0, 1.0),
+            ("mm/min", 1.0, 60.0),
+            ("um/s", 1.0, 1e3),
+            ("µm/s", 1.0, 1e3),
+        ],
+    ),
+    (
+        Kind::Length,
+        "a length",
+        &[
+            ("mm", 1.0, 1.0),
+            ("cm", 10.0, 1.0),
+            ("um", 1.0, 1e3),
+            ("µm", 1.0, 1e3),
+        ],
+    ),
+    (Kind::Force, "a force", &[("N", 1.0, 1.0), ("mN", 1.0, 1e3)]),
+    (
+        Kind::Time,
+        "a time",
+        &[
+            ("s", 1.0, 1.0),
+            ("ms", 1.0, 1e3),
+            ("min", 60.0, 1.0),
+            ("h", 3600.0, 1.0),
+        ],
+    ),
+    (Kind::Mass, "a mass", &[("g", 1.0, 1.0), ("kg", 1e3, 1.0)]),
+    (
+        Kind::Frequency,
+        "a frequency",
+        &[("Hz", 1.0, 1.0), ("mHz", 1.0, 1e3)],
+    ),
+    (
+        Kind::ForceRate,
+        "a force over time",
+        &[
+            ("N/s", 1.0, 1.0),
+            ("N/min", 1.0, 60.0),
+            ("mN/s", 1.0, 1e3),
+            ("mN/min", 1.0, 6e4),
+        ],
+    ),
+    (
+        Kind::Voltage,
+        "a voltage",
+        &[("V", 1.0, 1.0), ("mV", 1.0, 1e3)],
+    ),
+];
+
+impl Kind {
+    fn entry(self) -> Option<&'static (Kind, &'static str, &'static [(&'static str, f64, f64)])> {
+        UNITS.iter().find(|(kind, ..)| *kind == self)
+    }
+
+    /// The unit numbers of this kind are kept in; empty for a count and for words.
+    #[must_use]
+    pub fn unit(self) -> &'static str {
+        self.entry().map_or("", |(_, _, units)| units[0].0)
+    }
+
+    /// Every unit of this kind.
+    #[must_use]
+    pub fn units(self) -> Vec<&'static str> {
+        let units = self.entry().map_or(&[][..], |(_, _, units)| units);
+        units.iter().map(|(unit, ..)| *unit).collect()
+    }
+
+    /// Its name with an article.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Count => "a whole number",
+            Self::Flag => "true or false",
+            Self::Text => "a text",
+            _ => self.entry().map_or("a value", |(_, name, _)| name),
+        }
+    }
+
+    /// A value of this kind as one would write it.
+    #[must_use]
+    pub fn example(self) -> &'static str {
+        match self {
+            Self::Speed => "\"0.75 mm/s\"",
+            Self::Length => "\"20 mm\"",
+            Self::Force => "\"1.5 N\"",
+            Self::Time => "\"50 s\" or \"3 min\"",
+            Self::Mass => "\"240 g\"",
+            Self::Frequency => "\"0.5 Hz\"",
+            Self::ForceRate => "\"0.01 N/min\"",
+            Self::Voltage => "\"1.8 V\"",
+            Self::Count => "10",
+            Self::Flag => "true",
+            Self::Text => "\"words\"",
+        }
+    }
+
+    /// The kind that a unit belongs to.
+    #[must_use]
+    pub fn of_unit(unit: &str) -> Option<Self> {
+        let has = |units: &[(&str, f64, f64)]| units.iter().any(|(known, ..)| *known == unit);
+        let found = UNITS.iter().find(|(_, _, units)| has(units));
+        found.map(|(kind, ..)| *kind)
+    }
+}
+
+/// A value with the words it was given in.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Given {
+    /// As it was written.
+    pub text: String,
+    /// What it is.
+    pub what: What,
+}
+
+/// What a value is.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum What {
+    /// A number in the unit of its kind; a count has none.
+    Number(Kind, f64),
+    /// Yes or no.
+    Flag(bool),
+    /// Words.
+    Text,
+    /// `"none"`: no value.
+    None,
+    /// Several values of one kind.
+    List(Vec<Given>),
+}
+
+impl Given {
+    fn new(text: &str, what: What) -> Self {
+        Self {
+            text: text.to_owned(),
+            what,
+        }
+    }
+
+    /// A count, such as the pass of a loop.
+    #[must_use]
+    pub fn count(count: u32) -> Self {
+        Self::new(
+            &count.to_string(),
+            What::Number(Kind::Count, f64::from(count)),
+        )
+    }
+
+    /// What its words say by themselves: a number with a unit, a whole number, true, false, none, else words.
+    #[must_use]
+    pub fn of_text(text: &str) -> Self {
+        let trimmed = text.trim();
+        let what = match trimmed {
+            "none" => What::None,
+            "true" => What::Flag(true),
+            "false" => What::Flag(false),
+            _ => match split(trimmed) {
+                Some((number, "")) if is_whole(number) => What::Number(Kind::Count, number),
+                Some((number, unit)) => match Kind::of_unit(unit) {
+                    Some(kind) => What::Number(kind, scaled(kind, number, unit)),
+                    None => What::Text,
+                },
+                None => What::Text,
+            },
+        };
+        Self::new(trimmed, what)
+    }
+
+    /// The same for a value of a file.
+    pub(super) fn of_node(node: &Node) -> Result<Self, String> {
+        match &node.value {
+            Value::Text(text) | Value::Number(text) => Ok(Self::of_text(text)),
+            Value::Flag(flag) => Ok(Self::new(&flag.to_string(), What::Flag(*flag))),
+            Value::List(items) => {
+                let items: Result<Vec<Self>, String> = items.iter().map(Self::of_node).collect();
+                Ok(Self::of_list(items?))
+            }
+            Value::Table(_) => {
+                Err("a table in braces is no value; write a text with a unit".into())
+            }
+        }
+    }
+
+    /// A list of values.
+    #[must_use]
+    pub fn of_list(items: Vec<Self>) -> Self {
+        let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
+        Self::new(&texts.join(", "), What::List(items.clone()))
+    }
+
+    /// Its kind; none for "none" and for a list of different kinds.
+    #[must_use]
+    pub fn kind(&self) -> Option<Kind> {
+        match &self.what {
+            What::Number(kind, _) => Some(*kind),
+            What::Flag(_) => Some(Kind::Flag),
+            What::Text => Some(Kind::Text),
+            What::None => None,
+            What::List(items) => {
+                let first = items.first()?.kind()?;
+                items
+                    .iter()
+                    .all(|item| item.kind() == Some(first))
+                    .then_some(first)
+            }
+        }
+    }
+
+    /// The number of a value of one kind, or what is wrong with it.
+    pub(super) fn number(&self, kind: Kind) -> Result<f64, String> {
+        match self.what {
+            What::Number(found, number) if found == kind && number.is_finite() => Ok(number),
+            _ => Err(self.is_not(kind)),
+        }
+    }
+
+    /// Why it is not of a kind, and what to write.
+    pub(super) fn is_not(&self, kind: Kind) -> String {
+        let text = &self.text;
+        let write = format!("write {} like {}", kind.name(), kind.example());
+        match &self.what {
+            What::Number(Kind::Count, _) => format!("{text} has no unit; {write}"),
+            What::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
+            What::Flag(_) | What::None => format!("{text} is no value here; {write}"),
+            What::List(_) => format!("[{text}] is a list; {write}"),
+            What::Text => match split(text) {
+                Some((_, "")) if kind == Kind::Count => {
+                    format!("{text} is not a whole number; {write}")
+                }
+                Some((_, "")) => format!("{text} has no unit; {write}"),
+                Some((_, rest)) if rest.starts_with(',') => {
+                    let example = kind.example();
+                    format!(
+                        "\"{text}\" is not a number; write a point, not a comma, as in {example}"
+                    )
+                }
+                Some((_, unit)) if !kind.units().is_empty() => {
+                    let known = suggestion(unit, &kind.units());
+                    format!(
+                        "'{unit}' in \"{text}\" is no unit of {}; {known}",
+                        kind.name()
+                    )
+                }
+                _ => format!("\"{text}\" is not {}; {write}", kind.name()),
+            },
+        }
+    }
+}
+
+fn is_whole(number: f64) -> bool {
+    // Beyond 2^53 not every whole number has a double of its own; nothing is counted that far.
+    number.fract() == 0.0 && number.abs() < 9e15
+}
+
+fn scaled(kind: Kind, number: f64, unit: &str) -> f64 {
+    let units = kind.entry().map_or(&[][..], |(_, _, units)| units);
+    let found = units.iter().find(|(known, ..)| *known == unit);
+    found.map_or(f64::NAN, |(_, times, over)| number * times / over)
+}
+
+/// The number a text begins with, and what follows it.
+fn split(text: &str) -> Option<(f64, &str)> {
+    let bytes = text.as_bytes();
+    let digits_from = |start: usize| {
+        let rest = bytes.iter().skip(start);
+        start
+            + rest
+                .take_while(|byte| byte.is_ascii_digit() || **byte == b'.')
+                .count()
+    };
+    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
+    let mut end = digits_from(sign);
+    // An exponent only if digits follow: "2 eggs" are no power.
+    if matches!(bytes.get(end), Some(b'e' | b'E')) {
+        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
+        let exponent = digits_from(end + 1 + sign);
+        if exponent > end + 1 + sign {
+            end = exponent;
+        }
+    }
+    let number: f64 = text.get(..end)?.parse().ok()?;
+    number.is_finite().then(|| (number, text[end..].trim()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn values_are_exactly_what_they_say() {
+        for (text, kind, number) in [
+            ("0.75 mm/s", Kind::Speed, 0.75),
+            ("45mm/min", Kind::Speed, 0.75),
+            ("30 mN", Kind::Force, 0.03),
+            ("3 min", Kind::Time, 180.0),
+            ("0.1 h", Kind::Time, 360.0),
+            ("0.01 N/min", Kind::ForceRate, 0.01 / 60.0),
+            ("-5 mm", Kind::Length, -5.0),
+            ("1.04 kg", Kind::Mass, 1040.0),
+            ("1e-3 V", Kind::Voltage, 1e-3),
+            ("10", Kind::Count, 10.0),
+        ] {
+            assert_eq!(Given::of_text(text).number(kind), Ok(number), "{text}");
+        }
+    }
+
+    #[test]
+    fn what_is_not_a_value_says_what_to_write() {
+        for (text, kind, words) in [
+            ("0.75", Kind::Speed, "has no unit"),
+            ("5", Kind::Length, "has no unit"),
+            ("5 N", Kind::Length, "is a force"),
+            ("5 mmm", Kind::Length, "did you mean 'mm'"),
+            ("0,75 mm/s", Kind::Speed, "a point, not a comma"),
+            ("fast", Kind::Speed, "is not a speed"),
+            ("2.5", Kind::Count, "not a whole number"),
+            ("1e999 N", Kind::Force, "is not a force"),
+            ("nan", Kind::Time, "is not a time"),
+            ("", Kind::Time, "is not a time"),
+            ("--1 s", Kind::Time, "is not a time"),
+            ("none", Kind::Time, "no value here"),
+            ("2e s", Kind::Time, "no unit of a time"),
+        ] {
+            let message = Given::of_text(text).number(kind).unwrap_err();
+            assert!(message.contains(words), "{text}: {message}");
+        }
+    }
+}

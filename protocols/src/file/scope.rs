@@ -1,0 +1,141 @@
+//! The names a value may use: parameters, and what the loops around it run through.
+
+use super::problem::suggestion;
+use super::quantity::{Given, Kind, What};
+use super::tree::{Node, Value};
+
+/// Names with their values; inner loops last.
+#[derive(Debug, Default)]
+pub(super) struct Scope(Vec<(String, Given)>);
+
+impl Scope {
+    pub fn push(&mut self, name: &str, value: Given) {
+        self.0.push((name.to_owned(), value));
+    }
+
+    /// Forgets every name but the first so many.
+    pub fn shorten(&mut self, len: usize) {
+        self.0.truncate(len);
+    }
+
+    pub fn len(&self) -> usize {
+        self.0.len()
+    }
+
+    pub fn has(&self, name: &str) -> bool {
+        self.0.iter().any(|(known, _)| known == name)
+    }
+
+    fn get(&self, name: &str) -> Result<&Given, String> {
+        let found = self.0.iter().rev().find(|(known, _)| known == name);
+        found.map(|(_, given)| given).ok_or_else(|| {
+            let known: Vec<&str> = self.0.iter().map(|(known, _)| known.as_str()).collect();
+            let hint = suggestion(name, &known);
+            format!("there is no parameter or loop called '{name}'; {hint}")
+        })
+    }
+
+    /// The value of a node for a key of a kind: `$name` stands for a value, `{name}` in a text for its words.
+    pub fn value(&self, node: &Node, kind: Kind) -> Result<Given, String> {
+        match &node.value {
+            Value::Text(text) => match text.strip_prefix('$') {
+                Some(name) => {
+                    let given = self.get(name.trim())?.clone();
+                    // A value that does not fit is told with the name it came by.
+                    let fits = matches!(kind, Kind::Text | Kind::Flag)
+                        || given.what == What::None
+                        || given.kind() == Some(kind) && !matches!(given.what, What::List(_));
+                    if fits {
+                        Ok(given)
+                    } else {
+                        Err(format!("{text} does not fit: {}", given.is_not(kind)))
+                    }
+                }
+                None if kind == Kind::Text => {
+                    let text = self.filled_in(text)?;
+                    Ok(Given {
+                        what: if text == "none" {
+                            What::None
+                        } else {
+                            What::Text
+                        },
+                        text,
+                    })
+                }
+                None => Ok(Given::of_text(text)),
+            },
+            _ if kind == Kind::Text => {
+                Err(format!("{} is not a text; write it in quotes", node.kind()))
+            }
+            _ => Given::of_node(node),
+        }
+    }
+
+    /// The values a loop runs through.
+    pub fn list(&self, node: &Node) -> Result<Vec<Given>, String> {
+        let given = match &node.value {
+            Value::Text(text) => match text.strip_prefix('$') {
+                Some(name) => self.get(name.trim())?.clone(),
+                None => Given::of_text(text),
+            },
+            Value::List(items) => {
+                let items = items.iter().map(|item| match &item.value {
+                    Value::Text(text) if text.starts_with('$') => {
+                        self.get(text[1..].trim()).cloned()
+                    }
+                    _ => Given::of_node(item),
+                });
+                Given::of_list(items.collect::<Result<_, String>>()?)
+            }
+            _ => Given::of_node(node)?,
+        };
+        match given.what {
+            What::List(items) if items.is_empty() => {
+                Err("the list is empty; give it a value".into())
+            }
+            What::List(ref items) if given.kind().is_none() => {
+                let texts: Vec<&str> = items.iter().map(|item| item.text.as_str()).collect();
+                Err(format!(
+                    "[{}] has values of different kinds; give them one kind of unit",
+                    texts.join(", ")
+                ))
+            }
+            What::List(items) => Ok(items),
+            _ => Err(format!(
+                "'{}' is one value, not a list; write [\"{}\"]",
+                given.text, given.text
+            )),
+        }
+    }
+
+    /// A text with `{name}` replaced by the words of the value.
+    fn filled_in(&self, text: &str) -> Result<String, String> {
+        let mut filled = String::with_capacity(text.len());
+        let mut rest = text;
+        while let Some((before, behind)) = rest.split_once('{') {
+            let Some((name, after)) = behind.split_once('}') else {
+                return Err(
+                    "a brace is opened and not closed; write {name} for the value of a name".into(),
+                );
+            };
+            filled.push_str(before);
+            filled.push_str(&self.get(name.trim())?.text);
+            rest = after;
+        }
+        filled.push_str(rest);
+        Ok(filled)
+    }
+}
+
+/// Calls `see` with every name that a text uses.
+pub(super) fn names_in(text: &str, see: &mut impl FnMut(&str)) {
+    if let Some(name) = text.strip_prefix('$') {
+        see(name.trim());
+    }
+    let mut rest = text;
+    while let Some((_, behind)) = rest.split_once('{') {
+        let (name, after) = behind.split_once('}').unwrap_or((behind, ""));
+        see(name.trim());
+        rest = after;
+    }
+}

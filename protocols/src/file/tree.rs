@@ -1,0 +1,187 @@
+//! The text of a protocol as a tree in which every word knows its line.
+
+use super::problem::Problem;
+use std::ops::Range;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue};
+
+/// A value at its line.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Node {
+    pub line: u32,
+    pub value: Value,
+}
+
+/// What can stand behind a key.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) enum Value {
+    Text(String),
+    /// A number without a unit, as it was written.
+    Number(String),
+    Flag(bool),
+    List(Vec<Node>),
+    Table(Table),
+}
+
+/// Keys and values in the order of the text.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Table {
+    pub line: u32,
+    pub entries: Vec<Entry>,
+}
+
+/// A key with its value.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Entry {
+    pub key: String,
+    pub line: u32,
+    pub node: Node,
+}
+
+impl Table {
+    /// The value of a key.
+    pub fn get(&self, key: &str) -> Option<&Node> {
+        let found = self.entries.iter().find(|entry| entry.key == key);
+        found.map(|entry| &entry.node)
+    }
+}
+
+impl Node {
+    /// What it is, for a sentence.
+    pub fn kind(&self) -> &'static str {
+        match self.value {
+            Value::Text(_) => "a text",
+            Value::Number(_) => "a bare number",
+            Value::Flag(_) => "true or false",
+            Value::List(_) => "a list",
+            Value::Table(_) => "a table in braces",
+        }
+    }
+
+    /// Calls `see` with every text in it.
+    pub fn each_text(&self, see: &mut impl FnMut(&str)) {
+        match &self.value {
+            Value::Text(text) => see(text),
+            Value::List(items) => items.iter().for_each(|item| item.each_text(see)),
+            Value::Table(table) => {
+                let nodes = table.entries.iter().map(|entry| &entry.node);
+                nodes.for_each(|node| node.each_text(see));
+            }
+            Value::Number(_) | Value::Flag(_) => {}
+        }
+    }
+}
+
+/// Reads a text. A mistake of writing makes everything behind it doubtful, so only the first is told.
+pub(super) fn read(text: &str) -> Result<Table, Problem> {
+    let lines = Lines::of(text);
+    match DeTable::parse(text) {
+        Ok(document) => Ok(lines.table(document.get_ref(), 0)),
+        Err(err) => {
+            let line = err.span().map_or(0, |span| lines.at(&span));
+            let message = format!(
+                "this is not TOML: {}; look for a missing quote, comma, '=' or bracket here or just above",
+                err.message().trim().replace('\n', ", ")
+            );
+            Err(Problem::error(line, message))
+        }
+    }
+}
+
+/// Where lines begin.
+struct Lines(Vec<usize>);
+
+impl Lines {
+    fn of(text: &str) -> Self {
+        let breaks = text.bytes().enumerate().filter(|(_, byte)| *byte == b'\n');
+        let starts = std::iter::once(0).chain(breaks.map(|(offset, _)| offset + 1));
+        Self(starts.collect())
+    }
+
+    /// The line of a place, from 1.
+    fn at(&self, span: &Range<usize>) -> u32 {
+        let before = self.0.partition_point(|start| *start <= span.start);
+        u32::try_from(before).unwrap_or(u32::MAX)
+    }
+
+    fn table(&self, table: &DeTable<'_>, line: u32) -> Table {
+        let mut entries: Vec<(usize, Entry)> = table
+            .iter()
+            .map(|(key, value)| {
+                let line = self.at(&key.span());
+                let entry = Entry {
+                    key: key.get_ref().to_string(),
+                    line,
+                    node: self.node(value, line),
+                };
+                (key.span().start, entry)
+            })
+            .collect();
+        // The parser sorts by name; people read by place.
+        entries.sort_by_key(|(place, _)| *place);
+        let entries = entries.into_iter().map(|(_, entry)| entry).collect();
+        Table { line, entries }
+    }
+
+    /// A value; `at_least` is the line of its key, because tables in several pieces have no place of their own.
+    fn node(&self, value: &Spanned<DeValue<'_>>, at_least: u32) -> Node {
+        let line = self.at(&value.span()).max(at_least);
+        let value = match value.get_ref() {
+            DeValue::String(text) => Value::Text(text.to_string()),
+            DeValue::Integer(number) => Value::Number(number.to_string()),
+            DeValue::Float(number) => Value::Number(number.to_string()),
+            DeValue::Boolean(flag) => Value::Flag(*flag),
+            DeValue::Datetime(date) => Value::Text(date.to_string()),
+            DeValue::Array(items) => {
+                let items = items.iter().map(|item| self.node(item, at_least));
+                Value::List(items.collect())
+            }
+            DeValue::Table(table) => Value::Table(self.table(table, line)),
+        };
+        Node { line, value }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_word_knows_its_line_and_order() {
+        let text = "b = 1\na = 'x'\n\n[t]\nz = [\n  { k = 'v' },\n  2.5,\n]\n[[m]]\nq = true\n[[m]]\nq = 2\n";
+        let tree = read(text).unwrap();
+        let keys: Vec<(&str, u32)> = tree
+            .entries
+            .iter()
+            .map(|entry| (entry.key.as_str(), entry.line))
+            .collect();
+        assert_eq!(keys, [("b", 1), ("a", 2), ("t", 4), ("m", 9)]);
+        let Value::Table(t) = &tree.get("t").unwrap().value else {
+            panic!("t is a table");
+        };
+        let Value::List(items) = &t.get("z").unwrap().value else {
+            panic!("z is a list");
+        };
+        assert_eq!((items[0].line, items[1].line), (6, 7));
+        assert_eq!(items[1].value, Value::Number("2.5".into()));
+        let Value::List(monitors) = &tree.get("m").unwrap().value else {
+            panic!("m is a list");
+        };
+        let lines: Vec<u32> = monitors.iter().map(|node| node.line).collect();
+        assert_eq!(lines, [9, 11]);
+    }
+
+    #[test]
+    fn a_mistake_of_writing_names_its_line() {
+        for (text, line) in [
+            ("a = 1\nb = \"open\nc = 2\n", 2),
+            ("a = 1\n\nb 2\n", 3),
+            ("a = [1,\n2\n", 2),
+            ("a = 1\na = 2\n", 2),
+        ] {
+            let problem = read(text).unwrap_err();
+            assert!(problem.line.abs_diff(line) <= 1, "{problem}");
+            assert!(problem.message.starts_with("this is not TOML"), "{problem}");
+        }
+    }
+}

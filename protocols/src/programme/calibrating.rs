@@ -1,0 +1,121 @@
+//! From a session of weight steps to the calibration it measured.
+
+use crate::engine::{Effect, Record};
+use palpate_model::calibration::{
+    CALIBRATION_FORMAT, Calibration, CalibrationError, Direction, Series, SeriesStep,
+};
+use palpate_model::units::Volts;
+use palpate_sessions::{EntryKind, Session};
+use thiserror::Error;
+
+/// Half-width in g within which a laboratory weight of 100 g surely lies where nobody says it better: class M3 of
+/// OIML R 111-1 allows 50 mg.
+const TOLERANCE_G: f64 = 0.05;
+
+/// A session is no calibration.
+#[derive(Debug, Error)]
+pub enum CalibratingError {
+    /// No reading under a known mass.
+    #[error(
+        "session {0} holds no reading under a known mass; run the protocol load-cell-calibration"
+    )]
+    NoReadings(String),
+    /// It did not run to its end.
+    #[error("session {session} ended by {ending}; a calibration must be complete, so run it again")]
+    Incomplete {
+        /// Which.
+        session: String,
+        /// How.
+        ending: String,
+    },
+    /// The readings make none.
+    #[error(transparent)]
+    Readings(#[from] CalibrationError),
+}
+
+/// The calibration that a session measured, with the curve that foretells left-out weights best.
+pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, CalibratingError> {
+    let manifest = &session.manifest;
+    let id = manifest.session_id.clone();
+    let ending = session
+        .end
+        .as_ref()
+        .map_or("breaking off", |end| end.outcome.as_str());
+    if ending != "finish" {
+        return Err(CalibratingError::Incomplete {
+            session: id,
+            ending: ending.into(),
+        });
+    }
+    let decisions = session
+        .entries
+        .iter()
+        .filter(|entry| entry.kind == EntryKind::Decision);
+    let mut series: Vec<Series> = Vec::new();
+    let mut empty: Vec<Volts> = Vec::new();
+    for entry in decisions {
+        // Decisions of other kinds are other types; a reading that cannot be read back would be no reading.
+        let Ok(Effect::Record(Record::Weighed {
+            mass_g,
+            is_loading,
+            repeat,
+            volts,
+            noise,
+            slope_v_per_s,
+            samples,
+            waited,
+        })) = serde_json::from_value(entry.body.clone())
+        else {
+            continue;
+        };
+        let direction = if is_loading {
+            Direction::Loading
+        } else {
+            Direction::Unloading
+        };
+        let is_same = |one: &Series| (one.direction, one.repeat) == (direction, repeat);
+        if !series.last().is_some_and(is_same) {
+            series.push(Series {
+                direction,
+                repeat,
+                steps: Vec::new(),
+            });
+        }
+        if mass_g == 0.0 {
+            empty.push(volts);
+        }
+        let step = SeriesStep {
+            mass_g,
+            weights: Vec::new(),
+            volts,
+            noise: Some(noise),
+            samples: Some(samples),
+            slope_v_per_s: Some(slope_v_per_s),
+            waited_s: Some(waited.0),
+        };
+        if let Some(last) = series.last_mut() {
+            last.steps.push(step);
+        }
+    }
+    if series.is_empty() {
+        return Err(CalibratingError::NoReadings(id));
+    }
+    let calibration = Calibration {
+        name: name.into(),
+        format: CALIBRATION_FORMAT,
+        taken_at: Some(manifest.started_at_text()),
+        source: format!("session {id}"),
+        rig: manifest.rig.name.clone(),
+        operator: manifest.operator.clone(),
+        zero_before: empty.first().copied(),
+        zero_after: empty.last().copied(),
+        series,
+        ..Calibration::default()
+    }
+    .with_stacked_weights(TOLERANCE_G)?;
+    let curve = calibration.best_curve()?;
+    Ok(Calibration {
+        curve,
+        ..calibration
+    })
+}

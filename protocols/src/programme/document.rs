@@ -1,0 +1,308 @@
+//! The file of a programme.
+
+use crate::file::{Protocol, built_in};
+use crate::plans::{OnTimeout, Plan, Prompt, Step};
+use palpate_model::rig::HandAction;
+use palpate_model::units::Seconds;
+use serde::Deserialize;
+use std::collections::BTreeMap;
+use thiserror::Error;
+use toml::{Spanned, Value};
+
+/// Version of the language that is read.
+const LANGUAGE: u32 = 1;
+
+/// Most repeats of a task: more is a mistake of the keyboard.
+const REPEATS_MAX: u32 = 1000;
+
+/// How long a person has to clip a specimen in.
+const MOUNT_TIMEOUT: Seconds = Seconds(3600.0);
+
+/// What a programme does, in order.
+#[derive(Clone, Debug)]
+pub struct Programme {
+    /// Name, such as `day-in-the-lab`.
+    pub name: String,
+    /// In a few words.
+    pub title: String,
+    /// What it is for.
+    pub about: String,
+    /// Who runs it, unless told otherwise.
+    pub operator: String,
+    /// Whether what previews ask to acknowledge is acknowledged; it is recorded in every session.
+    pub is_acknowledged: bool,
+    /// Settings of the simulated rig that differ from the usual ones.
+    pub simulated: BTreeMap<String, String>,
+    /// The tasks.
+    pub tasks: Vec<Task>,
+}
+
+/// One protocol of a programme.
+#[derive(Clone, Debug)]
+pub struct Task {
+    /// Its name; sessions are filed under it.
+    pub name: String,
+    /// The protocol.
+    pub protocol: Protocol,
+    /// Values of its parameters.
+    pub values: BTreeMap<String, String>,
+    /// Number of the specimen that is clipped in first; none keeps the one that is there.
+    pub specimen: Option<u64>,
+    /// How often.
+    pub repeats: u32,
+    /// Rest before every repeat but the first.
+    pub rest: Seconds,
+    /// Whether forces of later tasks follow the calibration it measures.
+    pub calibrates: bool,
+    /// Which task's model its sessions are compared with.
+    pub validates: Option<Validates>,
+    /// Line of the file it begins on.
+    pub line: usize,
+}
+
+/// A prediction to be compared.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Validates {
+    /// Name of the task whose first session is fitted.
+    pub task: String,
+}
+
+/// A programme that is none; prints as one sentence a problem.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("{}", .0.join("\n"))]
+pub struct ProgrammeError(pub Vec<String>);
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Text {
+    #[serde(rename = "palpate-programme")]
+    language: u32,
+    name: String,
+    title: String,
+    #[serde(default)]
+    about: String,
+    #[serde(default)]
+    operator: String,
+    #[serde(default)]
+    acknowledge: bool,
+    #[serde(default)]
+    simulated: BTreeMap<String, Value>,
+    #[serde(default)]
+    task: Vec<Spanned<TaskText>>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct TaskText {
+    name: String,
+    protocol: String,
+    #[serde(default)]
+    set: BTreeMap<String, Value>,
+    specimen: Option<u64>,
+    #[serde(default = "one")]
+    repeats: u32,
+    #[serde(default)]
+    rest_s: f64,
+    #[serde(default)]
+    calibrates: bool,
+    validates: Option<String>,
+}
+
+const fn one() -> u32 {
+    1
+}
+
+impl Programme {
+    /// Whether a text is meant as a programme rather than a protocol.
+    #[must_use]
+    pub fn is_meant(text: &str) -> bool {
+        text.lines()
+            .any(|line| line.trim_start().starts_with("palpate-programme"))
+    }
+
+    /// Reads a programme. `other` gives the text of a protocol that is not built in, by the name the programme calls
+    /// it; every problem is told.
+    pub fn read(
+        text: &str,
+        other: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ProgrammeError> {
+        let whole: Text = toml::from_str(text).map_err(|err| {
+            let line = err.span().map_or(1, |span| line_of(text, span.start));
+            ProgrammeError(vec![format!("line {line}: {}", err.message())])
+        })?;
+        let mut problems = Vec::new();
+        if whole.language != LANGUAGE {
+            problems.push(format!(
+                "this is written in version {} of the language and this palpate reads {LANGUAGE}; use a newer palpate",
+                whole.language
+            ));
+        }
+        if whole.task.is_empty() {
+            problems.push("a programme needs at least one [[task]]".into());
+        }
+        let mut tasks: Vec<Task> = Vec::new();
+        for task in whole.task {
+            let line = line_of(text, task.span().start);
+            match read_task(task.into_inner(), line, &tasks, other) {
+                Ok(task) => tasks.push(task),
+                Err(own) => {
+                    problems.extend(
+                        own.into_iter()
+                            .map(|problem| format!("line {line}: {problem}")),
+                    );
+                }
+            }
+        }
+        if !problems.is_empty() {
+            return Err(ProgrammeError(problems));
+        }
+        Ok(Self {
+            name: whole.name,
+            title: whole.title,
+            about: whole.about,
+            operator: whole.operator,
+            is_acknowledged: whole.acknowledge,
+            simulated: texts(whole.simulated),
+            tasks,
+        })
+    }
+
+    /// The specimen that is clipped in during a task.
+    #[must_use]
+    pub fn specimen_at(&self, task: usize) -> Option<u64> {
+        let so_far = self.tasks.iter().take(task + 1).rev();
+        so_far.filter_map(|task| task.specimen).next()
+    }
+
+    /// Sessions in all.
+    #[must_use]
+    pub fn session_count(&self) -> u32 {
+        self.tasks.iter().map(|task| task.repeats).sum()
+    }
+}
+
+impl Task {
+    /// The plan of one repeat, counted from 1: the protocol's, behind the rest and the specimen it needs. `remount`
+    /// is the specimen that somebody must look after before a programme goes on.
+    #[must_use]
+    pub fn plan(&self, repeat: u32, remount: Option<u64>) -> Option<Plan> {
+        let mut plan = self.protocol.plan(&self.values).ok()?;
+        let mut before = Vec::new();
+        if repeat > 1 && self.rest.0 > 0.0 {
+            before.push(Step::Rest {
+                duration: self.rest,
+            });
+        }
+        let fresh = self.specimen.filter(|_| repeat == 1);
+        if let Some(specimen) = fresh.or(remount) {
+            before.push(Step::Prompt(Prompt {
+                message: format!("Clip in specimen {specimen}, with the probe clear of it"),
+                timeout: MOUNT_TIMEOUT,
+                on_timeout: OnTimeout::Stop,
+                hand: Some(HandAction::Mount { specimen }),
+            }));
+        }
+        plan.steps.splice(0..0, before.into_iter().map(Into::into));
+        Some(plan)
+    }
+}
+
+fn read_task(
+    text: TaskText,
+    line: usize,
+    before: &[Task],
+    other: &dyn Fn(&str) -> Result<String, String>,
+) -> Result<Task, Vec<String>> {
+    let name = text.name.trim().to_owned();
+    let mut problems = Vec::new();
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    if name.is_empty() || !name.chars().all(is_plain) {
+        problems.push(format!(
+            "a task cannot be called '{name}'; use letters, digits and hyphens, since its folder is called so"
+        ));
+    }
+    if before.iter().any(|task| task.name == name) {
+        problems.push(format!(
+            "there is a task '{name}' already; call it otherwise"
+        ));
+    }
+    if !(1..=REPEATS_MAX).contains(&text.repeats) {
+        problems.push(format!(
+            "{} repeats are not possible; give 1 to {REPEATS_MAX}",
+            text.repeats
+        ));
+    }
+    if !(0.0..=86_400.0).contains(&text.rest_s) {
+        problems.push(format!(
+            "a rest of {} s is not possible; give 0 to 86400 s",
+            text.rest_s
+        ));
+    }
+    if let Some(model) = &text.validates
+        && !before.iter().any(|task| task.name == *model)
+    {
+        problems.push(format!(
+            "there is no task '{model}' before this one whose model it could be compared with"
+        ));
+    }
+    let values = texts(text.set);
+    let protocol = match built_in(&text.protocol) {
+        Some(found) => found,
+        None => match other(&text.protocol) {
+            Ok(file) => Protocol::read(&file),
+            Err(reason) => {
+                problems.push(reason);
+                return Err(problems);
+            }
+        },
+    };
+    match protocol {
+        Ok(protocol) => {
+            let wrong = protocol.plan(&values).err().into_iter().flatten();
+            problems.extend(wrong.map(|problem| problem.to_string()));
+            if !problems.is_empty() {
+                return Err(problems);
+            }
+            Ok(Task {
+                name,
+                protocol,
+                values,
+                specimen: text.specimen,
+                repeats: text.repeats,
+                rest: Seconds(text.rest_s),
+                calibrates: text.calibrates,
+                validates: text.validates.map(|task| Validates { task }),
+                line,
+            })
+        }
+        Err(wrong) => {
+            let named = |problem| format!("protocol '{}': {problem}", text.protocol);
+            problems.extend(wrong.iter().map(named));
+            Err(problems)
+        }
+    }
+}
+
+/// Values as a protocol's parameters are given: a text, or a number without a unit; a list with commas. Whether
+/// that is a value, the protocol says.
+fn texts(values: BTreeMap<String, Value>) -> BTreeMap<String, String> {
+    values
+        .into_iter()
+        .map(|(name, value)| (name, as_text(&value)))
+        .collect()
+}
+
+fn as_text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Integer(number) => number.to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Boolean(is_so) => is_so.to_string(),
+        Value::Array(items) => items.iter().map(as_text).collect::<Vec<_>>().join(", "),
+        Value::Datetime(_) | Value::Table(_) => String::new(),
+    }
+}
+
+fn line_of(text: &str, at: usize) -> usize {
+    1 + text[..at.min(text.len())].matches('\n').count()
+}

@@ -1,0 +1,12 @@
+//! A programme: protocols one after the other, with repeats, specimens and rests between them, as a day in the
+//! laboratory goes. Every run is a session of its own; a journal tells where to continue after a crash.
+
+mod calibrating;
+mod document;
+mod progress;
+mod run;
+
+pub use calibrating::{CalibratingError, calibration_of};
+pub use document::{Programme, ProgrammeError, Task, Validates};
+pub use progress::{Entry, Place, Progress, ProgressError};
+pub use run::{Done, Event, Laboratory, RunError, run};

@@ -1,0 +1,317 @@
+//! Carries a programme out on a runner: every run in its own session folder, every step of the way in the journal.
+
+use super::calibrating::{CalibratingError, calibration_of};
+use super::document::Programme;
+use super::progress::{Entry, Place, Progress, ProgressError};
+use crate::preview::preview;
+use crate::runner::{
+    AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, StartError, wall_now,
+};
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::{Limits, RigDescription};
+use palpate_model::units::Seconds;
+use palpate_sessions::journal::{Journal, JournalError, stamp};
+use palpate_sessions::{ReadError, Session};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::time::Duration;
+use thiserror::Error;
+
+/// How long the runner may be silent before it is looked at whether it still lives.
+const SILENCE: Duration = Duration::from_millis(500);
+
+/// Where a programme is carried out.
+pub struct Laboratory<'a> {
+    /// The runner, with nothing running.
+    pub runner: &'a Runner,
+    /// Says that there is a new snapshot.
+    pub woken: &'a Receiver<()>,
+    /// The rig.
+    pub rig: &'a RigDescription,
+    /// Its interlock thresholds.
+    pub limits: Limits,
+    /// Volts to newtons until a task measures it.
+    pub calibration: Calibration,
+    /// Folder of the journal and of all sessions.
+    pub folder: &'a Path,
+    /// Who answers prompts.
+    pub answers: Answers,
+    /// With which probe.
+    pub indenter: String,
+}
+
+/// What happens on the way.
+pub enum Event<'a> {
+    /// A run begins.
+    Begun {
+        /// Which.
+        place: &'a Place,
+        /// Sessions that have finished, and all.
+        count: (u32, u32),
+    },
+    /// A run goes on; with the time left for the whole programme.
+    Running(&'a RunView, Seconds),
+    /// A run ended as it should.
+    Finished(&'a Place, &'a Path),
+    /// From now on forces follow this calibration.
+    Calibrated(&'a Calibration),
+}
+
+/// A programme that is complete.
+#[derive(Clone, Debug)]
+pub struct Done {
+    /// Every run, interrupted ones too.
+    pub progress: Progress,
+    /// The calibration in force at the end.
+    pub calibration: Calibration,
+    /// Whether it was continued rather than begun.
+    pub was_continued: bool,
+}
+
+/// A programme that is not.
+#[derive(Debug, Error)]
+pub enum RunError {
+    /// The folder belongs to something else.
+    #[error(transparent)]
+    Progress(#[from] ProgressError),
+    /// The journal.
+    #[error(transparent)]
+    Journal(#[from] JournalError),
+    /// A plan or the rig refuses.
+    #[error("task '{task}': {reason}")]
+    Refused {
+        /// Which.
+        task: String,
+        /// Why.
+        reason: String,
+    },
+    /// A run ended before its plan did.
+    #[error(
+        "task '{task}', repeat {repeat}, ended by {ending}: {reason}; the same command goes on from there"
+    )]
+    Ended {
+        /// Which.
+        task: String,
+        /// Which repeat.
+        repeat: u32,
+        /// How.
+        ending: String,
+        /// Why.
+        reason: String,
+    },
+    /// The weights make no calibration.
+    #[error("task '{task}': {source}")]
+    Calibrating {
+        /// Which.
+        task: String,
+        /// Why.
+        source: CalibratingError,
+    },
+    /// A session of an earlier task.
+    #[error(transparent)]
+    Session(#[from] ReadError),
+    /// The thread is gone.
+    #[error("the runner ended unexpectedly; the session in progress is incomplete")]
+    NoRunner,
+}
+
+/// Carries a programme out, or goes on where its journal ends.
+pub fn run(
+    programme: &Programme,
+    crc32: &str,
+    laboratory: Laboratory<'_>,
+    tell: &mut dyn FnMut(Event<'_>),
+) -> Result<Done, RunError> {
+    let (journal, entries) = Journal::open(laboratory.folder)?;
+    let progress = Progress::of(&entries, programme, crc32)?;
+    let was_continued = !progress.runs.is_empty();
+    let mut work = Work {
+        programme,
+        journal,
+        progress,
+        is_remounting: was_continued,
+        laboratory,
+        tell,
+    };
+    if entries.is_empty() {
+        work.journal.push(&Entry::Programme {
+            name: programme.name.clone(),
+            crc32: crc32.to_owned(),
+            at: stamp(wall_now()),
+        })?;
+    }
+    for task in 0..programme.tasks.len() {
+        if let Some(folder) = work.progress.finished(task).last() {
+            work.calibrate(task, &work.laboratory.folder.join(folder))?;
+        }
+    }
+    while let Some(place) = work.progress.next(programme) {
+        work.one(place)?;
+    }
+    Ok(Done {
+        progress: work.progress,
+        calibration: work.laboratory.calibration,
+        was_continued,
+    })
+}
+
+struct Work<'a> {
+    programme: &'a Programme,
+    journal: Journal,
+    progress: Progress,
+    /// The rig was left alone: somebody must see that the specimen is still the right one.
+    is_remounting: bool,
+    laboratory: Laboratory<'a>,
+    tell: &'a mut dyn FnMut(Event<'_>),
+}
+
+impl Work<'_> {
+    /// One run, from its entry in the journal to the next.
+    fn one(&mut self, place: Place) -> Result<(), RunError> {
+        let programme = self.programme;
+        let task = &programme.tasks[place.task];
+        let refused = |reason: String| RunError::Refused {
+            task: task.name.clone(),
+            reason,
+        };
+        let specimen = programme.specimen_at(place.task);
+        let remount = specimen.filter(|_| std::mem::take(&mut self.is_remounting));
+        let plan = task
+            .plan(place.repeat, remount)
+            .ok_or_else(|| refused("its protocol cannot be written out".into()))?;
+        let session = session_folder(&task.name, &place);
+        let folder = self.laboratory.folder.join(&session);
+        let request = RunRequest {
+            plan,
+            calibration: self.laboratory.calibration.clone(),
+            limits: self.laboratory.limits,
+            out: Some(folder.clone()),
+            labels: Labels {
+                operator: programme.operator.clone(),
+                specimen: specimen.map_or(String::new(), |number| format!("specimen {number}")),
+                indenter: self.laboratory.indenter.clone(),
+            },
+            is_acknowledged: programme.is_acknowledged,
+            after_stop: AfterStop::Close,
+            answers: self.laboratory.answers,
+        };
+        let later = self.time_after(&place).map_err(refused)?;
+        let (reply, answer) = sync_channel(1);
+        let asked = Request::Run(Box::new(request), reply);
+        self.laboratory
+            .runner
+            .request(asked)
+            .map_err(|_| RunError::NoRunner)?;
+        match answer.recv() {
+            Ok(Ok(())) => {}
+            Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
+                return Err(refused(reason));
+            }
+            Err(_) => return Err(RunError::NoRunner),
+        }
+        self.journal.push(&Entry::Begun {
+            place: place.clone(),
+            session: session.clone(),
+            at: stamp(wall_now()),
+        })?;
+        self.progress
+            .runs
+            .push((place.clone(), session.clone(), None));
+        let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some("finish");
+        let done = self.progress.runs.iter().filter(finished).count() as u32;
+        (self.tell)(Event::Begun {
+            place: &place,
+            count: (done, programme.session_count()),
+        });
+        let (ending, reason) = self.wait(&folder, later)?;
+        self.journal.push(&Entry::Ended {
+            place: place.clone(),
+            outcome: ending.clone(),
+            reason: reason.clone(),
+        })?;
+        if let Some(run) = self.progress.runs.last_mut() {
+            run.2 = Some(ending.clone());
+        }
+        if ending != "finish" {
+            return Err(RunError::Ended {
+                task: task.name.clone(),
+                repeat: place.repeat,
+                ending,
+                reason,
+            });
+        }
+        (self.tell)(Event::Finished(&place, &folder));
+        self.calibrate(place.task, &folder)
+    }
+
+    /// Waits until the run in a folder has ended and its log is closed.
+    fn wait(&mut self, folder: &Path, later: Seconds) -> Result<(String, String), RunError> {
+        loop {
+            let is_woken = self.laboratory.woken.recv_timeout(SILENCE).is_ok();
+            let snapshot = self.laboratory.runner.snapshot();
+            let own = snapshot.run.as_ref().filter(|run| run.folder == folder);
+            if let Some(view) = own {
+                let left = Seconds(view.time_left.0 + later.0);
+                (self.tell)(Event::Running(view, left));
+                if let Some(outcome) = &view.outcome {
+                    return match &view.log_error {
+                        // What is not on disk did not happen.
+                        Some(err) => Ok(("abort".into(), err.clone())),
+                        None => Ok((outcome.ending.name().into(), outcome.reason.clone())),
+                    };
+                }
+            }
+            if !is_woken && !self.laboratory.runner.is_alive() {
+                return Err(RunError::NoRunner);
+            }
+        }
+    }
+
+    /// The calibration that a finished task measured, if it is one that calibrates.
+    fn calibrate(&mut self, task: usize, folder: &Path) -> Result<(), RunError> {
+        let task = &self.programme.tasks[task];
+        if !task.calibrates {
+            return Ok(());
+        }
+        let session = Session::open(folder)?;
+        let calibration =
+            calibration_of(&session, &task.name).map_err(|source| RunError::Calibrating {
+                task: task.name.clone(),
+                source,
+            })?;
+        (self.tell)(Event::Calibrated(&calibration));
+        self.laboratory.calibration = calibration;
+        Ok(())
+    }
+
+    /// Expected time of everything behind a place.
+    fn time_after(&self, place: &Place) -> Result<Seconds, String> {
+        let curve = self.laboratory.calibration.curve();
+        let curve = curve.map_err(|err| err.to_string())?;
+        let mut left = 0.0;
+        for (index, task) in self.programme.tasks.iter().enumerate().skip(place.task) {
+            let first = if index == place.task {
+                place.repeat + 1
+            } else {
+                1
+            };
+            for repeat in first..=task.repeats {
+                let Some(plan) = task.plan(repeat, None) else {
+                    continue;
+                };
+                let (rig, limits) = (self.laboratory.rig, &self.laboratory.limits);
+                left += preview(&plan, rig, limits, &curve, true).expected.0;
+            }
+        }
+        Ok(Seconds(left))
+    }
+}
+
+/// Where a run's session goes: `TASK/REPEAT`, and `TASK/REPEAT-ATTEMPT` where it is made again.
+fn session_folder(task: &str, place: &Place) -> PathBuf {
+    let name = match place.attempt {
+        1 => format!("{:02}", place.repeat),
+        attempt => format!("{:02}-{attempt}", place.repeat),
+    };
+    Path::new(task).join(name)
+}
