@@ -181,7 +181,7 @@ fn labels(args: &RampHoldArgs) -> Result<Labels, Failure> {
 }
 
 /// The first signal stops, the second halts.
-fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
+pub(super) fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
     let requests = runner.requests();
     let count = AtomicU32::new(0);
     ctrlc::set_handler(move || {

@@ -1,6 +1,7 @@
 //! The words every crate shares about a rig: what it is, what it is told, what it reports.
 
 pub mod command;
+pub mod compliance;
 pub mod course;
 pub mod description;
 pub mod event;
@@ -12,8 +13,10 @@ pub mod phase;
 pub mod profile;
 pub mod reading;
 pub mod signal;
+pub mod thickness;
 
 pub use command::{MoveTo, Oscillation, RigCommand};
+pub use compliance::{Compliance, ComplianceError, CorrectedDepth, StiffSample, fit_compliance};
 pub use course::Course;
 pub use description::{AdcDescription, RigDescription};
 pub use event::{Ack, Fault};
@@ -25,3 +28,4 @@ pub use phase::Phase;
 pub use profile::Profile;
 pub use reading::{AxisStatus, Reading};
 pub use signal::SignalFacts;
+pub use thickness::{Thickness, ThicknessError, Touched, thickness};
