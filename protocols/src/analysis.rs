@@ -111,6 +111,14 @@ pub enum SourceError {
         /// The parser's words.
         detail: String,
     },
+    /// The session's plan is not what this version knows.
+    #[error(
+        "the session's plan cannot be understood ({detail}); read the session with the version that wrote it"
+    )]
+    Plan {
+        /// The parser's words.
+        detail: String,
+    },
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration {

@@ -9,6 +9,7 @@ pub mod analysis;
 pub mod cycles;
 pub mod edited;
 pub mod engine;
+pub mod fidelity;
 pub mod file;
 pub mod plans;
 pub mod preview;

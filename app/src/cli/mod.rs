@@ -12,6 +12,7 @@ mod output;
 mod plan;
 mod programme;
 mod replay;
+mod report;
 mod rig;
 mod run;
 mod select;
@@ -62,6 +63,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Tell what a session contains
     Info(info::InfoArgs),
+    /// Tell what happened in a run: targets and what was done, missing samples, use of time
+    Report(report::ReportArgs),
     /// Say what a session is worth: valid, suspect or rejected
     Verdict(verdict::VerdictArgs),
     /// Correct where a session found contact; its log stays as it is
@@ -147,6 +150,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
+        Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
         Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
     };
@@ -185,6 +189,7 @@ fn source_failure(err: SourceError) -> Failure {
         SourceError::Session(err) => read_failure(err),
         SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
         SourceError::Edits(_)
+        | SourceError::Plan { .. }
         | SourceError::Empty
         | SourceError::Calibration { .. }
         | SourceError::Decision { .. } => Failure::failed(err),

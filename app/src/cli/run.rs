@@ -11,7 +11,7 @@ use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
-use palpate_sessions::About;
+use palpate_sessions::{About, Verdict};
 use serde::Serialize;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -92,6 +92,8 @@ struct RunReport {
     contact_mm: Option<f64>,
     contact_std_error_mm: Option<f64>,
     force_peak_n: Option<f64>,
+    verdict: Option<Verdict>,
+    verdict_reason: Option<String>,
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
@@ -248,6 +250,8 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         contact_mm: view.contact.map(|contact| contact.position.0),
         contact_std_error_mm: view.contact.map(|contact| contact.std_error_mm),
         force_peak_n: view.force_peak.map(|force| force.0),
+        verdict: view.verdict.as_ref().map(|(verdict, _)| *verdict),
+        verdict_reason: view.verdict.as_ref().map(|(_, reason)| reason.clone()),
         live: view.live.clone(),
     };
     output.result(&report, || run_text(&report));
@@ -280,6 +284,9 @@ fn run_text(report: &RunReport) -> String {
     }
     if let Some(peak) = report.force_peak_n {
         lines.push(format!("peak force {peak:.3} N"));
+    }
+    if let (Some(verdict), Some(reason)) = (report.verdict, &report.verdict_reason) {
+        lines.push(format!("{verdict}: {reason}"));
     }
     if let Some(live) = &report.live {
         lines.push("live fit:".into());

@@ -118,7 +118,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     };
     let manifest = Manifest {
         record_version: RECORD_VERSION,
-        session_id,
+        session_id: session_id.clone(),
         software_version: env!("CARGO_PKG_VERSION").into(),
         engine_version: ENGINE_VERSION,
         started_at: started_at.into(),
@@ -151,7 +151,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     Ok(ActiveRun::new(
         config,
         preview,
-        writer,
+        (writer, session_id),
         path,
         bench.origin,
         (request.after_stop, request.answers),
