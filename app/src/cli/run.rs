@@ -22,7 +22,7 @@ use std::time::Duration;
 
 /// Arguments of `palpate run`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct RunArgs {
     #[command(subcommand)]
     command: Option<RunCommand>,
@@ -52,7 +52,7 @@ pub enum RunCommand {
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
     /// A built-in protocol ('palpate protocol list') or a protocol file
-    #[arg(value_name = "NAME|FILE", required = true)]
+    #[arg(value_name = "NAME|FILE")]
     protocol: Option<String>,
     #[command(flatten)]
     values: ValueArgs,

@@ -159,7 +159,7 @@ const HOME_KEYS: [Key; 2] = [
 pub(super) const WORDS: [Word; 17] = [
     Word {
         name: "self-test",
-        about: "Check link, signal and stop, and switch the motor on. First in every protocol.",
+        about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
         keys: &[key(
             "for",
             Kind::Time,
