@@ -106,7 +106,7 @@ fn without_a_specimen_the_probe_meets_the_base_or_nothing() {
         let truth = rig.truth();
         let into = truth.position.distance_from(base).max(0.0);
         assert_eq!(truth.force.0 > 0.0, meets);
-        assert!((truth.force.0 - 100.0 * into).abs() < 1e-9, "{truth:?}");
+        assert!((truth.force.0 - 1000.0 * into).abs() < 1e-9, "{truth:?}");
     }
 }
 

@@ -1,6 +1,7 @@
 //! Where sessions live: the library, the folder of one session, and room on its disk.
 
 pub use crate::lock::{HolderLock, LockError};
+use chrono::{DateTime, Utc};
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -149,6 +150,13 @@ fn library_from(
 #[must_use]
 pub fn new_session_folder(library: &Path, session_id: &str) -> PathBuf {
     library.join("sessions").join(session_id)
+}
+
+/// The folder a new run of a programme gets in a library.
+#[must_use]
+pub fn new_programme_folder(library: &Path, name: &str, started_at: DateTime<Utc>) -> PathBuf {
+    let begun = crate::manifest::new_session_id(started_at);
+    library.join("programmes").join(format!("{name}-{begun}"))
 }
 
 /// Refuses a disk with less than twice the room a session needs.

@@ -29,7 +29,7 @@ pub use calibrations::{
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,
-    library_folder, new_session_folder, segment_file,
+    library_folder, new_programme_folder, new_session_folder, segment_file,
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use log::{

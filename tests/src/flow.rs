@@ -154,8 +154,9 @@ impl Flow {
         });
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();
-        let fitted = fit_source(&session, None, &FitOptions::default());
-        let result = match fitted {
+        let options = FitOptions::default();
+        let fitted = fit_source(&session, None, &options);
+        let result = match fitted.map(|fitted| fitted.with_systematic(&options)) {
             Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
             Err(err) => Err(err.to_string()),
         };

@@ -70,7 +70,7 @@ pub fn search_on(
             touch_speed: MmPerS(0.3),
         },
         Step::Tare {
-            duration: Seconds(1.0),
+            duration: Seconds(4.0),
         },
         Step::FindContact(plan),
     ];

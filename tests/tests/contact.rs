@@ -234,6 +234,29 @@ fn a_loaded_cell_is_refused() {
 }
 
 #[test]
+fn a_drifting_signal_is_refused_and_a_steady_one_recorded() {
+    // Something drips onto the cell, half a gram a second.
+    let rig = SimRig::new(settings(1, "20", "100"));
+    let mut mass_g = 0.0;
+    let found = search_on(rig, FindContact::default(), move |rig, state| {
+        if state.phase() == Phase::Tare {
+            mass_g += 0.5e-3;
+            rig.by_hand(HandAction::LoadCell { mass_g });
+        }
+    });
+    assert_refused(&found, "drifts by");
+    let found = search(settings(1, "20", "100"), FindContact::default(), None);
+    let drift = found.records.iter().find_map(|record| match record {
+        Record::Tared { drift, .. } => *drift,
+        _ => None,
+    });
+    let drift = drift.expect("a drift");
+    // 3 mV of white noise over 4000 samples and 4 s: root 12 / 4000 over 4 s.
+    assert!((drift.std_error / (3e-3 * (12f64 / 4000.0).sqrt() / 4.0) - 1.0).abs() < 0.1);
+    assert!(drift.volts_per_s.abs() < 4.0 * drift.std_error);
+}
+
+#[test]
 fn an_interval_wider_than_the_plan_allows_is_refused() {
     let plan = FindContact {
         std_error_mm_max: 0.005,

@@ -10,6 +10,7 @@ mod last_fit;
 mod new_file;
 mod output;
 mod plan;
+mod programme;
 mod protocol;
 mod replay;
 mod rig;

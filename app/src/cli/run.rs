@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::output::Output;
+use super::programme::ProgrammeArgs;
 use super::protocol::{ValueArgs, pair};
 use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
@@ -9,12 +10,13 @@ use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
+use palpate_protocols::programme::Programme;
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
 use serde::Serialize;
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -165,6 +167,10 @@ fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
             "name a protocol; 'palpate protocol list' tells which there are",
         ));
     };
+    if !super::protocol::is_built_in(name) && Programme::is_meant(&super::protocol::text_of(name)?)
+    {
+        return run_programme(name, args, output);
+    }
     let bench = super::rig::open(&args.how.rig)?;
     let (protocol, written, _) =
         super::protocol::sound(name, &args.values.values(), &bench, output)?;
@@ -199,6 +205,24 @@ fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
         source.answers = answers;
     }
     carry_out_for(plan, bench, how, labels, output)
+}
+
+fn run_programme(file: &str, args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
+    if !args.values.values().is_empty() || !args.ask.is_empty() {
+        return Err(Failure::usage(
+            "a programme sets the values of its protocols itself; change it in its file instead of with --set or --ask",
+        ));
+    }
+    let how = &args.how;
+    let programme = ProgrammeArgs {
+        file: Path::new(file),
+        rig: &how.rig,
+        out: how.out.as_deref(),
+        operator: &how.operator,
+        indenter: &how.indenter,
+        preview: how.preview,
+    };
+    super::programme::run(&programme, output)
 }
 
 fn carry_out(plan: Plan, bench: OpenRig, how: &HowArgs, output: &Output) -> Result<(), Failure> {
@@ -275,7 +299,7 @@ fn carry_out_for(
 }
 
 /// The first signal stops, the second halts.
-fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
+pub(super) fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
     let requests = runner.requests();
     let count = AtomicU32::new(0);
     ctrlc::set_handler(move || {

@@ -8,6 +8,7 @@ pub mod extremes;
 pub mod family;
 pub mod picture;
 pub mod plan_picture;
+pub mod programme;
 pub mod selection;
 mod selection_plot;
 pub(crate) mod svg;

@@ -39,7 +39,7 @@ fn row_ui(ui: &mut Ui, text: &ParameterText) {
                 ui.label(RichText::new("95 %").color(tokens.text_quiet).small());
             });
             let interval = RichText::new(&text.interval).monospace().small();
-            ui.label(interval.color(tokens.text_quiet));
+            ui.add(Label::new(interval.color(tokens.text_quiet)).wrap());
         });
     }
 }

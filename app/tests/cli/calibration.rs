@@ -206,7 +206,7 @@ fn mistakes_get_one_sentence() {
             "give best, monotone",
         ),
         (
-            &["import", "cell.csv", "--name", "p", "--tolerance", "-1"],
+            &["import", "cell.csv", "--name", "p", "--tolerance=-1"],
             "tolerance",
         ),
         (

@@ -1,10 +1,12 @@
 //! The command line as a user meets it: whole commands, their exit codes and their sentences.
 
+mod analyse;
 mod calibration;
 mod disk;
 mod extremes;
 mod fit;
 mod plan;
+mod protocol;
 mod select;
 mod trade;
 

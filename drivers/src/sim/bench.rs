@@ -8,9 +8,9 @@ use palpate_model::rig::HandAction;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Newtons, Position, Seconds};
 
-/// Stiffness of the base in N/mm: a box wall of some millimetres of acrylic. At the 0.03 mm/s of a careful
-/// touch the force then rises by 3 N/s, slow enough to be stopped in time.
-const BASE_STIFFNESS: f64 = 100.0;
+/// Stiffness of the base in N/mm: a steel plate on its mount, which gives way by 1 um/N. At the slowest speed,
+/// 0.03 mm/s, its force rises by 30 N/s, which the force-rate interlock lets pass.
+const BASE_STIFFNESS: f64 = 1000.0;
 
 /// The probe's position is solved for this closely, in mm: far below what any force resolves.
 const SOLVED_MM: f64 = 1e-12;

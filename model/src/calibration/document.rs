@@ -275,6 +275,7 @@ impl Calibration {
                 format: self.format,
             });
         }
+        self.check_facts()?;
         let points = if self.series.is_empty() {
             self.points_of_steps()?
         } else {
@@ -286,6 +287,37 @@ impl Calibration {
             }),
             _ => Ok(points),
         }
+    }
+
+    /// Numbers beside the readings must be numbers, and those that say how far something may be off not
+    /// negative.
+    fn check_facts(&self) -> Result<(), CalibrationError> {
+        let signed = [
+            ("zero before", self.zero_before),
+            ("zero after", self.zero_after),
+            ("excitation", self.excitation),
+        ];
+        let signed = signed.map(|(what, volts)| (what, volts.map(Volts::get), f64::NEG_INFINITY));
+        let resolution = ("resolution", self.resolution.map(Volts::get), 0.0);
+        let weights = self.weights.iter().flat_map(|weight| {
+            [
+                ("mass of a weight", Some(weight.mass_g), 0.0),
+                ("tolerance of a weight", weight.tolerance_g, 0.0),
+            ]
+        });
+        let noises = self
+            .series_steps()
+            .map(|(_, step)| ("noise", step.noise.map(Volts::get), 0.0));
+        let mut facts = signed
+            .into_iter()
+            .chain([resolution])
+            .chain(weights)
+            .chain(noises);
+        let wrong = facts.find_map(|(what, value, least)| {
+            let value = value.filter(|value| !(value.is_finite() && *value >= least))?;
+            Some(CalibrationError::Fact { what, value })
+        });
+        wrong.map_or(Ok(()), Err)
     }
 
     fn points_of_steps(&self) -> Result<Vec<Point>, CalibrationError> {

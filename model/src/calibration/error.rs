@@ -26,6 +26,16 @@ pub enum CalibrationError {
         /// Its signal in V.
         volts: f64,
     },
+    /// A number beside the readings that cannot be.
+    #[error(
+        "the {what} of the calibration is {value}, which cannot be; correct it or leave it out"
+    )]
+    Fact {
+        /// Which number.
+        what: &'static str,
+        /// Its value.
+        value: f64,
+    },
     /// Masses out of order.
     #[error(
         "weight step {step} has {mass_g} g after {before_g} g; masses must increase from step to step, remove or reorder it"

@@ -114,6 +114,41 @@ fn a_document_of_recorded_sessions_gives_the_same_curve() {
 }
 
 #[test]
+fn facts_that_cannot_be_are_refused() {
+    let thesis = Calibration::thesis;
+    let nan = Some(Volts(f64::NAN));
+    for (wrong, words) in [
+        (
+            Calibration {
+                excitation: nan,
+                ..thesis()
+            },
+            "excitation of the calibration is NaN",
+        ),
+        (
+            Calibration {
+                zero_after: nan,
+                ..thesis()
+            },
+            "zero after",
+        ),
+        (
+            Calibration {
+                resolution: Some(Volts(-0.1)),
+                ..thesis()
+            },
+            "resolution of the calibration is -0.1",
+        ),
+    ] {
+        let refusal = wrong.curve().unwrap_err().to_string();
+        assert!(refusal.contains(words), "{refusal}");
+    }
+    let mut noisy = document(&[(Direction::Loading, 1, &[(0.0, 1.0), (100.0, 1.2)])]);
+    noisy.series[0].steps[1].noise = nan;
+    assert!(noisy.curve().unwrap_err().to_string().contains("noise"));
+}
+
+#[test]
 fn a_newer_form_is_refused() {
     let mut calibration = Calibration::thesis();
     calibration.format = CALIBRATION_FORMAT + 1;

@@ -162,6 +162,12 @@ impl Calibration {
                 "read it again",
             ),
             (
+                "tolerance",
+                weight.tolerance_g.unwrap_or(0.0),
+                weight.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
+                "give grams, 0 or more",
+            ),
+            (
                 "tare",
                 weight.tare.0,
                 weight.tare.is_finite(),

@@ -1,6 +1,7 @@
 //! The words every crate shares about a rig: what it is, what it is told, what it reports.
 
 pub mod command;
+pub mod compliance;
 pub mod course;
 pub mod description;
 pub mod event;
@@ -11,8 +12,10 @@ pub mod path;
 pub mod phase;
 pub mod profile;
 pub mod reading;
+pub mod thickness;
 
 pub use command::{MoveTo, Oscillation, RigCommand};
+pub use compliance::{Compliance, ComplianceError, CorrectedDepth, StiffSample, fit_compliance};
 pub use course::Course;
 pub use description::{AdcDescription, RigDescription};
 pub use event::{Ack, Fault};
@@ -23,3 +26,4 @@ pub use path::{PathError, PathTracker};
 pub use phase::Phase;
 pub use profile::Profile;
 pub use reading::{AxisStatus, Reading};
+pub use thickness::{Thickness, ThicknessError, Touched, thickness};

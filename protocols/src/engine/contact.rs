@@ -7,14 +7,14 @@
 
 use super::context::{Context, Progress};
 use super::input::Record;
-use super::state::Contact;
+use super::state::{Contact, Tare};
 use super::touch_log::{Counts, TouchLog};
 use crate::plans::FindContact;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::signal::{
     ContactEstimate, ContactPoint, MovingMean, TouchEstimate, fit_contact, fit_touch,
 };
-use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
+use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use std::collections::VecDeque;
 
 /// Samples averaged before a force is compared with a criterion: 50 ms at 1 kHz, two to three
@@ -38,6 +38,9 @@ const CRITERION_SIGMAS: f64 = 6.0;
 
 /// A criterion above this would press visibly before it triggers.
 const CRITERION_MAX: Newtons = Newtons(0.2);
+
+/// A drift counts as far as it is beyond so many of its standard errors.
+const DRIFT_SIGMAS: f64 = 3.0;
 
 /// Contact finding never exerts more than this.
 const FORCE_MAX: Newtons = Newtons(0.5);
@@ -116,6 +119,13 @@ impl ContactSearch {
             ));
         }
         let end = Position(cx.state.config.limits.travel_max.0 - TRAVEL_MARGIN_MM);
+        let way_mm = end.distance_from(cx.state.derived.position);
+        check_drift(
+            cx,
+            &tare,
+            Seconds(way_mm / plan.approach_speed.0),
+            criterion,
+        )?;
         cx.move_to(end, plan.approach_speed)?;
         Ok(Self {
             plan,
@@ -414,6 +424,28 @@ impl ContactSearch {
             std_error_mm: found.std_error_mm,
         })
     }
+}
+
+/// Refuses a drift that surely moves the force by half of the criterion within the time an approach may take.
+fn check_drift(
+    cx: &Context<'_>,
+    tare: &Tare,
+    span: Seconds,
+    criterion: Newtons,
+) -> Result<(), String> {
+    let Some(drift) = tare.drift else {
+        return Ok(());
+    };
+    let sure = (drift.volts_per_s.abs() - DRIFT_SIGMAS * drift.std_error).max(0.0);
+    let curve = &cx.state.config.curve;
+    let moved = curve.force_sigma(Newtons(0.0), Volts(sure * span.0));
+    if moved.0 > 0.5 * criterion.0 {
+        return Err(format!(
+            "the unloaded signal drifts by {:.2} mV a minute, which could move the force by {moved:.3} during the approach; let the load cell warm up, then tare again",
+            drift.volts_per_s * 6e4
+        ));
+    }
+    Ok(())
 }
 
 fn no_tissue(position: Position) -> String {

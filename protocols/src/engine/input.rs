@@ -1,6 +1,7 @@
 //! The two closed enums of the engine: what it sees and what it does.
 
 use super::interlock::Interlock;
+use super::state::Drift;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
 use palpate_model::fit::LiveEstimate;
@@ -101,6 +102,9 @@ pub enum Record {
         noise: Volts,
         /// How many samples.
         samples: u64,
+        /// How the signal drifted meanwhile; absent where the tare was too short to tell.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        drift: Option<Drift>,
     },
     /// Enough consecutive samples were above the contact criterion.
     ContactTriggered {
@@ -323,8 +327,17 @@ impl fmt::Display for Record {
                     "home found at counter {edge_pulses}; position zero set there"
                 )
             }
-            Self::Tared { volts, noise, .. } => {
-                write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)
+            Self::Tared {
+                volts,
+                noise,
+                drift,
+                ..
+            } => {
+                write!(f, "tare {volts:.4}, noise {:.2} mV rms", noise.0 * 1e3)?;
+                // A minute is how long people wait for a cell to settle.
+                drift.map_or(Ok(()), |drift| {
+                    write!(f, ", drift {:+.2} mV a minute", drift.volts_per_s * 6e4)
+                })
             }
             Self::ContactTriggered {
                 pass,

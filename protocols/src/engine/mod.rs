@@ -29,7 +29,7 @@ mod weigh;
 
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
-pub use state::{Config, Contact, Derived, PauseView, Power, State, Tare};
+pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, Tare};
 pub use step::step;
 
 /// Version of the engine's decisions. Raised whenever a recorded session could decide

@@ -17,6 +17,7 @@ use palpate_model::calibration::Curve;
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
 use std::sync::Arc;
 
@@ -54,6 +55,17 @@ pub struct Tare {
     pub volts: Volts,
     /// Standard deviation of one sample, quantisation included.
     pub noise: Volts,
+    /// How the signal drifted meanwhile; `None` where the tare was too short to tell.
+    pub drift: Option<Drift>,
+}
+
+/// A steady change of the unloaded signal.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drift {
+    /// Slope of a straight line through the samples, in V/s.
+    pub volts_per_s: f64,
+    /// Its standard error under white noise.
+    pub std_error: f64,
 }
 
 /// Where the tissue begins.

@@ -34,6 +34,40 @@ impl RunningStats {
     }
 }
 
+/// A straight line through a stream of points, in constant memory, by the same updates.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct RunningLine {
+    count: u64,
+    x: f64,
+    y: f64,
+    xx: f64,
+    xy: f64,
+    yy: f64,
+}
+
+impl RunningLine {
+    pub fn push(&mut self, x: f64, y: f64) {
+        self.count += 1;
+        let share = 1.0 / self.count as f64;
+        let (dx, dy) = (x - self.x, y - self.y);
+        self.x += dx * share;
+        self.y += dy * share;
+        self.xx += dx * (x - self.x);
+        self.xy += dx * (y - self.y);
+        self.yy += dy * (y - self.y);
+    }
+
+    /// Slope and its standard error under white noise; `None` below three points or without spread.
+    pub fn slope(&self) -> Option<(f64, f64)> {
+        if self.count < 3 || self.xx <= 0.0 {
+            return None;
+        }
+        let slope = self.xy / self.xx;
+        let left = (self.yy - slope * self.xy).max(0.0);
+        Some((slope, (left / (self.count - 2) as f64 / self.xx).sqrt()))
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -48,5 +82,17 @@ mod tests {
         assert!((stats.mean() - mean).abs() < 1e-15);
         // Squared deviations of 1e-3 on values of 1.28: cancellation leaves about ten digits.
         assert!((stats.std_dev() / variance.sqrt() - 1.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_line_is_the_one_of_the_textbook() {
+        let mut line = RunningLine::default();
+        let points = [(0.0, 1.1), (1.0, 2.9), (2.0, 5.2), (3.0, 6.8)];
+        points.iter().for_each(|&(x, y)| line.push(1e6 + x, y));
+        // By hand: Sxx = 5, Sxy = 9.7, Syy = 18.9; residuals (18.9 - 9.7^2 / 5) / 2 / 5.
+        let (slope, error) = line.slope().unwrap();
+        assert!((slope - 1.94).abs() < 1e-9, "{slope}");
+        assert!((error - 0.0082f64.sqrt()).abs() < 1e-8, "{error}");
+        assert_eq!(RunningLine::default().slope(), None);
     }
 }

@@ -51,8 +51,9 @@ impl RampHold {
                 speed: MmPerS(9.0),
                 touch_speed: MmPerS(0.3),
             },
+            // Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
             Step::Tare {
-                duration: Seconds(1.0),
+                duration: Seconds(4.0),
             },
             Step::FindContact(FindContact::default()),
             Step::Ramp {

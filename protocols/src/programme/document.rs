@@ -283,23 +283,24 @@ fn read_task(
     }
 }
 
-/// Values as a protocol's parameters are given: a text, or a number without a unit.
+/// Values as a protocol's parameters are given: a text, or a number without a unit; a list with commas. Whether
+/// that is a value, the protocol says.
 fn texts(values: BTreeMap<String, Value>) -> BTreeMap<String, String> {
-    let text = |value: Value| match value {
-        Value::String(text) => text,
-        Value::Array(items) => {
-            let items = items.into_iter().map(|item| match item {
-                Value::String(text) => text,
-                other => other.to_string(),
-            });
-            items.collect::<Vec<_>>().join(", ")
-        }
-        other => other.to_string(),
-    };
     values
         .into_iter()
-        .map(|(name, value)| (name, text(value)))
+        .map(|(name, value)| (name, as_text(&value)))
         .collect()
+}
+
+fn as_text(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.clone(),
+        Value::Integer(number) => number.to_string(),
+        Value::Float(number) => number.to_string(),
+        Value::Boolean(is_so) => is_so.to_string(),
+        Value::Array(items) => items.iter().map(as_text).collect::<Vec<_>>().join(", "),
+        Value::Datetime(_) | Value::Table(_) => String::new(),
+    }
 }
 
 fn line_of(text: &str, at: usize) -> usize {

@@ -1,0 +1,223 @@
+//! `palpate run FILE` for a programme: every task on one rig, a journal to continue from, a page of what it told.
+
+use super::Failure;
+use super::output::Output;
+use super::rig::RigArgs;
+use crate::report::programme::Page;
+use palpate_protocols::programme::{
+    Done, Event, Laboratory, Programme, RunError, run as carry_out,
+};
+use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
+use palpate_sessions::text::{checksum, read};
+use palpate_sessions::{library_folder, new_programme_folder};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::sync_channel;
+
+/// Name of the page in the programme's folder.
+const PAGE_FILE: &str = "summary.html";
+
+/// Name of the calibration in force at the end.
+const CALIBRATION_FILE: &str = "calibration.json";
+
+/// What a programme is run with.
+pub(super) struct ProgrammeArgs<'a> {
+    /// Its file.
+    pub file: &'a Path,
+    /// The rig.
+    pub rig: &'a RigArgs,
+    /// Folder for everything it leaves; to go on, the one it was begun in.
+    pub out: Option<&'a Path>,
+    /// Who runs it, where that is not what the file says.
+    pub operator: &'a str,
+    /// With which probe.
+    pub indenter: &'a str,
+    /// Only tell what would happen.
+    pub preview: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    command: &'static str,
+    programme: &'a str,
+    folder: PathBuf,
+    was_continued: bool,
+    page: PathBuf,
+    calibration: Option<PathBuf>,
+    #[serde(flatten)]
+    told: &'a Page,
+}
+
+pub(super) fn run(args: &ProgrammeArgs<'_>, output: &Output) -> Result<(), Failure> {
+    let text = read(args.file).map_err(Failure::usage)?;
+    let mut programme = read_programme(args.file, &text)?;
+    if !args.operator.is_empty() {
+        programme.operator = args.operator.to_owned();
+    }
+    let rig_args = with_settings(args.rig, &programme.simulated)?;
+    if args.preview {
+        output.text_only(|| contents(&programme));
+        return Ok(());
+    }
+    let folder = match args.out {
+        Some(folder) => folder.to_path_buf(),
+        None => {
+            let library = library_folder().map_err(Failure::usage)?;
+            new_programme_folder(&library, &programme.name, wall_now().into())
+        }
+    };
+    let bench = super::rig::open(&rig_args)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let description = bench.rig.description().clone();
+    let answers = if bench.rig.is_virtual() {
+        Answers::Confirm
+    } else {
+        Answers::Operator
+    };
+    let (wake, woken) = sync_channel(1);
+    let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
+        // A full channel already says what this would say.
+        let _ = wake.try_send(());
+    })
+    .map_err(Failure::failed)?;
+    super::run::stop_on_signals(&runner)?;
+    let laboratory = Laboratory {
+        runner: &runner,
+        woken: &woken,
+        rig: &description,
+        limits: bench.limits,
+        calibration: bench.calibration,
+        folder: &folder,
+        answers,
+        indenter: args.indenter.to_owned(),
+    };
+    let done = watch(&programme, &checksum(&text), laboratory, output)?;
+    drop(runner);
+    leave(&programme, &folder, &done, output)
+}
+
+/// Carries the programme out with a line of progress.
+fn watch(
+    programme: &Programme,
+    crc32: &str,
+    laboratory: Laboratory<'_>,
+    output: &Output,
+) -> Result<Done, Failure> {
+    let bar = output.bar(1000);
+    let mut so_far = String::new();
+    let result = carry_out(programme, crc32, laboratory, &mut |event| match event {
+        Event::Begun { place, count } => {
+            let task = &programme.tasks[place.task].name;
+            so_far = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
+            bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
+        }
+        Event::Running(view, left) => bar.set_message(format!("{so_far}  {}", going(view, left.0))),
+        Event::Finished(..) | Event::Calibrated(_) => {}
+    });
+    bar.finish_and_clear();
+    result.map_err(|err| match err {
+        RunError::Progress(_) | RunError::Refused { .. } => Failure::usage(err),
+        err => Failure::failed(err),
+    })
+}
+
+fn going(view: &RunView, left: f64) -> String {
+    let left = left.round() as u64;
+    format!(
+        "{}  {}:{:02}:{:02} of session time left",
+        view.phase,
+        left / 3600,
+        left / 60 % 60,
+        left % 60
+    )
+}
+
+/// Writes the page and the calibration and tells where they are.
+fn leave(
+    programme: &Programme,
+    folder: &Path,
+    done: &Done,
+    output: &Output,
+) -> Result<(), Failure> {
+    let bar = output.count_bar(programme.tasks.len() as u64);
+    let page = Page::of(programme, folder, &done.progress, &mut |task| {
+        bar.inc(1);
+        bar.set_message(task.to_owned());
+    });
+    bar.finish_and_clear();
+    let path = folder.join(PAGE_FILE);
+    palpate_sessions::text::write(&path, &page.html()).map_err(Failure::failed)?;
+    let has_calibrated = programme.tasks.iter().any(|task| task.calibrates);
+    let calibration = has_calibrated.then(|| folder.join(CALIBRATION_FILE));
+    if let Some(path) = &calibration {
+        let text = serde_json::to_string_pretty(&done.calibration).map_err(Failure::failed)?;
+        palpate_sessions::text::write(path, &text).map_err(Failure::failed)?;
+    }
+    let report = Report {
+        command: "run",
+        programme: &programme.name,
+        folder: folder.to_path_buf(),
+        was_continued: done.was_continued,
+        page: path.clone(),
+        calibration: calibration.clone(),
+        told: &page,
+    };
+    output.result(&report, || {
+        let mut lines = vec![page.table(), format!("page: {}", path.display())];
+        lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
+        lines.join("\n")
+    });
+    Ok(())
+}
+
+fn read_programme(file: &Path, text: &str) -> Result<Programme, Failure> {
+    // Protocols that are not built in lie beside the programme.
+    let beside = |name: &str| {
+        let path = file.parent().unwrap_or(Path::new(".")).join(name);
+        read(&path).map_err(|err| {
+            format!(
+                "'{name}' is neither a built-in protocol nor a file beside the programme ({err})"
+            )
+        })
+    };
+    Programme::read(text, &beside)
+        .map_err(|err| Failure::usage(format!("{}: {err}", file.display())))
+}
+
+/// What the programme says of a simulated rig, where the command line says nothing else.
+fn with_settings(args: &RigArgs, simulated: &BTreeMap<String, String>) -> Result<RigArgs, Failure> {
+    let mut args = args.clone();
+    let usual = RigArgs::default();
+    for (name, value) in simulated {
+        let wrong =
+            |err: &dyn std::fmt::Display| Failure::usage(format!("[simulated] {name}: {err}"));
+        match name.as_str() {
+            "preconditioning" if args.preconditioning == usual.preconditioning => {
+                args.preconditioning = value.parse().map_err(|err| wrong(&err))?;
+            }
+            "softening" if args.softening == usual.softening => {
+                args.softening = value.parse().map_err(|err| wrong(&err))?;
+            }
+            "preconditioning" | "softening" => {}
+            _ => {
+                return Err(Failure::usage(format!(
+                    "[simulated] has no setting '{name}'; it has preconditioning and softening"
+                )));
+            }
+        }
+    }
+    Ok(args)
+}
+
+fn contents(programme: &Programme) -> String {
+    let mut lines = vec![programme.title.clone()];
+    lines.extend(programme.tasks.iter().map(|task| {
+        format!(
+            "{:<20} {:>3} x {}",
+            task.name, task.repeats, task.protocol.title
+        )
+    }));
+    lines.push(format!("{} sessions", programme.session_count()));
+    lines.join("\n")
+}

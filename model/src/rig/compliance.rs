@@ -1,0 +1,246 @@
+//! How far a rig gives way under force, from a run against something stiff, and what that does to depth.
+
+use crate::units::{Depth, Newtons, Position};
+use thiserror::Error;
+
+/// One sample of a run against a stiff surface.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct StiffSample {
+    /// Commanded position from home.
+    pub position: Position,
+    /// Force above tare.
+    pub force: Newtons,
+}
+
+/// Compliance of a rig with everything that was between its axis and the stiff surface, the surface included.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Compliance {
+    /// Way of the axis per force, in mm/N.
+    pub mm_per_newton: f64,
+    /// Its standard error.
+    pub std_error: f64,
+    /// Where the straight line has no force: the stiff surface, from home.
+    pub surface: Position,
+    /// Its standard error in mm.
+    pub surface_std_error_mm: f64,
+    /// Standard deviation of the forces about the line, in N.
+    pub rmse_n: f64,
+}
+
+/// No compliance follows from a run.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum ComplianceError {
+    /// Too little data above the seating force.
+    #[error(
+        "only {samples} samples are above the seating force of {seating:.2}; at least {SAMPLES_MIN} are needed, so press further or more slowly"
+    )]
+    TooShort {
+        /// How many there are.
+        samples: usize,
+        /// The seating force.
+        seating: Newtons,
+    },
+    /// The force does not rise with position.
+    #[error(
+        "the force does not rise with position, so nothing stiff was touched; check what stands before the probe"
+    )]
+    NotRising,
+    /// Not a straight line.
+    #[error(
+        "force over position curves: {bend:.1} % from a straight line over the run, more than {limit:.0} %; clean and seat the surface, or raise the seating force"
+    )]
+    Curved {
+        /// Greatest deviation of a parabola from the line as a share of the force range, in percent.
+        bend: f64,
+        /// What is allowed, in percent.
+        limit: f64,
+    },
+}
+
+/// Fewer samples do not tell a line from a parabola.
+const SAMPLES_MIN: usize = 30;
+
+/// A line is straight if a parabola leaves it by less than this share of the range of force: a correction
+/// that is wrong by 2 % of itself is far below a pulse on any rig worth correcting.
+const BEND_MAX: f64 = 0.02;
+
+/// A bend counts once it is beyond noise by so many standard errors.
+const BEND_SIGMAS: f64 = 3.0;
+
+/// Estimates the compliance of a rig from a slow run forward onto a stiff surface, by a straight line through
+/// the forces at or above `seating`: below it surfaces touch at their roughest points only.
+///
+/// Positions are commanded and exact; forces carry the noise. So force is fitted over position,
+/// `F = (x - x_0) / C`, and `C` follows with its error to first order.
+pub fn fit_compliance(
+    samples: &[StiffSample],
+    seating: Newtons,
+) -> Result<Compliance, ComplianceError> {
+    let used: Vec<(f64, f64)> = samples
+        .iter()
+        .filter(|sample| sample.force >= seating && sample.position.is_finite())
+        .map(|sample| (sample.position.0, sample.force.0))
+        .filter(|(_, force)| force.is_finite())
+        .collect();
+    let count = used.len() as f64;
+    if used.len() < SAMPLES_MIN {
+        let samples = used.len();
+        return Err(ComplianceError::TooShort { samples, seating });
+    }
+    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| used.iter().map(of).sum::<f64>() / count;
+    let (middle, force_mean) = (mean(&|s| s.0), mean(&|s| s.1));
+    let half = used
+        .iter()
+        .fold(0.0f64, |max, s| max.max((s.0 - middle).abs()));
+    // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
+    let u = |x: f64| (x - middle) / half;
+    let (square, cube) = (mean(&|s| u(s.0).powi(2)), mean(&|s| u(s.0).powi(3)));
+    let parabola = |x: f64| u(x).powi(2) - cube / square * u(x) - square;
+    let slope = mean(&|s| u(s.0) * s.1) / square;
+    let parabola_square = mean(&|s| parabola(s.0).powi(2));
+    let bend = mean(&|s| parabola(s.0) * s.1) / parabola_square;
+    let residual = |s: &(f64, f64)| s.1 - force_mean - slope * u(s.0);
+    let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
+    let slope_error = (variance / count / square).sqrt();
+    // Three standard errors: a slope that could be noise is none.
+    if !(half > 0.0 && slope > 3.0 * slope_error && slope.is_finite()) {
+        return Err(ComplianceError::NotRising);
+    }
+    let curved = variance - bend.powi(2) * parabola_square;
+    let bend_error = (curved.max(0.0) / count / parabola_square).sqrt();
+    let share = bend.abs() / (2.0 * slope);
+    if share > BEND_MAX && bend.abs() > BEND_SIGMAS * bend_error {
+        return Err(ComplianceError::Curved {
+            bend: 100.0 * share,
+            limit: 100.0 * BEND_MAX,
+        });
+    }
+    let compliance = half / slope;
+    Ok(Compliance {
+        mm_per_newton: compliance,
+        std_error: compliance * slope_error / slope,
+        surface: Position(middle - force_mean * compliance),
+        // Mean force and slope of centred samples are independent.
+        surface_std_error_mm: compliance
+            * (variance / count + (force_mean * slope_error / slope).powi(2)).sqrt(),
+        rmse_n: variance.sqrt(),
+    })
+}
+
+/// A depth with what a rig's compliance takes from it. It stands beside the raw depth, never in its place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct CorrectedDepth {
+    /// `depth - compliance * force`.
+    pub depth: Depth,
+    /// Its standard uncertainty in mm from that of compliance and force; that of the raw depth is not in it.
+    pub sigma_mm: f64,
+}
+
+impl Compliance {
+    /// How deep the probe really is where the axis is at a raw depth under a force.
+    ///
+    /// Contact is found at forces far below those of a measurement, and the rig gives way by as little there.
+    #[must_use]
+    pub fn correct(&self, raw: Depth, force: Newtons, force_sigma: Newtons) -> CorrectedDepth {
+        let from_compliance = force.0 * self.std_error;
+        let from_force = self.mm_per_newton * force_sigma.0;
+        CorrectedDepth {
+            depth: Depth(raw.0 - self.mm_per_newton * force.0),
+            sigma_mm: from_compliance.hypot(from_force),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::SplitMix;
+
+    /// A run onto a surface at 52.3 mm: `force` of the way past it, and white noise.
+    fn run(noise: f64, seed: u64, force: impl Fn(f64) -> f64) -> Vec<StiffSample> {
+        let mut random = SplitMix::seeded(seed);
+        (0..4000)
+            .map(|i| {
+                let x = f64::from(i) * 3e-5 - 0.02;
+                StiffSample {
+                    position: Position(52.3 + x),
+                    force: Newtons(force(x.max(0.0)) + noise * random.normal()),
+                }
+            })
+            .collect()
+    }
+
+    #[test]
+    fn a_straight_run_gives_compliance_and_surface() {
+        let exact = fit_compliance(&run(0.0, 1, |x| x / 0.02), Newtons(0.5)).unwrap();
+        assert!(
+            (exact.mm_per_newton / 0.02 - 1.0).abs() < 1e-10,
+            "{exact:?}"
+        );
+        assert!((exact.surface.0 - 52.3).abs() < 1e-10);
+        let (mut slope, mut surface) = (0.0, 0.0);
+        for seed in 0..40 {
+            let found = fit_compliance(&run(0.02, seed, |x| x / 0.02), Newtons(0.5)).unwrap();
+            slope += ((found.mm_per_newton - 0.02) / found.std_error).powi(2);
+            surface += ((found.surface.0 - 52.3) / found.surface_std_error_mm).powi(2);
+            assert!((found.rmse_n - 0.02).abs() < 0.002);
+        }
+        // Chi-square with 40 degrees: 16 to 76 holds all but 1e-3.
+        assert!((16.0..76.0).contains(&slope), "{slope}");
+        assert!((16.0..76.0).contains(&surface), "{surface}");
+    }
+
+    #[test]
+    fn seating_below_the_force_is_left_out() {
+        // The first 10 um are ten times as soft.
+        let seated = |x: f64| {
+            if x < 0.01 {
+                5.0 * x
+            } else {
+                0.05 + (x - 0.01) / 0.02
+            }
+        };
+        let found = fit_compliance(&run(0.005, 3, seated), Newtons(0.3)).unwrap();
+        assert!((found.mm_per_newton - 0.02).abs() < 4.0 * found.std_error);
+    }
+
+    #[test]
+    fn what_curves_or_is_soft_or_short_is_refused() {
+        // Hertz: a ball on a plate, F ~ x^1.5.
+        let hertz = fit_compliance(&run(0.01, 1, |x| 150.0 * x.powf(1.5)), Newtons(0.3));
+        assert!(
+            matches!(hertz, Err(ComplianceError::Curved { .. })),
+            "{hertz:?}"
+        );
+        let none = fit_compliance(&run(0.02, 1, |_| 1.0), Newtons(0.5));
+        assert_eq!(none, Err(ComplianceError::NotRising));
+        let short = fit_compliance(&run(0.0, 1, |x| x / 0.02), Newtons(4.99));
+        assert!(matches!(short, Err(ComplianceError::TooShort { .. })));
+        let still = vec![
+            StiffSample {
+                position: Position(1.0),
+                force: Newtons(1.0)
+            };
+            100
+        ];
+        assert_eq!(
+            fit_compliance(&still, Newtons(0.5)),
+            Err(ComplianceError::NotRising)
+        );
+    }
+
+    #[test]
+    fn corrected_depth_stands_beside_the_raw_one() {
+        let rig = Compliance {
+            mm_per_newton: 0.02,
+            std_error: 0.001,
+            surface: Position(52.3),
+            surface_std_error_mm: 0.001,
+            rmse_n: 0.02,
+        };
+        let corrected = rig.correct(Depth(30.0), Newtons(6.0), Newtons(0.1));
+        assert!((corrected.depth.0 - 29.88).abs() < 1e-12);
+        // 6 um from the compliance, 2 um from the force.
+        assert!((corrected.sigma_mm - 0.006f64.hypot(0.002)).abs() < 1e-12);
+    }
+}
