@@ -203,3 +203,17 @@ fn a_built_in_protocol_is_shown_copied_and_previewed() {
         stdout(&steps)
     );
 }
+
+#[test]
+fn the_pages_of_the_guide_are_those_of_the_protocols() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let check = std::process::Command::new("python3")
+        .arg(root.join("scripts/protocol-pages"))
+        .arg("--check")
+        .env("PALPATE", env!("CARGO_BIN_EXE_palpate"))
+        .output();
+    match check {
+        Ok(output) => assert!(output.status.success(), "{}", stderr(&output)),
+        Err(err) => println!("skipped: there is no python3 here ({err})"),
+    }
+}
