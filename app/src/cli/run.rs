@@ -10,6 +10,7 @@ use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
+use palpate_protocols::programme::Programme;
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
@@ -23,7 +24,7 @@ use std::time::Duration;
 
 /// Arguments of `palpate run`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct RunArgs {
     #[command(subcommand)]
     command: Option<RunCommand>,
