@@ -124,6 +124,8 @@ fn any_plan(random: &mut SplitMix) -> Plan {
             retreat_mm: 1.0,
             pass_speed: MmPerS(0.6),
             recovery: Seconds(0.3),
+            // At this speed a press would overshoot what contact finding may exert.
+            press: None,
             ..FindContact::default()
         }));
     }

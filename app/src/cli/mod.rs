@@ -11,6 +11,7 @@ mod new_file;
 mod output;
 mod plan;
 mod programme;
+mod protocol;
 mod replay;
 mod report;
 mod rig;
@@ -24,6 +25,7 @@ use clap::{Parser, Subcommand};
 use output::Output;
 use palpate_protocols::analysis::SourceError;
 use palpate_sessions::log::ReadError;
+use protocol::ProtocolCommand;
 use std::process::ExitCode;
 
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
@@ -39,8 +41,10 @@ enum Command {
     /// Open the window
     Window(rig::RigArgs),
     /// Run a protocol without a window
+    Run(run::RunArgs),
+    /// List, check, show or preview protocols
     #[command(subcommand)]
-    Run(run::RunCommand),
+    Protocol(protocol::ProtocolCommand),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
     /// Tell what the cycles of a record show: loops, shift, decay, relaxation
@@ -135,9 +139,14 @@ pub fn main() -> ExitCode {
     let (output, result) = match cli.command {
         None => (Output::text(), rig::window(&rig::RigArgs::default())),
         Some(Command::Window(args)) => (Output::text(), rig::window(&args)),
-        Some(Command::Run(run::RunCommand::RampHold(args))) => {
-            with(args.json, |out| run::run(&args, out))
-        }
+        Some(Command::Run(args)) => with(args.is_json(), |out| run::run(&args, out)),
+        Some(Command::Protocol(command)) => match command {
+            ProtocolCommand::List(args) => with(args.json, protocol::list),
+            ProtocolCommand::Check(args) => with(args.json, |out| protocol::run_check(&args, out)),
+            ProtocolCommand::Show(args) => with(args.json, |out| protocol::show(&args, out)),
+            ProtocolCommand::Preview(args) => with(args.json, |out| protocol::preview(&args, out)),
+            ProtocolCommand::Words => with(false, protocol::words),
+        },
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
         Some(Command::Analyse(args)) => with(args.json, |out| analyse::run(&args, out)),
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),

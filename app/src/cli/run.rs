@@ -2,11 +2,12 @@
 
 use super::Failure;
 use super::output::Output;
-use super::rig::RigArgs;
+use super::protocol::ValueArgs;
+use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
-use palpate_protocols::plans::{HoldUntil, RampHold};
+use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
@@ -19,11 +20,94 @@ use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
-/// The protocols.
+/// Arguments of `palpate run`.
+#[derive(Debug, Args)]
+#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+pub struct RunArgs {
+    #[command(subcommand)]
+    command: Option<RunCommand>,
+    #[command(flatten)]
+    protocol: ProtocolArgs,
+}
+
+impl RunArgs {
+    /// Whether one JSON object is wanted.
+    #[must_use]
+    pub fn is_json(&self) -> bool {
+        match &self.command {
+            Some(RunCommand::RampHold(args)) => args.json,
+            None => self.protocol.json,
+        }
+    }
+}
+
+/// Protocols with arguments of their own.
 #[derive(Debug, Subcommand)]
 pub enum RunCommand {
     /// Find the tissue, indent at constant speed, hold while the force relaxes
     RampHold(RampHoldArgs),
+}
+
+/// Arguments of `palpate run NAME|FILE`.
+#[derive(Debug, Args)]
+pub struct ProtocolArgs {
+    /// A built-in protocol ('palpate protocol list') or a protocol file
+    #[arg(value_name = "NAME|FILE", required = true)]
+    protocol: Option<String>,
+    #[command(flatten)]
+    values: ValueArgs,
+    #[command(flatten)]
+    how: HowArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// On which rig, into which folder, by whom.
+#[derive(Debug, Args)]
+struct HowArgs {
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Who runs it
+    #[arg(long, default_value = "")]
+    operator: String,
+    /// What is indented
+    #[arg(long, default_value = "")]
+    specimen: String,
+    /// With which probe
+    #[arg(long, default_value = "blunt 12 mm probe")]
+    indenter: String,
+    /// Tell more of specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    #[arg(long, value_name = "KEY=VALUE", alias = "ask")]
+    about: Vec<String>,
+    /// Accept what the preview or the daily check asks to acknowledge; it is recorded
+    #[arg(long)]
+    acknowledge: bool,
+    /// Only tell what would happen
+    #[arg(long)]
+    preview: bool,
+}
+
+impl HowArgs {
+    /// Who and what, as told by the arguments.
+    fn labels(&self) -> Result<Labels, Failure> {
+        let mut labels = Labels {
+            operator: self.operator.clone(),
+            specimen: self.specimen.clone(),
+            indenter: self.indenter.clone(),
+            about: About::default(),
+        };
+        for pair in &self.about {
+            labels
+                .tell_pair(pair)
+                .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+        }
+        labels.check().map_err(Failure::usage)?;
+        Ok(labels)
+    }
 }
 
 /// Arguments of `palpate run ramp-hold`.
@@ -45,28 +129,7 @@ pub struct RampHoldArgs {
     #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
     unload: Option<f64>,
     #[command(flatten)]
-    rig: RigArgs,
-    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
-    #[arg(long)]
-    out: Option<PathBuf>,
-    /// Who runs it
-    #[arg(long, default_value = "")]
-    operator: String,
-    /// What is indented
-    #[arg(long, default_value = "")]
-    specimen: String,
-    /// With which probe
-    #[arg(long, default_value = "blunt 12 mm probe")]
-    indenter: String,
-    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
-    #[arg(long, value_name = "KEY=VALUE")]
-    about: Vec<String>,
-    /// Accept what the preview asks to acknowledge; it is recorded
-    #[arg(long)]
-    acknowledge: bool,
-    /// Only tell what would happen
-    #[arg(long)]
-    preview: bool,
+    how: HowArgs,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -97,7 +160,14 @@ struct RunReport {
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
-pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
+    match &args.command {
+        Some(RunCommand::RampHold(args)) => run_ramp_hold(args, output),
+        None => run_protocol(&args.protocol, output),
+    }
+}
+
+fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     let params = RampHold {
         speed: MmPerS(args.speed),
         depth: Depth(args.depth),
@@ -105,16 +175,47 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         until: args.hold_until,
         unload: args.unload.map(MmPerS),
     };
-    let labels = labels(args)?;
-    let bench = super::rig::open(&args.rig)?;
-    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let labels = args.how.labels()?;
+    let bench = super::rig::open(&args.how.rig)?;
+    carry_out(params.plan(), bench, &args.how, labels, output)
+}
+
+/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told.
+fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
+    let Some(name) = &args.protocol else {
+        return Err(Failure::usage(
+            "name a protocol; 'palpate protocol list' tells which there are",
+        ));
+    };
+    let bench = super::rig::open(&args.how.rig)?;
+    let (protocol, written, _) =
+        super::protocol::sound(name, &args.values.values(), &bench, output)?;
+    let how = &args.how;
+    let labels = how.labels()?;
+    if !how.preview {
+        protocol.check_told(&labels).map_err(|reason| {
+            Failure::usage(format!(
+                "{reason}; add --about operator=Ada or the like for each"
+            ))
+        })?;
+    }
+    carry_out(written.plan, bench, how, labels, output)
+}
+
+fn carry_out(
+    plan: Plan,
+    bench: OpenRig,
+    how: &HowArgs,
+    labels: Labels,
+    output: &Output,
+) -> Result<(), Failure> {
     let request = RunRequest {
-        plan: params.plan(),
+        plan,
         calibration: bench.calibration,
         limits: bench.limits,
-        out: args.out.clone(),
+        out: how.out.clone(),
         labels,
-        is_acknowledged: args.acknowledge,
+        is_acknowledged: how.acknowledge,
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
     };
@@ -126,14 +227,14 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         &curve,
         false,
     );
-    if args.preview {
+    if how.preview {
         output.result(&preview, || preview_text(&preview));
         return match preview.refusals.first() {
             Some(refusal) => Err(Failure::usage(refusal)),
             None => Ok(()),
         };
     }
-    if let Err(reason) = preview.verdict(args.acknowledge) {
+    if let Err(reason) = preview.verdict(how.acknowledge) {
         let hint = if preview.refusals.is_empty() {
             "; add --acknowledge to accept this"
         } else {
@@ -146,7 +247,7 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(bench.rig, args.rig.time_scale, Some(first), move || {
+    let runner = Runner::start(bench.rig, how.rig.time_scale, Some(first), move || {
         // A full channel already says what this would say.
         let _ = wake.try_send(());
     })
@@ -163,23 +264,6 @@ pub(super) fn run(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         return Err(Failure::failed("the runner ended without a run"));
     };
     report(view, output)
-}
-
-/// Who and what, as told by the arguments.
-fn labels(args: &RampHoldArgs) -> Result<Labels, Failure> {
-    let mut labels = Labels {
-        operator: args.operator.clone(),
-        specimen: args.specimen.clone(),
-        indenter: args.indenter.clone(),
-        about: About::default(),
-    };
-    for pair in &args.about {
-        labels
-            .tell_pair(pair)
-            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
-    }
-    labels.check().map_err(Failure::usage)?;
-    Ok(labels)
 }
 
 /// The first signal stops, the second halts.

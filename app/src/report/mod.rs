@@ -7,6 +7,7 @@ pub mod cycles;
 pub mod extremes;
 pub mod family;
 pub mod picture;
+pub mod plan_picture;
 pub mod programme;
 pub mod selection;
 mod selection_plot;

@@ -1,5 +1,6 @@
 //! The command line as a user meets it: whole commands, their exit codes and their sentences.
 
+mod analyse;
 mod calibration;
 mod disk;
 mod extremes;

@@ -1,7 +1,7 @@
 //! The protocols that come with the program: files like any other, and the examples to copy.
 
 use super::Protocol;
-use super::problem::Problem;
+use super::problem::{Problem, nearest};
 
 macro_rules! built_in {
     ($($name:literal)*) => {
@@ -34,4 +34,10 @@ built_in! {
 pub fn built_in(name: &str) -> Option<Result<Protocol, Vec<Problem>>> {
     let (_, text) = BUILT_IN.iter().find(|(known, _)| *known == name)?;
     Some(Protocol::read(text))
+}
+
+/// The built-in name nearest to one that is not known, for a hint; `None` if nothing is near.
+#[must_use]
+pub fn nearest_built_in(name: &str) -> Option<&'static str> {
+    nearest(name, BUILT_IN.iter().map(|(known, _)| *known))
 }

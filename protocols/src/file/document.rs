@@ -1,14 +1,11 @@
 //! The head of a protocol: who it is, what may be changed, what is watched. The steps are read by `procedure`.
 
-use super::args::{Args, STEPS_HINT, check_range};
-use super::problem::{Problem, Problems, suggestion};
-use super::quantity::{Given, Kind, What};
-use super::scope::{Scope, names_in};
+use super::args::STEPS_HINT;
+use super::problem::{Problems, suggestion};
+use super::scope::names_in;
 use super::tree::{self, Node, Table, Value};
-use super::words::{Key, Need, Range};
-use super::{ASKABLE, LANGUAGE, Parameter, Protocol};
-use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
-use palpate_model::units::{Newtons, Seconds};
+use super::{LANGUAGE, Protocol, parameter};
+use palpate_sessions::about;
 use std::collections::BTreeSet;
 
 const KEYS: [&str; 11] = [
@@ -73,7 +70,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
     check_name(&root, &name, problems);
     let version = version(&root, problems);
     let ask = ask(&root, problems);
-    let parameters = parameters(&root, problems);
+    let parameters = parameter::all(&root, problems);
     let procedure = procedure(&root, problems);
     let protocol = Protocol {
         name,
@@ -155,7 +152,7 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         );
         return Vec::new();
     };
-    let known: Vec<&str> = ASKABLE.iter().map(|(key, _)| *key).collect();
+    let known: Vec<&str> = about::KEYS.iter().map(|key| key.name).collect();
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {
@@ -180,130 +177,6 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         }
     }
     ask
-}
-
-fn parameters(root: &Table, problems: &mut Problems) -> Vec<Parameter> {
-    let Some(node) = root.get("parameters") else {
-        return Vec::new();
-    };
-    let Value::Table(table) = &node.value else {
-        problems.error(
-            node.line,
-            "'parameters' must be a table; write [parameters] on a line of its own",
-        );
-        return Vec::new();
-    };
-    let read = |entry: &tree::Entry| {
-        let Value::Table(keys) = &entry.node.value else {
-            let name = &entry.key;
-            if name == "steps" {
-                problems.error(
-                    entry.line,
-                    format!("[parameters] has no key 'steps'; {STEPS_HINT}"),
-                );
-                return None;
-            }
-            problems.error(
-                entry.line,
-                format!("parameter '{name}' must say more than a value; write {name} = {{ default = \"20 mm\", about = \"...\", source = \"...\" }}"),
-            );
-            return None;
-        };
-        parameter(&entry.key, keys, problems)
-    };
-    table.entries.iter().filter_map(read).collect()
-}
-
-const PARAMETER_KEYS: [&str; 6] = ["default", "unit", "min", "max", "about", "source"];
-
-fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parameter> {
-    let line = keys.line;
-    for entry in &keys.entries {
-        if !PARAMETER_KEYS.contains(&entry.key.as_str()) {
-            let hint = suggestion(&entry.key, &PARAMETER_KEYS);
-            problems.error(
-                entry.line,
-                format!("parameter '{name}' has no key '{}'; {hint}", entry.key),
-            );
-        }
-    }
-    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
-    if name.is_empty() || !name.chars().all(is_plain) {
-        problems.error(
-            line,
-            format!("a parameter cannot be called '{name}'; use letters, digits, '_' and '-'"),
-        );
-        return None;
-    }
-    let text_of = |key: &str| match keys.get(key).map(|node| &node.value) {
-        Some(Value::Text(text)) => text.trim().to_owned(),
-        _ => String::new(),
-    };
-    let (about, source) = (text_of("about"), text_of("source"));
-    if about.is_empty() {
-        problems.error(
-            line,
-            format!("parameter '{name}' does not say what it is; write about = \"...\""),
-        );
-    }
-    let Some(default) = keys.get("default") else {
-        problems.error(
-            line,
-            format!(
-                "parameter '{name}' has no default; write default = \"20 mm\" or whatever is usual"
-            ),
-        );
-        return None;
-    };
-    let default = problems.take(default.line, Given::of_node(default))?;
-    let unit = text_of("unit");
-    let kind = match (default.kind(), unit.as_str()) {
-        (Some(kind), "") => kind,
-        (None, "") => {
-            problems.error(line, format!("the default of '{name}' does not tell its unit; add unit = \"mm\" or whatever it is"));
-            return None;
-        }
-        (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
-            Some(kind) if found.is_none_or(|found| found == kind) => kind,
-            Some(kind) => {
-                problems.error(
-                    line,
-                    format!("the default of '{name}' is wrong: {}", default.is_not(kind)),
-                );
-                return None;
-            }
-            None => {
-                problems.error(line, format!("'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"));
-                return None;
-            }
-        },
-    };
-    let mut bound = |key: &str| {
-        let node = keys.get(key)?;
-        let number = Given::of_node(node).and_then(|given| given.number(kind));
-        problems.take(
-            node.line,
-            number.map_err(|why| format!("'{key}' of '{name}': {why}")),
-        )
-    };
-    let parameter = Parameter {
-        name: name.to_owned(),
-        kind,
-        is_list: matches!(default.what, What::List(_)),
-        min: bound("min"),
-        max: bound("max"),
-        default,
-        about,
-        source,
-        line,
-    };
-    if let Err(why) = parameter.check(&parameter.default) {
-        problems.error(
-            line,
-            format!("the default of '{name}' does not pass its own check: {why}"),
-        );
-    }
-    Some(parameter)
 }
 
 fn procedure(root: &Table, problems: &mut Problems) -> Node {
@@ -384,177 +257,4 @@ fn check_used(protocol: &Protocol, problems: &mut Problems) {
             format!("parameter '{name}' is not used by any step; write \"${name}\" where its value belongs or take it out"),
         );
     }
-}
-
-const LIMIT_KEYS: [Key; 1] = [Key {
-    name: "force_max",
-    kind: Kind::Force,
-    range: Range::Above0,
-    need: Need::Optional,
-    about: "highest force above tare; the rig's own limit holds too",
-}];
-
-/// The limits of a plan for given values.
-pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems) -> PlanLimits {
-    match node {
-        None => PlanLimits::default(),
-        Some(Node {
-            value: Value::Table(table),
-            ..
-        }) => {
-            let args = Args::read(table, "[limits]", &[&LIMIT_KEYS], &[], scope, problems);
-            PlanLimits {
-                force_max: args.maybe("force_max").map(Newtons),
-            }
-        }
-        Some(node) => {
-            problems.error(
-                node.line,
-                "'limits' must be a table; write [limits] on a line of its own",
-            );
-            PlanLimits::default()
-        }
-    }
-}
-
-const fn monitor_key(name: &'static str, range: Range, need: Need, about: &'static str) -> Key {
-    Key {
-        name,
-        kind: Kind::Text,
-        range,
-        need,
-        about,
-    }
-}
-
-/// What a monitor can look at, with its kind.
-const SOURCES: [(&str, Source, Kind); 4] = [
-    ("force", Source::Force, Kind::Force),
-    ("depth", Source::Depth, Kind::Length),
-    ("signal", Source::Volts, Kind::Voltage),
-    ("position", Source::Position, Kind::Length),
-];
-
-const ACTIONS: [(&str, Action); 5] = [
-    ("note", Action::Note),
-    ("pause", Action::Pause),
-    ("stop", Action::Stop),
-    ("retract", Action::Retract),
-    ("halt", Action::Halt),
-];
-
-/// Keys of a monitor beside the values, whose unit depends on what is watched.
-pub(super) const MONITOR_KEYS: [Key; 4] = [
-    monitor_key(
-        "watch",
-        Range::OneOf(&["force", "depth", "signal", "position"]),
-        Need::Required,
-        "`force`, `depth`, `signal` or `position`",
-    ),
-    Key {
-        name: "settle",
-        kind: Kind::Time,
-        range: Range::From0,
-        need: Need::Usual("1 s"),
-        about: "how long it must be past before a paused run goes on",
-    },
-    monitor_key(
-        "action",
-        Range::OneOf(&["note", "pause", "stop", "retract", "halt"]),
-        Need::Required,
-        "`note`, `pause`, `stop`, `retract` or `halt`",
-    ),
-    monitor_key(
-        "message",
-        Range::Any,
-        Need::Required,
-        "what the operator reads",
-    ),
-];
-
-/// The monitors of a plan for given values.
-pub(super) fn monitors(
-    node: Option<&Node>,
-    scope: &Scope,
-    problems: &mut Problems,
-) -> Vec<Monitor> {
-    let Some(node) = node else {
-        return Vec::new();
-    };
-    let Value::List(items) = &node.value else {
-        problems.error(
-            node.line,
-            "write [[monitor]] in double brackets, once for each monitor",
-        );
-        return Vec::new();
-    };
-    let tables = items.iter().filter_map(|item| match &item.value {
-        Value::Table(table) => Some(table),
-        _ => None,
-    });
-    tables
-        .filter_map(|table| monitor(table, scope, problems))
-        .collect()
-}
-
-fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
-    let besides = ["above", "below", "resume"];
-    let args = Args::read(
-        table,
-        "a monitor",
-        &[&MONITOR_KEYS],
-        &besides,
-        scope,
-        problems,
-    );
-    let watch = args.text("watch").ok()?;
-    let (_, source, kind) = *SOURCES.iter().find(|(name, ..)| *name == watch)?;
-    let mut value = |key: &str| {
-        let node = table.get(key)?;
-        let number = scope.value(node, kind).and_then(|given| {
-            let number = given.number(kind)?;
-            check_range(kind, Range::Any, number).map(|()| number)
-        });
-        problems.take(
-            node.line,
-            number.map_err(|why| format!("'{key}' of a monitor: {why}")),
-        )
-    };
-    let (above, below, resume) = (value("above"), value("below"), value("resume"));
-    let (side, threshold) = match (table.get("above").is_some(), table.get("below").is_some()) {
-        (true, false) => (Side::Above, above?),
-        (false, true) => (Side::Below, below?),
-        _ => {
-            problems.error(
-                table.line,
-                "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"",
-            );
-            return None;
-        }
-    };
-    let monitor = Monitor {
-        source,
-        side,
-        threshold,
-        // Without a value of its own it is past as soon as it no longer trips.
-        resume: if table.get("resume").is_some() {
-            resume?
-        } else {
-            threshold
-        },
-        settle: Seconds(args.number("settle").ok()?),
-        action: ACTIONS
-            .iter()
-            .find(|(name, _)| args.text("action") == Ok(name))?
-            .1,
-        message: args.text("message").ok()?.to_owned(),
-    };
-    if let Err(why) = monitor.check() {
-        let line = table.get("resume").map_or(table.line, |node| node.line);
-        problems.push(Problem::error(
-            line,
-            format!("{why}; give a 'resume' on the other side of the threshold"),
-        ));
-    }
-    Some(monitor)
 }

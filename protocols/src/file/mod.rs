@@ -5,121 +5,37 @@
 
 mod args;
 mod builtin;
+mod check;
 mod document;
 mod order;
+mod parameter;
 mod problem;
 mod procedure;
 mod quantity;
 mod reference;
 mod scope;
 mod tree;
+mod watch;
 mod words;
 
-pub use builtin::{BUILT_IN, built_in};
+pub use builtin::{BUILT_IN, built_in, nearest_built_in};
+pub use check::{Checked, check};
+pub use order::word;
+pub use parameter::Parameter;
 pub use problem::{Problem, Severity};
 pub use quantity::{Given, Kind, What};
 pub use reference::reference;
 
 use crate::plans::{Plan, PlanSource};
+use palpate_sessions::Labels;
+use palpate_sessions::about::{KEYS, Key};
 use problem::{Problems, suggestion};
 use scope::Scope;
-use serde::Serialize;
 use std::collections::BTreeMap;
 use tree::{Node, Value};
 
 /// Version of the protocol language that this program reads.
 pub const LANGUAGE: u32 = 1;
-
-/// What a protocol can ask for before it starts: the key, and what it means.
-pub const ASKABLE: [(&str, &str); 14] = [
-    ("operator", "who runs it"),
-    ("specimen", "name of the specimen"),
-    ("specimen.source", "animal or person, organ, place"),
-    ("specimen.time-since-death", "hours since death or excision"),
-    ("specimen.storage", "how it was kept"),
-    ("specimen.temperature", "temperature during the test"),
-    ("specimen.hydration", "how it is kept wet"),
-    ("specimen.thickness", "in mm, and how it was measured"),
-    ("specimen.mounting", "how it is clipped or supported"),
-    ("indenter", "the probe in words"),
-    ("indenter.diameter", "in mm"),
-    (
-        "indenter.tip",
-        "flat, spherical with its radius, conical with its angle",
-    ),
-    ("indenter.material", "of the tip"),
-    ("signal.filter", "any filter between cell and converter"),
-];
-
-/// Something a technician may change at the start.
-#[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct Parameter {
-    /// Its name, as in `--set name=value`.
-    pub name: String,
-    /// What kind of value it takes.
-    pub kind: Kind,
-    /// Whether it takes several values, separated by commas.
-    pub is_list: bool,
-    /// The usual value.
-    pub default: Given,
-    /// Smallest value, in the unit of its kind.
-    pub min: Option<f64>,
-    /// Largest value, in the unit of its kind.
-    pub max: Option<f64>,
-    /// What it is.
-    pub about: String,
-    /// Where the default comes from; may be empty.
-    pub source: String,
-    /// Its line in the file.
-    pub line: u32,
-}
-
-impl Parameter {
-    /// Reads a value that was typed, or says what is wrong with it.
-    pub fn read(&self, text: &str) -> Result<Given, String> {
-        let given = if self.is_list {
-            Given::of_list(text.split(',').map(Given::of_text).collect())
-        } else {
-            Given::of_text(text)
-        };
-        self.check(&given).map(|()| given)
-    }
-
-    /// Whether a value is of the right kind and within the range.
-    fn check(&self, given: &Given) -> Result<(), String> {
-        match &given.what {
-            What::List(items) if self.is_list => {
-                items.iter().try_for_each(|item| self.check_one(item))
-            }
-            _ => self.check_one(given),
-        }
-    }
-
-    fn check_one(&self, given: &Given) -> Result<(), String> {
-        match self.kind {
-            // "none" is a value only of what can be left out.
-            _ if given.what == What::None && self.default.what == What::None => Ok(()),
-            Kind::Text if !given.text.is_empty() => Ok(()),
-            Kind::Flag if matches!(given.what, What::Flag(_)) => Ok(()),
-            Kind::Text | Kind::Flag => Err(given.is_not(self.kind)),
-            kind => {
-                let number = given.number(kind)?;
-                let unit = kind.unit();
-                match (self.min, self.max) {
-                    (Some(min), _) if number < min => Err(format!(
-                        "{} is too small; give {min} {unit} or more",
-                        given.text
-                    )),
-                    (_, Some(max)) if number > max => Err(format!(
-                        "{} is too large; give {max} {unit} or less",
-                        given.text
-                    )),
-                    _ => Ok(()),
-                }
-            }
-        }
-    }
-}
 
 /// A protocol as it was read: its head, and steps that wait for values.
 #[derive(Clone, Debug, PartialEq)]
@@ -134,7 +50,7 @@ pub struct Protocol {
     pub about: String,
     /// Where it comes from.
     pub source: String,
-    /// What must be told before the start: keys of [`ASKABLE`].
+    /// What must be told before the start: keys of [`KEYS`].
     pub ask: Vec<String>,
     /// What may be changed at the start.
     pub parameters: Vec<Parameter>,
@@ -222,8 +138,8 @@ impl Protocol {
             chosen.insert(parameter.name.clone(), given.text.clone());
             scope.push(&parameter.name, given);
         }
-        let limits = document::limits(self.limits.as_ref(), &scope, problems);
-        let monitors = document::monitors(self.monitors.as_ref(), &scope, problems);
+        let limits = watch::limits(self.limits.as_ref(), &scope, problems);
+        let monitors = watch::monitors(self.monitors.as_ref(), &scope, problems);
         let before = problems.count();
         let steps = procedure::write_out(&self.procedure, &mut scope, problems);
         // A step that could not be read would be missed by those behind it.
@@ -256,20 +172,23 @@ impl Protocol {
         (plan, lines)
     }
 
-    /// Which of the things it asks for have no answer yet, with what they mean.
-    #[must_use]
-    pub fn unanswered(
-        &self,
-        answers: &BTreeMap<String, String>,
-    ) -> Vec<(&'static str, &'static str)> {
-        let has_answer = |key: &str| {
-            answers
-                .get(key)
-                .is_some_and(|answer| !answer.trim().is_empty())
+    /// Whether everything it asks for was told; else what to tell.
+    pub fn check_told(&self, labels: &Labels) -> Result<(), String> {
+        let is_open = |key: &&Key| {
+            self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
         };
-        let asked = ASKABLE
+        let open: Vec<String> = KEYS
             .iter()
-            .filter(|(key, _)| self.ask.iter().any(|asked| asked == key));
-        asked.filter(|(key, _)| !has_answer(key)).copied().collect()
+            .filter(is_open)
+            .map(|key| format!("{} ({})", key.name, key.meaning))
+            .collect();
+        if open.is_empty() {
+            return Ok(());
+        }
+        Err(format!(
+            "protocol {} asks before it starts for: {}",
+            self.name,
+            open.join(", ")
+        ))
     }
 }

@@ -125,8 +125,9 @@ impl Known {
     }
 }
 
-/// The word for a step.
-pub(super) fn word(step: &Step) -> &'static str {
+/// The word for a step in a protocol.
+#[must_use]
+pub fn word(step: &Step) -> &'static str {
     match step {
         Step::SelfTest { .. } => "self-test",
         Step::Home { .. } => "home",

@@ -4,6 +4,13 @@ use super::problem::suggestion;
 use super::tree::{Node, Value};
 use serde::Serialize;
 
+/// A unit: its symbol, and `times / over` of the unit its kind is kept in. Both are whole numbers, so that decimal
+/// values stay what they say.
+type Unit = (&'static str, f64, f64);
+
+/// A kind with its name and units; numbers are kept in the first.
+type KindEntry = (Kind, &'static str, &'static [Unit]);
+
 /// What kind of value a key or a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "kebab-case")]
@@ -32,9 +39,7 @@ pub enum Kind {
     Text,
 }
 
-/// Units of each kind: the first is the one numbers are kept in. A unit is `times / over` of it; both are whole
-/// numbers, so that decimal values stay what they say.
-const UNITS: [(Kind, &str, &[(&str, f64, f64)]); 8] = [
+const UNITS: [KindEntry; 8] = [
     (
         Kind::Speed,
         "a speed",
@@ -90,7 +95,7 @@ const UNITS: [(Kind, &str, &[(&str, f64, f64)]); 8] = [
 ];
 
 impl Kind {
-    fn entry(self) -> Option<&'static (Kind, &'static str, &'static [(&'static str, f64, f64)])> {
+    fn entry(self) -> Option<&'static KindEntry> {
         UNITS.iter().find(|(kind, ..)| *kind == self)
     }
 
@@ -139,7 +144,7 @@ impl Kind {
     /// The kind that a unit belongs to.
     #[must_use]
     pub fn of_unit(unit: &str) -> Option<Self> {
-        let has = |units: &[(&str, f64, f64)]| units.iter().any(|(known, ..)| *known == unit);
+        let has = |units: &[Unit]| units.iter().any(|(known, ..)| *known == unit);
         let found = UNITS.iter().find(|(_, _, units)| has(units));
         found.map(|(kind, ..)| *kind)
     }

@@ -1,10 +1,11 @@
 //! The reference of the language, written from the table that reads it.
 
-use super::ASKABLE;
-use super::document::MONITOR_KEYS;
 use super::procedure::LOOP_KEYS;
 use super::quantity::Kind;
+use super::watch::MONITOR_KEYS;
 use super::words::{COMMON, Key, Need, WORDS};
+use crate::plans::FindContact;
+use palpate_sessions::about::KEYS;
 use std::fmt::Write;
 
 /// Every step with its keys, units and usual values, then loops, monitors, units and what can be asked, in Markdown.
@@ -18,6 +19,9 @@ pub fn reference() -> String {
             word.about,
             word.keys,
         );
+        if word.name == "find-contact" {
+            text.push_str(&usual_search());
+        }
     }
     section(
         &mut text,
@@ -48,10 +52,29 @@ pub fn reference() -> String {
         );
     }
     text.push_str("\n### What `ask` knows\n\n| key | meaning |\n|---|---|\n");
-    for (key, about) in ASKABLE {
-        let _ = writeln!(text, "| `{key}` | {about} |");
+    for key in KEYS {
+        let _ = writeln!(text, "| `{}` | {} |", key.name, key.meaning);
     }
     text
+}
+
+/// What a search for contact does without keys.
+fn usual_search() -> String {
+    let search = FindContact::default();
+    let press = search.press.map_or("no press".to_owned(), |press| {
+        format!("a press to {} and a dwell of {}", press.force, press.dwell)
+    });
+    format!(
+        "Without keys: a first pass at {}, felt at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
+         recovery of {}, a standard error of {} mm at most. The same for `find-base`.\n\n",
+        search.approach_speed,
+        search.criterion,
+        search.retreat_mm,
+        search.pass_speed,
+        search.pass_force,
+        search.recovery,
+        search.std_error_mm_max
+    )
 }
 
 fn section(text: &mut String, title: &str, about: &str, keys: &[Key]) {

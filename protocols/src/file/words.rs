@@ -81,13 +81,34 @@ pub(super) const COMMON: [Key; 3] = [
     ),
 ];
 
-const CONTACT_KEYS: [Key; 7] = [
+const CONTACT_KEYS: [Key; 10] = [
     key("speed", Kind::Speed, Need::Optional, "of the first pass"),
     key(
         "criterion",
         Kind::Force,
         Need::Optional,
-        "force that ends the first pass",
+        "force at which the first pass has felt the tissue",
+    ),
+    key(
+        "press",
+        Kind::Flag,
+        Need::Optional,
+        "`false`: the first pass ends there instead of pressing on to learn how the tissue answers",
+    ),
+    key(
+        "press_force",
+        Kind::Force,
+        Need::Optional,
+        "force that ends the press",
+    ),
+    ranged(
+        Range::From0,
+        key(
+            "dwell",
+            Kind::Time,
+            Need::Optional,
+            "time at the end of each pass while the force relaxes",
+        ),
     ),
     key(
         "retreat",
@@ -168,8 +189,8 @@ pub(super) const WORDS: [Word; 17] = [
         keys: &[key(
             "for",
             Kind::Time,
-            Need::Usual("1 s"),
-            "whole mains cycles: whole seconds",
+            Need::Usual("4 s"),
+            "whole mains cycles: whole seconds; from 2 s on the drift is told too",
         )],
         build: |args| {
             Ok(Step::Tare {
@@ -517,6 +538,19 @@ fn find(args: &Args) -> Result<FindContact, String> {
     ] {
         *field = args.maybe(name).unwrap_or(*field);
     }
+    let (force, dwell) = (args.maybe("press_force"), args.maybe("dwell"));
+    if args.is_no("press") {
+        if force.is_some() || dwell.is_some() {
+            return Err(
+                "without a press there is no 'press_force' or 'dwell'; take them out".into(),
+            );
+        }
+        search.press = None;
+    }
+    if let Some(press) = &mut search.press {
+        press.force.0 = force.unwrap_or(press.force.0);
+        press.dwell.0 = dwell.unwrap_or(press.dwell.0);
+    }
     Ok(search)
 }
 
@@ -571,7 +605,6 @@ fn prompt(args: &Args) -> Result<Step, String> {
     }))
 }
 
-/// A speed of a step.
 impl Args {
     fn speed(&self, key: &str) -> Result<MmPerS, String> {
         self.number(key).map(MmPerS)

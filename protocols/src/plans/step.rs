@@ -231,10 +231,17 @@ impl Default for FindContact {
             pass_force: Newtons(0.14),
             recovery: Seconds(10.0),
             std_error_mm_max: 0.1,
-            press: Some(Press {
-                force: Newtons(0.42),
-                dwell: Seconds(6.0),
-            }),
+            press: Some(Press::default()),
+        }
+    }
+}
+
+impl Default for Press {
+    /// Reasons as for [`FindContact`].
+    fn default() -> Self {
+        Self {
+            force: Newtons(0.42),
+            dwell: Seconds(6.0),
         }
     }
 }

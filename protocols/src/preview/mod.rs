@@ -41,6 +41,9 @@ pub struct StepPreview {
     pub longest: Seconds,
     /// Whether the duration is known to the sample: moves and waits are, searches are not.
     pub is_exact: bool,
+    /// Why this step cannot run on this rig; empty if it can.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub refusals: Vec<String>,
 }
 
 /// What a plan will do, as far as it can be known.
@@ -184,6 +187,7 @@ impl Walk<'_> {
         let phase = step.phase();
         let refused_before = self.refusals.len();
         let Span(expected, longest, is_exact) = self.span(phase, step);
+        let refusals = self.refusals[refused_before..].to_vec();
         for refusal in &mut self.refusals[refused_before..] {
             *refusal = format!("step {}, {phase}: {refusal}", index + 1);
         }
@@ -192,6 +196,7 @@ impl Walk<'_> {
             expected: Seconds(expected),
             longest: Seconds(longest),
             is_exact,
+            refusals,
         }
     }
 

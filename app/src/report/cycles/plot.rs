@@ -17,6 +17,8 @@ const GAP: f64 = 84.0;
 const HEIGHT: f64 = 740.0;
 /// Points of a loop or a hold in a pixel's width are two at most.
 const COLUMNS: usize = 860;
+/// Room for so many cycles at least: with fewer, marks would stand between whole numbers.
+const SLOTS_MIN: usize = 8;
 
 /// The picture of one record. The first cycle is blue, the last vermillion, those between in between.
 #[must_use]
@@ -145,7 +147,7 @@ fn by_cycle(
 ) {
     let count = report.cycles.len();
     let known: Vec<[f64; 2]> = points.iter().flatten().copied().collect();
-    let panel = Panel::around(place, [0.5, count as f64 + 0.5], &[&known]);
+    let panel = Panel::around(place, [0.5, count.max(SLOTS_MIN) as f64 + 0.5], &[&known]);
     panel.axes(svg, ["cycle", name], look());
     panel.line(svg, &known, LIGHT.line, 1.0);
     for [x, y] in &known {

@@ -1,0 +1,363 @@
+//! `palpate protocol`: what a protocol file says, what is wrong with it, and what it would do.
+
+mod text;
+
+use super::output::Output;
+use super::rig::{OpenRig, RigArgs};
+use super::{Failure, new_file};
+use crate::report::plan_picture;
+use clap::{Args, Subcommand};
+use palpate_protocols::file::{
+    BUILT_IN, Checked, Parameter, Problem, Protocol, check, nearest_built_in, reference,
+};
+use palpate_protocols::plans::PlannedStep;
+use palpate_protocols::preview::{Preview, outline};
+use palpate_protocols::runner::Stopwatch;
+use palpate_sessions::text::read_if_present;
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What to do with protocols.
+#[derive(Debug, Subcommand)]
+pub enum ProtocolCommand {
+    /// Name the built-in protocols
+    List(ListArgs),
+    /// Find every mistake in protocol files, each with its line
+    Check(CheckArgs),
+    /// Print a protocol's file, to read or to copy
+    Show(ShowArgs),
+    /// Tell what a protocol will do, step by step, before anything moves
+    Preview(PreviewArgs),
+    /// Print the words of the protocol language
+    Words,
+}
+
+/// Arguments of `palpate protocol list`.
+#[derive(Debug, Args)]
+pub struct ListArgs {
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `palpate protocol check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// Protocol files, or names of built-in protocols
+    #[arg(required = true, value_name = "NAME|FILE")]
+    files: Vec<String>,
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `palpate protocol show`.
+#[derive(Debug, Args)]
+pub struct ShowArgs {
+    /// A built-in protocol or a file
+    #[arg(value_name = "NAME|FILE")]
+    protocol: String,
+    /// Print the steps with loops written out instead
+    #[arg(long)]
+    steps: bool,
+    #[command(flatten)]
+    values: ValueArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `palpate protocol preview`.
+#[derive(Debug, Args)]
+pub struct PreviewArgs {
+    /// A built-in protocol or a file
+    #[arg(value_name = "NAME|FILE")]
+    protocol: String,
+    #[command(flatten)]
+    values: ValueArgs,
+    /// Draw depth and expected force over time into a new SVG file
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Values of parameters.
+#[derive(Clone, Debug, Args)]
+pub struct ValueArgs {
+    /// Another value of a parameter, such as depth=20mm or speeds="0.75 mm/s, 1.5 mm/s"; may be repeated
+    #[arg(long, value_name = "NAME=VALUE", value_parser = pair)]
+    set: Vec<(String, String)>,
+}
+
+impl ValueArgs {
+    /// By name; of two values for one name the later holds.
+    pub fn values(&self) -> BTreeMap<String, String> {
+        self.set.iter().cloned().collect()
+    }
+}
+
+/// `name=value`, or one sentence.
+pub(super) fn pair(text: &str) -> Result<(String, String), String> {
+    match text.split_once('=') {
+        Some((name, value)) if !name.trim().is_empty() => {
+            Ok((name.trim().to_owned(), value.trim().to_owned()))
+        }
+        _ => Err("this gives no value to a name; write it like depth=20mm".into()),
+    }
+}
+
+/// The text of a built-in protocol or of a file.
+pub(super) fn text_of(name: &str) -> Result<String, Failure> {
+    if let Some((_, text)) = BUILT_IN.iter().find(|(known, _)| *known == name) {
+        return Ok((*text).to_owned());
+    }
+    match read_if_present(Path::new(name)) {
+        Ok(Some(text)) => Ok(text),
+        Ok(None) => {
+            let hint = match nearest_built_in(name) {
+                Some(near) => format!("did you mean '{near}'?"),
+                None => "'palpate protocol list' names the built-in ones".into(),
+            };
+            Err(Failure::usage(format!(
+                "there is no built-in protocol and no file '{name}'; {hint}"
+            )))
+        }
+        Err(err) => Err(Failure::usage(format!(
+            "the protocol {name} cannot be read ({err}); give a text file"
+        ))),
+    }
+}
+
+/// A protocol written out for a rig, or its first error in a sentence; warnings become notes.
+pub(super) fn sound(
+    name: &str,
+    values: &BTreeMap<String, String>,
+    bench: &OpenRig,
+    output: &Output,
+) -> Result<(Protocol, palpate_protocols::file::Written, Preview), Failure> {
+    let text = text_of(name)?;
+    let Checked { plan, problems } = check_on(&text, values, bench)?;
+    let errors: Vec<&Problem> = problems
+        .iter()
+        .filter(|problem| problem.is_error())
+        .collect();
+    if let Some(first) = errors.first() {
+        let more = match errors.len() {
+            1 => String::new(),
+            count => format!(
+                "; and {} more: see 'palpate protocol check {name}'",
+                count - 1
+            ),
+        };
+        return Err(Failure::usage(format!("{name}, {first}{more}")));
+    }
+    for problem in &problems {
+        output.note(&format!("{name}, {problem}"));
+    }
+    plan.ok_or_else(|| Failure::failed(format!("{name} could not be written out")))
+}
+
+fn check_on(
+    text: &str,
+    values: &BTreeMap<String, String>,
+    bench: &OpenRig,
+) -> Result<Checked, Failure> {
+    let curve = bench.calibration.curve().map_err(Failure::usage)?;
+    let rig = bench.rig.description();
+    Ok(check(text, values, rig, &bench.limits, &curve))
+}
+
+#[derive(Serialize)]
+struct Head<'a> {
+    name: &'a str,
+    version: u32,
+    title: &'a str,
+    about: &'a str,
+    source: &'a str,
+    ask: &'a [String],
+    parameters: &'a [Parameter],
+}
+
+impl<'a> Head<'a> {
+    fn of(protocol: &'a Protocol) -> Self {
+        Self {
+            name: &protocol.name,
+            version: protocol.version,
+            title: &protocol.title,
+            about: &protocol.about,
+            source: &protocol.source,
+            ask: &protocol.ask,
+            parameters: &protocol.parameters,
+        }
+    }
+}
+
+pub(super) fn list(output: &Output) -> Result<(), Failure> {
+    let protocols: Result<Vec<Protocol>, Failure> = BUILT_IN
+        .iter()
+        .map(|(name, text)| read(name, text))
+        .collect();
+    let protocols = protocols?;
+    let heads: Vec<Head<'_>> = protocols.iter().map(Head::of).collect();
+    let object = serde_json::json!({ "command": "protocol list", "protocols": heads });
+    output.result(&object, || text::list(&protocols));
+    Ok(())
+}
+
+fn read(name: &str, text: &str) -> Result<Protocol, Failure> {
+    Protocol::read(text).map_err(|problems| Failure::usage(text::sentences(name, &problems)))
+}
+
+#[derive(Serialize)]
+struct FileReport {
+    file: String,
+    /// Name in the file; none if it cannot be read.
+    name: Option<String>,
+    problems: Vec<Problem>,
+    expected_s: Option<f64>,
+}
+
+pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+    let bench = super::rig::open(&args.rig)?;
+    let curve = bench.calibration.curve().map_err(Failure::usage)?;
+    let watch = Stopwatch::start();
+    let nothing = BTreeMap::new();
+    let mut files = Vec::new();
+    let mut wrong = 0;
+    for file in &args.files {
+        let text = text_of(file)?;
+        let checked = check(
+            &text,
+            &nothing,
+            bench.rig.description(),
+            &bench.limits,
+            &curve,
+        );
+        wrong += usize::from(!checked.is_sound());
+        let (name, expected_s) = match checked.plan {
+            Some((protocol, _, preview)) => (Some(protocol.name), Some(preview.expected.0)),
+            None => (None, None),
+        };
+        files.push(FileReport {
+            file: file.clone(),
+            name,
+            problems: checked.problems,
+            expected_s,
+        });
+    }
+    let object = serde_json::json!({
+        "command": "protocol check",
+        "files": files,
+        "seconds": watch.seconds(),
+    });
+    output.result(&object, || text::check(&files));
+    match wrong {
+        0 => Ok(()),
+        1 => Err(Failure::usage(
+            "one protocol cannot run as it is; correct what is listed",
+        )),
+        _ => Err(Failure::usage(format!(
+            "{wrong} protocols cannot run as they are; correct what is listed"
+        ))),
+    }
+}
+
+pub(super) fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
+    let file = text_of(&args.protocol)?;
+    let values = args.values.values();
+    if !args.steps && values.is_empty() {
+        // A file with mistakes is shown too: that is how one finds them.
+        let protocol = Protocol::read(&file).ok();
+        let object = serde_json::json!({
+            "command": "protocol show",
+            "protocol": protocol.as_ref().map(Head::of),
+            "text": file,
+        });
+        output.result(&object, || file.trim_end().to_owned());
+        return Ok(());
+    }
+    let protocol = read(&args.protocol, &file)?;
+    let written = protocol
+        .write_out(&values)
+        .map_err(|problems| Failure::usage(text::sentences(&args.protocol, &problems)))?;
+    let steps: &[PlannedStep] = &written.plan.steps;
+    let object = serde_json::json!({
+        "command": "protocol show",
+        "protocol": Head::of(&protocol),
+        "steps": steps,
+        "lines": written.lines,
+    });
+    output.result(&object, || text::steps(&written));
+    Ok(())
+}
+
+#[derive(Serialize)]
+struct PreviewReport<'a> {
+    command: &'static str,
+    protocol: Head<'a>,
+    values: &'a BTreeMap<String, String>,
+    checkpoints: Vec<Checkpoint<'a>>,
+    #[serde(flatten)]
+    preview: &'a Preview,
+}
+
+#[derive(Serialize)]
+struct Checkpoint<'a> {
+    name: &'a str,
+    /// Index of the step before it, from 0.
+    step_index: usize,
+    /// Expected time since the start.
+    after_s: f64,
+}
+
+pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure> {
+    new_file::check("plot", args.plot.as_deref())?;
+    let bench = super::rig::open(&args.rig)?;
+    let (protocol, written, preview) =
+        sound(&args.protocol, &args.values.values(), &bench, output)?;
+    let plan = &written.plan;
+    let nothing = BTreeMap::new();
+    let after = |index: usize| {
+        preview.steps[..=index]
+            .iter()
+            .map(|step| step.expected.0)
+            .sum()
+    };
+    let report = PreviewReport {
+        command: "protocol preview",
+        protocol: Head::of(&protocol),
+        values: plan
+            .source
+            .as_ref()
+            .map_or(&nothing, |source| &source.values),
+        checkpoints: plan
+            .checkpoints_from(0)
+            .map(|(step_index, name)| Checkpoint {
+                name,
+                step_index,
+                after_s: after(step_index),
+            })
+            .collect(),
+        preview: &preview,
+    };
+    output.result(&report, || text::preview(&protocol, &written, &preview));
+    new_file::write("plot", args.plot.as_deref(), || {
+        let curve = bench.calibration.curve();
+        let points = curve.map_or(Vec::new(), |curve| {
+            outline(plan, bench.rig.description(), &bench.limits, &curve)
+        });
+        plan_picture::of_plan(&protocol.title, &points)
+    })
+}
+
+pub(super) fn words(output: &Output) -> Result<(), Failure> {
+    output.text_only(|| reference().trim_end().to_owned());
+    Ok(())
+}

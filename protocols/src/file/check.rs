@@ -1,0 +1,66 @@
+//! Everything that can be said of a protocol before it runs: the language, the order of steps, and the rig.
+
+use super::problem::{PROBLEMS_MAX, Problem};
+use super::{Protocol, Written};
+use crate::preview::{Preview, preview};
+use palpate_model::calibration::Curve;
+use palpate_model::rig::{Limits, RigDescription};
+use std::collections::BTreeMap;
+
+/// A protocol with what was found.
+#[derive(Clone, Debug)]
+pub struct Checked {
+    /// The protocol with its plan and preview for the chosen values; none if it cannot be read or written out.
+    pub plan: Option<(Protocol, Written, Preview)>,
+    /// Errors and warnings, in order of lines.
+    pub problems: Vec<Problem>,
+}
+
+impl Checked {
+    /// Whether nothing forbids a run.
+    #[must_use]
+    pub fn is_sound(&self) -> bool {
+        !self.problems.iter().any(Problem::is_error)
+    }
+}
+
+/// Checks a text with chosen values on a rig whose axis is not homed.
+#[must_use]
+pub fn check(
+    text: &str,
+    values: &BTreeMap<String, String>,
+    rig: &RigDescription,
+    limits: &Limits,
+    curve: &Curve,
+) -> Checked {
+    let written = Protocol::read(text).and_then(|protocol| {
+        protocol
+            .write_out(values)
+            .map(|written| (protocol, written))
+    });
+    let (protocol, written) = match written {
+        Ok(pair) => pair,
+        Err(problems) => {
+            return Checked {
+                plan: None,
+                problems,
+            };
+        }
+    };
+    let preview = preview(&written.plan, rig, limits, curve, false);
+    let mut problems = written.warnings.clone();
+    for (step, line) in preview.steps.iter().zip(&written.lines) {
+        for reason in &step.refusals {
+            let problem = Problem::error(*line, reason.clone());
+            // Every pass of a loop is refused for the same reason.
+            if problems.len() < PROBLEMS_MAX && !problems.contains(&problem) {
+                problems.push(problem);
+            }
+        }
+    }
+    problems.sort_by_key(|problem| problem.line);
+    Checked {
+        plan: Some((protocol, written, preview)),
+        problems,
+    }
+}

@@ -1,0 +1,202 @@
+//! What a technician may change at the start.
+
+use super::args::STEPS_HINT;
+use super::problem::{Problems, suggestion};
+use super::quantity::{Given, Kind, What};
+use super::tree::{Entry, Table, Value};
+use serde::Serialize;
+
+/// Something a technician may change at the start.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Parameter {
+    /// Its name, as in `--set name=value`.
+    pub name: String,
+    /// What kind of value it takes.
+    pub kind: Kind,
+    /// Whether it takes several values, separated by commas.
+    pub is_list: bool,
+    /// The usual value.
+    pub default: Given,
+    /// Smallest value, in the unit of its kind.
+    pub min: Option<f64>,
+    /// Largest value, in the unit of its kind.
+    pub max: Option<f64>,
+    /// What it is.
+    pub about: String,
+    /// Where the default comes from; may be empty.
+    pub source: String,
+    /// Its line in the file.
+    pub line: u32,
+}
+
+impl Parameter {
+    /// Reads a value that was typed, or says what is wrong with it.
+    pub fn read(&self, text: &str) -> Result<Given, String> {
+        let given = if self.is_list {
+            Given::of_list(text.split(',').map(Given::of_text).collect())
+        } else {
+            Given::of_text(text)
+        };
+        self.check(&given).map(|()| given)
+    }
+
+    /// Whether a value is of the right kind and within the range.
+    fn check(&self, given: &Given) -> Result<(), String> {
+        match &given.what {
+            What::List(items) if self.is_list => {
+                items.iter().try_for_each(|item| self.check_one(item))
+            }
+            _ => self.check_one(given),
+        }
+    }
+
+    fn check_one(&self, given: &Given) -> Result<(), String> {
+        match self.kind {
+            // "none" is a value only of what can be left out.
+            _ if given.what == What::None && self.default.what == What::None => Ok(()),
+            Kind::Text if !given.text.is_empty() => Ok(()),
+            Kind::Flag if matches!(given.what, What::Flag(_)) => Ok(()),
+            Kind::Text | Kind::Flag => Err(given.is_not(self.kind)),
+            kind => {
+                let number = given.number(kind)?;
+                let unit = kind.unit();
+                match (self.min, self.max) {
+                    (Some(min), _) if number < min => Err(format!(
+                        "{} is too small; give {min} {unit} or more",
+                        given.text
+                    )),
+                    (_, Some(max)) if number > max => Err(format!(
+                        "{} is too large; give {max} {unit} or less",
+                        given.text
+                    )),
+                    _ => Ok(()),
+                }
+            }
+        }
+    }
+}
+
+/// Every parameter of a protocol.
+pub(super) fn all(root: &Table, problems: &mut Problems) -> Vec<Parameter> {
+    let Some(node) = root.get("parameters") else {
+        return Vec::new();
+    };
+    let Value::Table(table) = &node.value else {
+        problems.error(
+            node.line,
+            "'parameters' must be a table; write [parameters] on a line of its own",
+        );
+        return Vec::new();
+    };
+    let read = |entry: &Entry| {
+        let Value::Table(keys) = &entry.node.value else {
+            let name = &entry.key;
+            if name == "steps" {
+                problems.error(
+                    entry.line,
+                    format!("[parameters] has no key 'steps'; {STEPS_HINT}"),
+                );
+                return None;
+            }
+            problems.error(
+                entry.line,
+                format!("parameter '{name}' must say more than a value; write {name} = {{ default = \"20 mm\", about = \"...\", source = \"...\" }}"),
+            );
+            return None;
+        };
+        parameter(&entry.key, keys, problems)
+    };
+    table.entries.iter().filter_map(read).collect()
+}
+
+const PARAMETER_KEYS: [&str; 6] = ["default", "unit", "min", "max", "about", "source"];
+
+fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parameter> {
+    let line = keys.line;
+    for entry in &keys.entries {
+        if !PARAMETER_KEYS.contains(&entry.key.as_str()) {
+            let hint = suggestion(&entry.key, &PARAMETER_KEYS);
+            problems.error(
+                entry.line,
+                format!("parameter '{name}' has no key '{}'; {hint}", entry.key),
+            );
+        }
+    }
+    let is_plain = |letter: char| letter.is_ascii_alphanumeric() || letter == '_' || letter == '-';
+    if name.is_empty() || !name.chars().all(is_plain) {
+        problems.error(
+            line,
+            format!("a parameter cannot be called '{name}'; use letters, digits, '_' and '-'"),
+        );
+        return None;
+    }
+    let text_of = |key: &str| match keys.get(key).map(|node| &node.value) {
+        Some(Value::Text(text)) => text.trim().to_owned(),
+        _ => String::new(),
+    };
+    let (about, source) = (text_of("about"), text_of("source"));
+    if about.is_empty() {
+        problems.error(
+            line,
+            format!("parameter '{name}' does not say what it is; write about = \"...\""),
+        );
+    }
+    let Some(default) = keys.get("default") else {
+        problems.error(
+            line,
+            format!(
+                "parameter '{name}' has no default; write default = \"20 mm\" or whatever is usual"
+            ),
+        );
+        return None;
+    };
+    let default = problems.take(default.line, Given::of_node(default))?;
+    let unit = text_of("unit");
+    let kind = match (default.kind(), unit.as_str()) {
+        (Some(kind), "") => kind,
+        (None, "") => {
+            problems.error(line, format!("the default of '{name}' does not tell its unit; add unit = \"mm\" or whatever it is"));
+            return None;
+        }
+        (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
+            Some(kind) if found.is_none_or(|found| found == kind) => kind,
+            Some(kind) => {
+                problems.error(
+                    line,
+                    format!("the default of '{name}' is wrong: {}", default.is_not(kind)),
+                );
+                return None;
+            }
+            None => {
+                problems.error(line, format!("'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"));
+                return None;
+            }
+        },
+    };
+    let mut bound = |key: &str| {
+        let node = keys.get(key)?;
+        let number = Given::of_node(node).and_then(|given| given.number(kind));
+        problems.take(
+            node.line,
+            number.map_err(|why| format!("'{key}' of '{name}': {why}")),
+        )
+    };
+    let parameter = Parameter {
+        name: name.to_owned(),
+        kind,
+        is_list: matches!(default.what, What::List(_)),
+        min: bound("min"),
+        max: bound("max"),
+        default,
+        about,
+        source,
+        line,
+    };
+    if let Err(why) = parameter.check(&parameter.default) {
+        problems.error(
+            line,
+            format!("the default of '{name}' does not pass its own check: {why}"),
+        );
+    }
+    Some(parameter)
+}

@@ -1,0 +1,183 @@
+//! Limits and monitors of a protocol.
+
+use super::args::{Args, check_range};
+use super::problem::{Problem, Problems};
+use super::quantity::Kind;
+use super::scope::Scope;
+use super::tree::{Node, Table, Value};
+use super::words::{Key, Need, Range};
+use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
+use palpate_model::units::{Newtons, Seconds};
+
+const LIMIT_KEYS: [Key; 1] = [Key {
+    name: "force_max",
+    kind: Kind::Force,
+    range: Range::Above0,
+    need: Need::Optional,
+    about: "highest force above tare; the rig's own limit holds too",
+}];
+
+/// The limits of a plan for given values.
+pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems) -> PlanLimits {
+    match node {
+        None => PlanLimits::default(),
+        Some(Node {
+            value: Value::Table(table),
+            ..
+        }) => {
+            let args = Args::read(table, "[limits]", &[&LIMIT_KEYS], &[], scope, problems);
+            PlanLimits {
+                force_max: args.maybe("force_max").map(Newtons),
+            }
+        }
+        Some(node) => {
+            problems.error(
+                node.line,
+                "'limits' must be a table; write [limits] on a line of its own",
+            );
+            PlanLimits::default()
+        }
+    }
+}
+
+const fn monitor_key(name: &'static str, range: Range, need: Need, about: &'static str) -> Key {
+    Key {
+        name,
+        kind: Kind::Text,
+        range,
+        need,
+        about,
+    }
+}
+
+/// What a monitor can look at, with its kind.
+const SOURCES: [(&str, Source, Kind); 4] = [
+    ("force", Source::Force, Kind::Force),
+    ("depth", Source::Depth, Kind::Length),
+    ("signal", Source::Volts, Kind::Voltage),
+    ("position", Source::Position, Kind::Length),
+];
+
+const ACTIONS: [(&str, Action); 5] = [
+    ("note", Action::Note),
+    ("pause", Action::Pause),
+    ("stop", Action::Stop),
+    ("retract", Action::Retract),
+    ("halt", Action::Halt),
+];
+
+/// Keys of a monitor beside the values, whose unit depends on what is watched.
+pub(super) const MONITOR_KEYS: [Key; 4] = [
+    monitor_key(
+        "watch",
+        Range::OneOf(&["force", "depth", "signal", "position"]),
+        Need::Required,
+        "`force`, `depth`, `signal` or `position`",
+    ),
+    Key {
+        name: "settle",
+        kind: Kind::Time,
+        range: Range::From0,
+        need: Need::Usual("1 s"),
+        about: "how long it must be past before a paused run goes on",
+    },
+    monitor_key(
+        "action",
+        Range::OneOf(&["note", "pause", "stop", "retract", "halt"]),
+        Need::Required,
+        "`note`, `pause`, `stop`, `retract` or `halt`",
+    ),
+    monitor_key(
+        "message",
+        Range::Any,
+        Need::Required,
+        "what the operator reads",
+    ),
+];
+
+/// The monitors of a plan for given values.
+pub(super) fn monitors(
+    node: Option<&Node>,
+    scope: &Scope,
+    problems: &mut Problems,
+) -> Vec<Monitor> {
+    let Some(node) = node else {
+        return Vec::new();
+    };
+    let Value::List(items) = &node.value else {
+        problems.error(
+            node.line,
+            "write [[monitor]] in double brackets, once for each monitor",
+        );
+        return Vec::new();
+    };
+    let tables = items.iter().filter_map(|item| match &item.value {
+        Value::Table(table) => Some(table),
+        _ => None,
+    });
+    tables
+        .filter_map(|table| monitor(table, scope, problems))
+        .collect()
+}
+
+fn monitor(table: &Table, scope: &Scope, problems: &mut Problems) -> Option<Monitor> {
+    let besides = ["above", "below", "resume"];
+    let args = Args::read(
+        table,
+        "a monitor",
+        &[&MONITOR_KEYS],
+        &besides,
+        scope,
+        problems,
+    );
+    let watch = args.text("watch").ok()?;
+    let (_, source, kind) = *SOURCES.iter().find(|(name, ..)| *name == watch)?;
+    let mut value = |key: &str| {
+        let node = table.get(key)?;
+        let number = scope.value(node, kind).and_then(|given| {
+            let number = given.number(kind)?;
+            check_range(kind, Range::Any, number).map(|()| number)
+        });
+        problems.take(
+            node.line,
+            number.map_err(|why| format!("'{key}' of a monitor: {why}")),
+        )
+    };
+    let (above, below, resume) = (value("above"), value("below"), value("resume"));
+    let (side, threshold) = match (table.get("above").is_some(), table.get("below").is_some()) {
+        (true, false) => (Side::Above, above?),
+        (false, true) => (Side::Below, below?),
+        _ => {
+            problems.error(
+                table.line,
+                "a monitor needs one threshold: write above = \"6 N\" or below = \"6 N\"",
+            );
+            return None;
+        }
+    };
+    let monitor = Monitor {
+        source,
+        side,
+        threshold,
+        // Without a value of its own it is past as soon as it no longer trips.
+        resume: if table.get("resume").is_some() {
+            resume?
+        } else {
+            threshold
+        },
+        settle: Seconds(args.number("settle").ok()?),
+        action: ACTIONS
+            .iter()
+            .find(|(name, _)| args.text("action") == Ok(name))?
+            .1,
+        message: args.text("message").ok()?.to_owned(),
+    };
+    if let Err(why) = monitor.check() {
+        let line = table.get("resume").map_or(table.line, |node| node.line);
+        problems.push(Problem::error(
+            line,
+            format!("{why}; give a 'resume' on the other side of the threshold"),
+        ));
+    }
+    Some(monitor)
+}
