@@ -32,7 +32,7 @@ steps = [
 "#;
 
 fn with_mine() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a file that can be read");
+    let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file that can be written");
     folder
 }
