@@ -4,12 +4,14 @@ use palpate_model::calibration::Calibration;
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
+use palpate_sessions::edits::EditError;
 use palpate_sessions::import::{ColumnNames, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
 use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
+use crate::edited;
 use crate::engine::{Effect, Record};
 
 /// Samples for a fit, and what a reader should know about them.
@@ -35,6 +37,24 @@ pub enum Stretch {
     RampHold,
     /// The recorded way back as well, where there is one.
     WithUnload,
+}
+
+/// What is asked of a source.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Wanted {
+    /// Which part of it.
+    pub stretch: Stretch,
+    /// Take a session though it was rejected.
+    pub is_rejected_included: bool,
+}
+
+impl From<Stretch> for Wanted {
+    fn from(stretch: Stretch) -> Self {
+        Self {
+            stretch,
+            is_rejected_included: false,
+        }
+    }
 }
 
 /// The probe has left the tissue once forces on the way back are below so many standard deviations: from
@@ -64,6 +84,17 @@ pub enum SourceError {
     /// The session cannot be read.
     #[error(transparent)]
     Session(#[from] ReadError),
+    /// The session's edits cannot be read.
+    #[error(transparent)]
+    Edits(#[from] EditError),
+    /// Somebody, or the program, decided that the session is not to be used.
+    #[error(
+        "the session was rejected ({reason}) and is not used; --include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict"
+    )]
+    Rejected {
+        /// Why.
+        reason: String,
+    },
     /// The table cannot be read.
     #[error(transparent)]
     Table(#[from] TableError),
@@ -77,6 +108,14 @@ pub enum SourceError {
         "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"
     )]
     Decision {
+        /// The parser's words.
+        detail: String,
+    },
+    /// The session's plan is not what this version knows.
+    #[error(
+        "the session's plan cannot be understood ({detail}); read the session with the version that wrote it"
+    )]
+    Plan {
         /// The parser's words.
         detail: String,
     },
@@ -98,12 +137,17 @@ pub fn read_named(path: &Path, columns: Option<&ColumnNames>) -> Result<FitSourc
     read_stretch(path, columns, Stretch::RampHold)
 }
 
-/// As [`read_named`], of the stretch that is asked for. A table without phases is taken whole.
+/// As [`read_named`], of what is asked for. A table without phases is taken whole. The edits of a session
+/// are made, and a rejected one is refused.
 pub fn read_stretch(
     path: &Path,
     columns: Option<&ColumnNames>,
-    stretch: Stretch,
+    wanted: impl Into<Wanted>,
 ) -> Result<FitSource, SourceError> {
+    let Wanted {
+        stretch,
+        is_rejected_included,
+    } = wanted.into();
     let is_session = path.is_dir()
         || path
             .extension()
@@ -118,7 +162,13 @@ pub fn read_stretch(
             calibration: None,
         });
     }
-    let session = Session::open(path)?;
+    let edited = edited::open(path)?;
+    if let (Some(reason), false) = (edited.rejection(), is_rejected_included) {
+        return Err(SourceError::Rejected {
+            reason: reason.to_owned(),
+        });
+    }
+    let session = edited.session;
     let samples = samples_of(&session, stretch)?;
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);

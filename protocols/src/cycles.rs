@@ -1,6 +1,7 @@
 //! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
 
 use crate::analysis::{SourceError, decisions, is_saturated, trusted_samples};
+use crate::edited;
 use crate::engine::{Effect, Record};
 use palpate_model::cycles::{CycleSample, by_depth};
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
@@ -36,7 +37,7 @@ impl CycleSource {
 pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, SourceError> {
     let is_session = path.is_dir() || path.extension().is_some_and(|name| name == "mcap");
     if is_session || !path.exists() {
-        return of_session(&Session::open(path)?);
+        return of_session(&edited::open(path)?.session);
     }
     let table = read_table(path, columns)?;
     let mut notes = table.notes;

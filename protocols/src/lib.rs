@@ -7,7 +7,9 @@
 
 pub mod analysis;
 pub mod cycles;
+pub mod edited;
 pub mod engine;
+pub mod fidelity;
 pub mod file;
 pub mod plans;
 pub mod preview;

@@ -10,7 +10,10 @@
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
+pub mod about;
 pub mod calibrations;
+mod chain;
+pub mod edits;
 pub mod export;
 pub mod folder;
 pub mod import;
@@ -23,9 +26,12 @@ mod schema;
 pub mod text;
 pub mod trade;
 
+pub use about::{About, AboutError, Labels};
 pub use calibrations::{
     Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
 };
+pub use chain::ChainError;
+pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,

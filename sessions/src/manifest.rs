@@ -1,7 +1,8 @@
 //! The first message of every session: who measured what, on which rig, with which versions.
 
+use crate::about::About;
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_model::rig::{Limits, RigDescription};
+use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU32, Ordering};
 
@@ -30,6 +31,12 @@ pub struct Manifest {
     pub specimen: String,
     /// The probe's shape and size, in words.
     pub indenter: String,
+    /// What else was told of specimen, probe and series; see [`crate::about::KEYS`].
+    #[serde(default, skip_serializing_if = "About::is_empty")]
+    pub about: About,
+    /// How the signal was taken; `None` in sessions recorded before this was written down.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub signal: Option<SignalFacts>,
     /// The rig as it described itself.
     pub rig: RigDescription,
     /// The interlock limits in force.

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::{Args, ValueEnum};
+use palpate_protocols::edited;
 use palpate_sessions::export::{ExportError, export_csv, export_parquet};
 use palpate_sessions::log::Session;
 use std::path::PathBuf;
@@ -32,7 +33,8 @@ enum Format {
 }
 
 pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
-    let session = Session::open(&args.session).map_err(super::read_failure)?;
+    let edited = edited::open(&args.session).map_err(super::source_failure)?;
+    let session = edited.session;
     session.notes.iter().for_each(|note| output.note(note));
     let name = args
         .session

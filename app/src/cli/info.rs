@@ -3,6 +3,10 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
+use palpate_model::rig::SignalFacts;
+use palpate_protocols::edited;
+use palpate_sessions::About;
+use palpate_sessions::edits::{Change, Edit, Verdict};
 use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -28,6 +32,8 @@ struct Info<'a> {
     operator: &'a str,
     specimen: &'a str,
     indenter: &'a str,
+    about: &'a About,
+    signal: Option<&'a SignalFacts>,
     rig: &'a str,
     rig_settings: &'a std::collections::BTreeMap<String, String>,
     plan: &'a serde_json::Value,
@@ -39,11 +45,15 @@ struct Info<'a> {
     ending: Option<&'a str>,
     reason: Option<&'a str>,
     time_use_s: Option<&'a [(String, f64)]>,
+    verdict: Option<Verdict>,
+    verdict_reason: Option<&'a str>,
+    edits: &'a [Edit],
     notes: &'a [String],
 }
 
 pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
-    let session = Session::open(&args.session).map_err(super::read_failure)?;
+    let edited = edited::open(&args.session).map_err(super::source_failure)?;
+    let (session, edits) = (edited.session, edited.edits);
     let manifest = &session.manifest;
     let info = Info {
         command: "info",
@@ -55,6 +65,8 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         operator: &manifest.operator,
         specimen: &manifest.specimen,
         indenter: &manifest.indenter,
+        about: &manifest.about,
+        signal: manifest.signal.as_ref(),
         rig: &manifest.rig.identity,
         rig_settings: &manifest.rig.settings,
         plan: &manifest.plan,
@@ -66,6 +78,9 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         ending: session.end.as_ref().map(|end| end.outcome.as_str()),
         reason: session.end.as_ref().map(|end| end.reason.as_str()),
         time_use_s: session.end.as_ref().map(|end| end.time_use.as_slice()),
+        verdict: edits.verdict().map(|(verdict, _)| verdict),
+        verdict_reason: edits.verdict().map(|(_, edit)| edit.reason.as_str()),
+        edits: &edits.all,
         notes: &session.notes,
     };
     output.result(&info, || text(&info));
@@ -98,13 +113,20 @@ fn text(info: &Info<'_>) -> String {
         format!("operator   {}", or_dash(info.operator)),
         format!("specimen   {}", or_dash(info.specimen)),
         format!("indenter   {}", or_dash(info.indenter)),
-        format!("rig        {}", info.rig),
     ];
+    lines.extend(
+        info.about
+            .lines()
+            .iter()
+            .map(|(key, value)| format!("           {key} {value}")),
+    );
+    lines.push(format!("rig        {}", info.rig));
     lines.extend(
         info.rig_settings
             .iter()
             .map(|(key, value)| format!("           {key} {value}")),
     );
+    lines.extend(info.signal.map(signal_text));
     lines.push(format!(
         "written by palpate {}, engine {}",
         info.software_version, info.engine_version
@@ -135,6 +157,36 @@ fn text(info: &Info<'_>) -> String {
             .collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
+    lines.extend(info.edits.iter().map(edit_text));
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
     lines.join("\n")
+}
+
+fn signal_text(signal: &SignalFacts) -> String {
+    let range = signal.range_v.map_or(String::new(), |[low, high]| {
+        format!(", range {low:.3} to {high:.3} V")
+    });
+    let count = signal.resolution_v.map_or(String::new(), |volts| {
+        format!(", one count {:.3} mV", volts * 1e3)
+    });
+    format!(
+        "signal     {:.2} Hz{range}{count}\n           filter {}\n           {}",
+        signal.sample_rate_hz, signal.filter, signal.aliasing
+    )
+}
+
+fn edit_text(edit: &Edit) -> String {
+    let at = edit.at.format("%Y-%m-%d %H:%M:%SZ");
+    let what = match edit.change {
+        Change::Verdict { verdict } => verdict.to_string(),
+        Change::Contact {
+            number,
+            position_mm,
+            was_mm,
+        } => format!(
+            "contact {number} at {:.3} mm instead of {:.3} mm",
+            position_mm.0, was_mm.0
+        ),
+    };
+    format!("edit       {at} {}: {what}: {}", edit.by, edit.reason)
 }

@@ -13,10 +13,12 @@ mod plan;
 mod programme;
 mod protocol;
 mod replay;
+mod report;
 mod rig;
 mod run;
 mod select;
 mod trade;
+mod verdict;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -65,6 +67,12 @@ enum Command {
     Export(export::ExportArgs),
     /// Tell what a session contains
     Info(info::InfoArgs),
+    /// Tell what happened in a run: targets and what was done, missing samples, use of time
+    Report(report::ReportArgs),
+    /// Say what a session is worth: valid, suspect or rejected
+    Verdict(verdict::VerdictArgs),
+    /// Correct where a session found contact; its log stays as it is
+    CorrectContact(verdict::CorrectArgs),
 }
 
 /// Why a command did not do what was asked.
@@ -151,6 +159,9 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
+        Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
+        Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
+        Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -185,9 +196,11 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) => Failure::usage(err),
-        SourceError::Empty | SourceError::Calibration { .. } | SourceError::Decision { .. } => {
-            Failure::failed(err)
-        }
+        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Edits(_)
+        | SourceError::Plan { .. }
+        | SourceError::Empty
+        | SourceError::Calibration { .. }
+        | SourceError::Decision { .. } => Failure::failed(err),
     }
 }

@@ -2,20 +2,19 @@
 
 use super::Failure;
 use super::output::Output;
-use super::programme::ProgrammeArgs;
-use super::protocol::{ValueArgs, pair};
+use super::programme;
+use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
-use palpate_protocols::programme::Programme;
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
 };
+use palpate_sessions::{About, Verdict};
 use serde::Serialize;
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
@@ -53,14 +52,11 @@ pub enum RunCommand {
 /// Arguments of `palpate run NAME|FILE`.
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
-    /// A built-in protocol ('palpate protocol list') or a protocol file
+    /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
     #[arg(value_name = "NAME|FILE")]
     protocol: Option<String>,
     #[command(flatten)]
     values: ValueArgs,
-    /// What the protocol asks for, such as specimen.storage="saline, 4 C"; may be repeated
-    #[arg(long, value_name = "KEY=ANSWER", value_parser = pair)]
-    ask: Vec<(String, String)>,
     #[command(flatten)]
     how: HowArgs,
     /// Print one JSON object
@@ -70,27 +66,30 @@ pub struct ProtocolArgs {
 
 /// On which rig, into which folder, by whom.
 #[derive(Debug, Args)]
-struct HowArgs {
+pub(super) struct HowArgs {
     #[command(flatten)]
-    rig: RigArgs,
+    pub(super) rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
     #[arg(long)]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Who runs it
     #[arg(long, default_value = "")]
-    operator: String,
+    pub(super) operator: String,
     /// What is indented
     #[arg(long, default_value = "")]
     specimen: String,
     /// With which probe
     #[arg(long, default_value = "blunt 12 mm probe")]
-    indenter: String,
+    pub(super) indenter: String,
+    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    about: Vec<String>,
     /// Accept what the preview asks to acknowledge; it is recorded
     #[arg(long)]
-    acknowledge: bool,
+    pub(super) acknowledge: bool,
     /// Only tell what would happen
     #[arg(long)]
-    preview: bool,
+    pub(super) preview: bool,
 }
 
 /// Arguments of `palpate run ramp-hold`.
@@ -119,7 +118,7 @@ pub struct RampHoldArgs {
 }
 
 /// A finite number, or one sentence.
-fn number(text: &str) -> Result<f64, String> {
+pub(super) fn number(text: &str) -> Result<f64, String> {
     match text.parse::<f64>() {
         Ok(value) if value.is_finite() => Ok(value),
         _ => Err("this is not a finite number; write it like 0.75".into()),
@@ -138,6 +137,8 @@ struct RunReport {
     contact_mm: Option<f64>,
     contact_std_error_mm: Option<f64>,
     force_peak_n: Option<f64>,
+    verdict: Option<Verdict>,
+    verdict_reason: Option<String>,
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
@@ -157,90 +158,43 @@ fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         unload: args.unload.map(MmPerS),
     };
     let bench = super::rig::open(&args.how.rig)?;
-    carry_out(params.plan(), bench, &args.how, output)
+    let labels = labels(&args.how)?;
+    carry_out(params.plan(), bench, &args.how, labels, output)
 }
 
-/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told.
+/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
 fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
         return Err(Failure::usage(
             "name a protocol; 'palpate protocol list' tells which there are",
         ));
     };
-    if !super::protocol::is_built_in(name) && Programme::is_meant(&super::protocol::text_of(name)?)
-    {
-        return run_programme(name, args, output);
+    let how = &args.how;
+    if programme::is_one(name) {
+        return programme::run(Path::new(name), how, &args.values.values(), output);
     }
-    let bench = super::rig::open(&args.how.rig)?;
+    let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) =
         super::protocol::sound(name, &args.values.values(), &bench, output)?;
-    let mut answers: BTreeMap<String, String> = args.ask.iter().cloned().collect();
-    let how = &args.how;
-    for (key, told) in [
-        ("operator", &how.operator),
-        ("specimen", &how.specimen),
-        ("indenter", &how.indenter),
-    ] {
-        if !told.is_empty() {
-            answers.entry(key.into()).or_insert_with(|| told.clone());
-        }
-    }
+    let labels = labels(how)?;
     if !how.preview {
-        protocol.check_answers(&answers).map_err(|reason| {
+        protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
-                "{reason}; add --ask operator=Ada or the like for each"
+                "{reason}; add --operator, --specimen or --about KEY=VALUE for each"
             ))
         })?;
     }
-    let mut plan = written.plan;
-    let mut labels = Labels::default();
-    for (key, label) in [
-        ("operator", &mut labels.operator),
-        ("specimen", &mut labels.specimen),
-        ("indenter", &mut labels.indenter),
-    ] {
-        *label = answers.remove(key).unwrap_or_default();
-    }
-    if let Some(source) = &mut plan.source {
-        source.answers = answers;
-    }
-    carry_out_for(plan, bench, how, labels, output)
+    carry_out(written.plan, bench, how, labels, output)
 }
 
-fn run_programme(file: &str, args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
-    if !args.values.values().is_empty() || !args.ask.is_empty() {
-        return Err(Failure::usage(
-            "a programme sets the values of its protocols itself; change it in its file instead of with --set or --ask",
-        ));
-    }
-    let how = &args.how;
-    let programme = ProgrammeArgs {
-        file: Path::new(file),
-        rig: &how.rig,
-        out: how.out.as_deref(),
-        operator: &how.operator,
-        indenter: &how.indenter,
-        preview: how.preview,
-    };
-    super::programme::run(&programme, output)
-}
-
-fn carry_out(plan: Plan, bench: OpenRig, how: &HowArgs, output: &Output) -> Result<(), Failure> {
-    let labels = Labels {
-        operator: how.operator.clone(),
-        specimen: how.specimen.clone(),
-        indenter: how.indenter.clone(),
-    };
-    carry_out_for(plan, bench, how, labels, output)
-}
-
-fn carry_out_for(
+fn carry_out(
     plan: Plan,
     bench: OpenRig,
     how: &HowArgs,
     labels: Labels,
     output: &Output,
 ) -> Result<(), Failure> {
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let request = RunRequest {
         plan,
         calibration: bench.calibration,
@@ -296,6 +250,23 @@ fn carry_out_for(
         return Err(Failure::failed("the runner ended without a run"));
     };
     report(view, output)
+}
+
+/// Who and what, as told by the arguments.
+fn labels(args: &HowArgs) -> Result<Labels, Failure> {
+    let mut labels = Labels {
+        operator: args.operator.clone(),
+        specimen: args.specimen.clone(),
+        indenter: args.indenter.clone(),
+        about: About::default(),
+    };
+    for pair in &args.about {
+        labels
+            .tell_pair(pair)
+            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+    }
+    labels.check().map_err(Failure::usage)?;
+    Ok(labels)
 }
 
 /// The first signal stops, the second halts.
@@ -366,6 +337,8 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         contact_mm: view.contact.map(|contact| contact.position.0),
         contact_std_error_mm: view.contact.map(|contact| contact.std_error_mm),
         force_peak_n: view.force_peak.map(|force| force.0),
+        verdict: view.verdict.as_ref().map(|(verdict, _)| *verdict),
+        verdict_reason: view.verdict.as_ref().map(|(_, reason)| reason.clone()),
         live: view.live.clone(),
     };
     output.result(&report, || run_text(&report));
@@ -398,6 +371,9 @@ fn run_text(report: &RunReport) -> String {
     }
     if let Some(peak) = report.force_peak_n {
         lines.push(format!("peak force {peak:.3} N"));
+    }
+    if let (Some(verdict), Some(reason)) = (report.verdict, &report.verdict_reason) {
+        lines.push(format!("{verdict}: {reason}"));
     }
     if let Some(live) = &report.live {
         lines.push("live fit:".into());

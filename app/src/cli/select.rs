@@ -9,7 +9,7 @@ use clap::Args;
 use palpate_model::families::by_key;
 use palpate_model::fit::FitSample;
 use palpate_model::select::{SelectError, SelectOptions, Selection, select};
-use palpate_protocols::analysis::Stretch;
+use palpate_protocols::analysis::{Stretch, Wanted};
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -42,6 +42,9 @@ pub struct SelectArgs {
     /// Compare the way back too, where it was recorded
     #[arg(long)]
     unload: bool,
+    /// Take sessions though they were rejected
+    #[arg(long)]
+    include_rejected: bool,
     /// Draw error over cost as a new SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
@@ -65,11 +68,14 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
     new_file::check("plot", args.plot.as_deref())?;
     let found = sources::find(&args.sources)?;
-    let stretch = match args.unload {
-        true => Stretch::WithUnload,
-        false => Stretch::RampHold,
+    let wanted = Wanted {
+        stretch: match args.unload {
+            true => Stretch::WithUnload,
+            false => Stretch::RampHold,
+        },
+        is_rejected_included: args.include_rejected,
     };
-    let records = sources::read(&found, columns.as_ref(), stretch, output)?;
+    let records = sources::read(&found, columns.as_ref(), wanted, output)?;
     options.specimens = specimens(args, &records)?;
     let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let bar = output.count_bar(0);

@@ -11,6 +11,7 @@ pub mod plan_picture;
 pub mod programme;
 pub mod selection;
 mod selection_plot;
+pub mod session;
 pub(crate) mod svg;
 pub mod text;
 pub mod thin;

@@ -7,6 +7,7 @@ use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{AfterStop, Answers, Labels, RunRequest};
+use palpate_sessions::About;
 use std::path::{Path, PathBuf};
 
 /// Longest hold the preview accepts: a day, in seconds.
@@ -67,6 +68,7 @@ impl Default for ProtocolForm {
                 operator: String::new(),
                 specimen: String::new(),
                 indenter: "blunt 12 mm probe".into(),
+                about: About::default(),
             },
             speed: QuantityField::new(params.speed.0),
             depth: QuantityField::new(params.depth.0),

@@ -8,7 +8,7 @@ use egui_plot::PlotPoint;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
 use palpate_model::units::Seconds;
-use palpate_protocols::analysis::{self, SourceError};
+use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::runner::{RunView, Stopwatch};
 use palpate_sessions::import::ColumnNames;
 use std::path::{Path, PathBuf};
@@ -59,13 +59,14 @@ impl Fitted {
     }
 }
 
-/// Reads a session or a table and fits it. `columns` names the columns of a table without header.
+/// Reads what is wanted of a session or a table and fits it. `columns` names the columns of a table without header.
 pub fn fit_source(
     path: &Path,
     columns: Option<&ColumnNames>,
+    wanted: Wanted,
     options: &FitOptions,
 ) -> Result<Fitted, SourceError> {
-    let source = analysis::read_named(path, columns)?;
+    let source = analysis::read_stretch(path, columns, wanted)?;
     let watch = Stopwatch::start();
     let result = fit(&source.samples, options);
     Ok(Fitted {
@@ -173,7 +174,12 @@ impl Refitter {
 
 fn exact(folder: &Path) -> Result<ExactFit, String> {
     let options = FitOptions::default();
-    let fitted = fit_source(folder, None, &options).map_err(|err| err.to_string())?;
+    // Whoever looks at a run sees its fit, whatever the run is worth.
+    let wanted = Wanted {
+        is_rejected_included: true,
+        ..Wanted::default()
+    };
+    let fitted = fit_source(folder, None, wanted, &options).map_err(|err| err.to_string())?;
     let fitted = fitted.with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);

@@ -6,6 +6,7 @@ use palpate_app::workers::fit::fit_source;
 use palpate_model::fit::FitOptions;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
+use palpate_protocols::analysis::Wanted;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
@@ -100,7 +101,13 @@ fn one_source_prints_what_the_window_shows() {
     table(&at.join("t.csv"), &rows(900, 0.1, 1.0));
     let output = palpate(at, &["fit", "t.csv"]);
     succeeded(&output);
-    let fitted = fit_source(&at.join("t.csv"), None, &FitOptions::default()).unwrap();
+    let fitted = fit_source(
+        &at.join("t.csv"),
+        None,
+        Wanted::default(),
+        &FitOptions::default(),
+    )
+    .unwrap();
     let report = fitted.result.unwrap();
     assert_eq!(stdout(&output).trim_end(), text::whole(&report));
     assert!(stdout(&output).contains("tau_eps    1.0"));

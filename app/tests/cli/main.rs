@@ -7,6 +7,7 @@ mod extremes;
 mod fit;
 mod plan;
 mod protocol;
+mod records;
 mod select;
 mod trade;
 

@@ -12,6 +12,7 @@ pub mod path;
 pub mod phase;
 pub mod profile;
 pub mod reading;
+pub mod signal;
 pub mod thickness;
 
 pub use command::{MoveTo, Oscillation, RigCommand};
@@ -26,4 +27,5 @@ pub use path::{PathError, PathTracker};
 pub use phase::Phase;
 pub use profile::Profile;
 pub use reading::{AxisStatus, Reading};
+pub use signal::SignalFacts;
 pub use thickness::{Thickness, ThicknessError, Touched, thickness};

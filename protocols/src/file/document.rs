@@ -4,7 +4,7 @@ use super::args::STEPS_HINT;
 use super::problem::{Problems, suggestion};
 use super::scope::names_in;
 use super::tree::{self, Node, Table, Value};
-use super::{ASKABLE, LANGUAGE, Protocol, parameter};
+use super::{LANGUAGE, Protocol, parameter};
 use std::collections::BTreeSet;
 
 const KEYS: [&str; 11] = [
@@ -151,7 +151,10 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         );
         return Vec::new();
     };
-    let known: Vec<&str> = ASKABLE.iter().map(|(key, _)| *key).collect();
+    let known: Vec<&str> = palpate_sessions::about::KEYS
+        .iter()
+        .map(|key| key.name)
+        .collect();
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {

@@ -27,6 +27,8 @@ pub use quantity::{Given, Kind, What};
 pub use reference::reference;
 
 use crate::plans::{Plan, PlanSource};
+use palpate_sessions::Labels;
+use palpate_sessions::about::{KEYS, Key};
 use problem::{Problems, suggestion};
 use scope::Scope;
 use std::collections::BTreeMap;
@@ -34,27 +36,6 @@ use tree::{Node, Value};
 
 /// Version of the protocol language that this program reads.
 pub const LANGUAGE: u32 = 1;
-
-/// What a protocol can ask for before it starts: the key, and what it means.
-pub const ASKABLE: [(&str, &str); 14] = [
-    ("operator", "who runs it"),
-    ("specimen", "name of the specimen"),
-    ("specimen.source", "animal or person, organ, place"),
-    ("specimen.time-since-death", "hours since death or excision"),
-    ("specimen.storage", "how it was kept"),
-    ("specimen.temperature", "temperature during the test"),
-    ("specimen.hydration", "how it is kept wet"),
-    ("specimen.thickness", "in mm, and how it was measured"),
-    ("specimen.mounting", "how it is clipped or supported"),
-    ("indenter", "the probe in words"),
-    ("indenter.diameter", "in mm"),
-    (
-        "indenter.tip",
-        "flat, spherical with its radius, conical with its angle",
-    ),
-    ("indenter.material", "of the tip"),
-    ("signal.filter", "any filter between cell and converter"),
-];
 
 /// A protocol as it was read: its head, and steps that wait for values.
 #[derive(Clone, Debug, PartialEq)]
@@ -69,7 +50,7 @@ pub struct Protocol {
     pub about: String,
     /// Where it comes from.
     pub source: String,
-    /// What must be told before the start: keys of [`ASKABLE`].
+    /// What must be told before the start: keys of [`KEYS`].
     pub ask: Vec<String>,
     /// What may be changed at the start.
     pub parameters: Vec<Parameter>,
@@ -186,30 +167,19 @@ impl Protocol {
             source: Some(PlanSource {
                 crc32: self.crc32.clone(),
                 values: chosen,
-                answers: BTreeMap::new(),
             }),
         };
         (plan, lines)
     }
 
-    /// Whether everything it asks for was told, and nothing that nobody knows; else what to tell.
-    pub fn check_answers(&self, answers: &BTreeMap<String, String>) -> Result<(), String> {
-        let known = ASKABLE.map(|(key, _)| key);
-        if let Some(odd) = answers.keys().find(|key| !known.contains(&key.as_str())) {
-            return Err(format!(
-                "nothing is called '{odd}'; {}",
-                suggestion(odd, &known)
-            ));
-        }
-        let has_answer = |key: &str| {
-            answers
-                .get(key)
-                .is_some_and(|answer| !answer.trim().is_empty())
+    /// Whether everything it asks for was told; else what to tell.
+    pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
+        let is_open = |key: &&Key| {
+            self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
         };
-        let is_open = |key: &str| self.ask.iter().any(|asked| asked == key) && !has_answer(key);
-        let open = ASKABLE.iter().filter(|(key, _)| is_open(key));
+        let open = KEYS.iter().filter(is_open);
         let open: Vec<String> = open
-            .map(|(key, about)| format!("{key} ({about})"))
+            .map(|key| format!("{} ({})", key.name, key.meaning))
             .collect();
         if open.is_empty() {
             return Ok(());

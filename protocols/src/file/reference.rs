@@ -1,11 +1,11 @@
 //! The reference of the language, written from the table that reads it.
 
-use super::ASKABLE;
 use super::procedure::LOOP_KEYS;
 use super::quantity::Kind;
 use super::watch::MONITOR_KEYS;
 use super::words::{COMMON, Key, Need, WORDS};
 use crate::plans::FindContact;
+use palpate_sessions::about::KEYS;
 use std::fmt::Write;
 
 /// Every step with its keys, units and usual values, then loops, monitors, units and what can be asked, in Markdown.
@@ -52,8 +52,8 @@ pub fn reference() -> String {
         );
     }
     text.push_str("\n### What `ask` knows\n\n| key | meaning |\n|---|---|\n");
-    for (key, about) in ASKABLE {
-        let _ = writeln!(text, "| `{key}` | {about} |");
+    for key in KEYS {
+        let _ = writeln!(text, "| `{}` | {} |", key.name, key.meaning);
     }
     text
 }

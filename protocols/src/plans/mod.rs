@@ -47,9 +47,6 @@ pub struct PlanSource {
     pub crc32: String,
     /// Value of every parameter, as it was written.
     pub values: BTreeMap<String, String>,
-    /// What was asked before the start and told, such as `specimen.storage`.
-    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
-    pub answers: BTreeMap<String, String>,
 }
 
 /// One step at its place in the plan.

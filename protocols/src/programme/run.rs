@@ -11,7 +11,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
-use palpate_sessions::{ReadError, Session};
+use palpate_sessions::{About, AboutError, ReadError, Session};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
@@ -186,11 +186,9 @@ impl Work<'_> {
             calibration: self.laboratory.calibration.clone(),
             limits: self.laboratory.limits,
             out: Some(folder.clone()),
-            labels: Labels {
-                operator: programme.operator.clone(),
-                specimen: specimen.map_or(String::new(), |number| format!("specimen {number}")),
-                indenter: self.laboratory.indenter.clone(),
-            },
+            labels: self
+                .labels(&place, specimen)
+                .map_err(|err| refused(err.to_string()))?,
             is_acknowledged: programme.is_acknowledged,
             after_stop: AfterStop::Close,
             answers: self.laboratory.answers,
@@ -242,6 +240,26 @@ impl Work<'_> {
         }
         (self.tell)(Event::Finished(&place, &folder));
         self.calibrate(place.task, &folder)
+    }
+
+    /// Who and what a run is about, with its place in the programme.
+    fn labels(&self, place: &Place, specimen: Option<u64>) -> Result<Labels, AboutError> {
+        let task = &self.programme.tasks[place.task];
+        let mut labels = Labels {
+            operator: self.programme.operator.clone(),
+            specimen: specimen.map_or(String::new(), |number| format!("specimen {number}")),
+            indenter: self.laboratory.indenter.clone(),
+            about: About::default(),
+        };
+        let series = format!("{}/{}", self.programme.name, task.name);
+        labels.tell("series.id", &series)?;
+        // The simulated rig counts its own specimen as 0.
+        if let Some(number) = specimen.filter(|number| *number > 0) {
+            labels.tell("series.specimen", &number.to_string())?;
+        }
+        labels.tell("series.repeat", &place.repeat.to_string())?;
+        labels.tell("series.repeats", &task.repeats.to_string())?;
+        Ok(labels)
     }
 
     /// Waits until the run in a folder has ended and its log is closed.

@@ -1,8 +1,10 @@
 //! One run in progress: the engine's state with its log, its live fit and its plot history.
 
+use super::clock::wall_now;
 use super::snapshot::{LogLine, PromptView, RunView};
 use super::start::{AfterStop, Answers};
 use crate::engine::{self, Config, Effect, EndingKind, Input, Operator, Outcome, Record, State};
+use crate::fidelity::{FidelityMeter, first_verdict};
 use crate::plans::Step;
 use crate::preview::Preview;
 use palpate_model::Nanos;
@@ -10,6 +12,7 @@ use palpate_model::fit::LiveFit;
 use palpate_model::rig::{Fault, HandAction, Phase, Reading, RigCommand};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
 use palpate_sessions::{LogError, SessionWriter};
 use std::collections::{BTreeMap, VecDeque};
@@ -28,6 +31,9 @@ pub(super) struct ActiveRun {
     preview: Preview,
     writer: Option<SessionWriter>,
     folder: PathBuf,
+    session_id: String,
+    fidelity: FidelityMeter,
+    verdict: Option<(Verdict, String)>,
     origin: Nanos,
     after_stop: AfterStop,
     answers: Answers,
@@ -51,18 +57,22 @@ impl ActiveRun {
     pub fn new(
         config: Config,
         preview: Preview,
-        writer: SessionWriter,
+        (writer, session_id): (SessionWriter, String),
         folder: PathBuf,
         origin: Nanos,
         unattended: (AfterStop, Answers),
     ) -> Self {
         let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
+        let fidelity = FidelityMeter::new(&config.plan, &config.rig);
         Self {
             engine: Some(State::new(Arc::new(config))),
             preview,
             writer: Some(writer),
             folder,
+            session_id,
+            fidelity,
+            verdict: None,
             origin,
             after_stop,
             answers,
@@ -118,6 +128,9 @@ impl ActiveRun {
         if is_urgent {
             commands.iter().copied().for_each(&mut *send);
         }
+        effects
+            .iter()
+            .for_each(|effect| self.fidelity.effect(effect));
         if let Some((kind, body)) = logged {
             self.log(now, kind, body);
         }
@@ -191,6 +204,7 @@ impl ActiveRun {
             phase: state.phase(),
             cycle: state.cycle(),
         };
+        self.fidelity.row(&row);
         let result = self
             .writer
             .as_mut()
@@ -287,7 +301,23 @@ impl ActiveRun {
         {
             self.log_error = Some(err.to_string());
         }
+        let (verdict, reason) = first_verdict(&outcome, self.fidelity.found());
+        self.record_verdict(verdict, &reason);
+        self.verdict = Some((verdict, reason));
         self.outcome = Some(outcome);
+    }
+
+    /// The first verdict stands beside the log, like those of people after it.
+    fn record_verdict(&mut self, verdict: Verdict, reason: &str) {
+        let edit = Edit {
+            at: wall_now().into(),
+            by: "palpate".into(),
+            reason: reason.to_owned(),
+            change: Change::Verdict { verdict },
+        };
+        if let Err(err) = add_edit(&self.folder, &self.session_id, &edit) {
+            self.log_error.get_or_insert_with(|| err.to_string());
+        }
     }
 
     /// The run as the world may see it.
@@ -328,6 +358,7 @@ impl ActiveRun {
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
             outcome: self.outcome.clone(),
+            verdict: self.verdict.clone(),
             log_error: self.log_error.clone(),
             events: Arc::new(self.events.iter().cloned().collect()),
         })

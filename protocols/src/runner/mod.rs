@@ -13,5 +13,6 @@ mod start;
 pub(crate) use active_run::{LiveFeed, to_json};
 pub use clock::{Stopwatch, TimeScale, wall_now};
 pub use main_loop::{Request, Runner};
+pub use palpate_sessions::Labels;
 pub use snapshot::{LogLine, PromptView, RigView, RunView, Snapshot};
-pub use start::{AfterStop, Answers, Labels, RunRequest, StartError};
+pub use start::{AfterStop, Answers, RunRequest, StartError};

@@ -7,6 +7,7 @@ use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Newtons, Seconds};
+use palpate_sessions::edits::Verdict;
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -91,6 +92,8 @@ pub struct RunView {
     pub can_retract: Result<(), String>,
     /// How it ended, once it has and the log is closed.
     pub outcome: Option<Outcome>,
+    /// The first verdict on the session, with its reason, once the run has ended.
+    pub verdict: Option<(Verdict, String)>,
     /// What the log said when it could not be closed.
     pub log_error: Option<String>,
     /// What happened, newest last; the oldest lines fall out past [`RunView::EVENTS_MAX`].

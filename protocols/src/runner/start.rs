@@ -9,24 +9,12 @@ use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_sessions::{
-    Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space, library_folder,
-    new_session_folder, new_session_id,
+    Labels, Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space,
+    library_folder, new_session_folder, new_session_id,
 };
-use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use std::sync::Arc;
 use thiserror::Error;
-
-/// Who and what a session is about.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-pub struct Labels {
-    /// Who ran it.
-    pub operator: String,
-    /// What was indented.
-    pub specimen: String,
-    /// With what.
-    pub indenter: String,
-}
 
 /// What happens when a run stopped before its plan was complete.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -103,6 +91,10 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         bench.is_homed,
     );
     preview.verdict(request.is_acknowledged).map_err(refused)?;
+    request
+        .labels
+        .check()
+        .map_err(|err| refused(err.to_string()))?;
 
     let started_at = wall_now();
     let session_id = new_session_id(started_at.into());
@@ -126,13 +118,15 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     };
     let manifest = Manifest {
         record_version: RECORD_VERSION,
-        session_id,
+        session_id: session_id.clone(),
         software_version: env!("CARGO_PKG_VERSION").into(),
         engine_version: ENGINE_VERSION,
         started_at: started_at.into(),
         operator: request.labels.operator.clone(),
         specimen: request.labels.specimen.clone(),
         indenter: request.labels.indenter.clone(),
+        about: request.labels.about.clone(),
+        signal: Some(bench.rig.signal()),
         rig: bench.rig.as_ref().clone(),
         limits: request.limits,
         calibration: json("calibration", serde_json::to_value(&request.calibration))?,
@@ -157,7 +151,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     Ok(ActiveRun::new(
         config,
         preview,
-        writer,
+        (writer, session_id),
         path,
         bench.origin,
         (request.after_stop, request.answers),

@@ -12,7 +12,8 @@ const ROW_GROUP: usize = 1 << 18;
 
 /// Writes the samples as Parquet. The file's metadata carries the units (`palpate.columns`, JSON
 /// from column to unit) and where the numbers come from (`palpate.session`, `palpate.software`,
-/// `palpate.record_version`).
+/// `palpate.record_version`), of what (`palpate.specimen`, `palpate.about`, a JSON object) and what a reader
+/// must know (`palpate.notes`, a JSON list of sentences).
 pub fn export_parquet(session: &Session, path: &Path) -> Result<(), ExportError> {
     let frame = frame(session, path)?;
     let metadata = metadata(session);
@@ -35,6 +36,15 @@ fn metadata(session: &Session) -> KeyValueMetadata {
         (
             "palpate.record_version",
             manifest.record_version.to_string(),
+        ),
+        ("palpate.specimen", manifest.specimen.clone()),
+        (
+            "palpate.about",
+            serde_json::json!(manifest.about).to_string(),
+        ),
+        (
+            "palpate.notes",
+            serde_json::json!(session.notes).to_string(),
         ),
     ];
     KeyValueMetadata::from_static(

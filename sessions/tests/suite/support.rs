@@ -1,10 +1,11 @@
 //! Sessions to test with, and sinks that remember or fail.
 
 use chrono::{TimeZone, Utc};
-use palpate_model::rig::{AdcDescription, Limits, Phase, RigDescription};
+use palpate_model::rig::{AdcDescription, Limits, Phase, RigDescription, SignalFacts};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    EndRecord, Entry, EntryKind, LogWriter, Manifest, RECORD_VERSION, Row, Session, Sink,
+    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, RECORD_VERSION, Row, Session,
+    Sink,
 };
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -30,6 +31,24 @@ impl Random {
     }
 }
 
+fn about() -> About {
+    let mut labels = Labels::default();
+    labels
+        .tell_pair("specimen.temperature_c=36.6")
+        .expect("a known key");
+    labels.about
+}
+
+fn signal() -> SignalFacts {
+    SignalFacts {
+        sample_rate_hz: 1e9 / 976_562.0,
+        filter: "none".into(),
+        range_v: Some([-10.0, 10.0 - 10.0 / 32768.0]),
+        resolution_v: Some(10.0 / 32768.0),
+        aliasing: "above 512 Hz".into(),
+    }
+}
+
 pub fn manifest() -> Manifest {
     Manifest {
         record_version: RECORD_VERSION,
@@ -40,6 +59,8 @@ pub fn manifest() -> Manifest {
         operator: "Ada \"A.\" Lovelace\n".into(),
         specimen: "µ-gel 3 %".into(),
         indenter: "sphere 10 mm".into(),
+        about: about(),
+        signal: Some(signal()),
         rig: RigDescription {
             name: "sim".into(),
             identity: "simulated rig".into(),

@@ -1,10 +1,11 @@
 //! Many sources, each read and fitted on one of several threads; the answers in the sources' order.
 
-use super::super::{Failure, output::Output};
+use super::super::{Failure, output::Output, source_failure};
 use super::Recipe;
 use crate::report::text;
 use crate::workers::pool::{News, NoAnswer, in_order};
 use palpate_model::fit::{FitReport, PARAMETER_NAMES, PARAMETER_UNITS};
+use palpate_protocols::analysis::SourceError;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -13,7 +14,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// What came of one source.
 struct Answer {
     notes: Vec<String>,
-    result: Result<FitReport, Failure>,
+    result: Result<FitReport, NotFitted>,
+}
+
+/// Why a source has no fit.
+enum NotFitted {
+    /// Its session was rejected, and that is not a failure of the batch.
+    Rejected(String),
+    Failed(Failure),
 }
 
 #[derive(Serialize)]
@@ -31,6 +39,12 @@ struct FailedLine<'a> {
     exit: u8,
 }
 
+#[derive(Serialize)]
+struct RejectedLine<'a> {
+    source: &'a Path,
+    rejected: &'a str,
+}
+
 pub(super) fn run(
     sources: &[PathBuf],
     jobs: usize,
@@ -41,7 +55,7 @@ pub(super) fn run(
     end_on_signals(&is_ending)?;
     let bar = output.count_bar(sources.len() as u64);
     let mut rows = Vec::with_capacity(sources.len());
-    let mut failed = 0;
+    let (mut failed, mut rejected) = (0, 0);
     let work = |source: &PathBuf| answer(source, recipe);
     in_order(jobs, sources, &is_ending, work, |news| match news {
         News::Done(count) => {
@@ -53,7 +67,11 @@ pub(super) fn run(
         News::Next(answer) => {
             let source = sources[rows.len()].as_path();
             let Answer { notes, result } = answer.unwrap_or_else(missing);
-            failed += usize::from(result.is_err());
+            match &result {
+                Err(NotFitted::Failed(_)) => failed += 1,
+                Err(NotFitted::Rejected(_)) => rejected += 1,
+                Ok(_) => {}
+            }
             bar.suspend(|| {
                 for note in &notes {
                     output.note(&format!("{}: {note}", source.display()));
@@ -64,7 +82,11 @@ pub(super) fn run(
                         report,
                         notes: &notes,
                     }),
-                    Err(failure) => output.object(&FailedLine {
+                    Err(NotFitted::Rejected(reason)) => output.object(&RejectedLine {
+                        source,
+                        rejected: reason,
+                    }),
+                    Err(NotFitted::Failed(failure)) => output.object(&FailedLine {
                         source,
                         error: failure.sentence(),
                         exit: failure.code(),
@@ -77,6 +99,12 @@ pub(super) fn run(
     .map_err(|err| Failure::failed(format!("no thread can be started ({err}); try again")))?;
     bar.finish_and_clear();
     output.text_only(|| table(sources, &rows));
+    if rejected > 0 {
+        output.note(&format!(
+            "{} sources, {rejected} of them rejected; --include-rejected fits them all the same",
+            sources.len()
+        ));
+    }
     if failed == 0 {
         return Ok(());
     }
@@ -100,14 +128,19 @@ fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
 }
 
 fn answer(source: &Path, recipe: &Recipe) -> Answer {
-    match recipe.fit(source) {
+    match recipe.read(source) {
         Ok(fitted) => Answer {
             notes: fitted.notes,
-            result: fitted.result.map_err(Failure::failed),
+            result: fitted
+                .result
+                .map_err(|err| NotFitted::Failed(Failure::failed(err))),
         },
-        Err(failure) => Answer {
+        Err(err) => Answer {
             notes: Vec::new(),
-            result: Err(failure),
+            result: Err(match err {
+                SourceError::Rejected { reason } => NotFitted::Rejected(reason),
+                err => NotFitted::Failed(source_failure(err)),
+            }),
         },
     }
 }
@@ -119,13 +152,13 @@ fn missing(none: NoAnswer) -> Answer {
     };
     Answer {
         notes: Vec::new(),
-        result: Err(Failure::failed(sentence)),
+        result: Err(NotFitted::Failed(Failure::failed(sentence))),
     }
 }
 
 /// One row per source: parameters with their intervals, how good, how many sentences; or why not.
 /// Parameters that were held everywhere have no column.
-fn table(sources: &[PathBuf], rows: &[Result<FitReport, Failure>]) -> String {
+fn table(sources: &[PathBuf], rows: &[Result<FitReport, NotFitted>]) -> String {
     let reports = || rows.iter().flatten();
     let is_shown = |index: &usize| {
         let one = |report: &FitReport| !report.parameters[*index].is_fixed;
@@ -149,7 +182,10 @@ fn table(sources: &[PathBuf], rows: &[Result<FitReport, Failure>]) -> String {
                 line.push(format!("{:.3}", report.rmse_n * 1e3));
                 line.push(report.sentences().count().to_string());
             }
-            Err(failure) => line.push(format!("failed: {}", failure.sentence())),
+            Err(NotFitted::Rejected(reason)) => line.push(format!("rejected: {reason}")),
+            Err(NotFitted::Failed(failure)) => {
+                line.push(format!("failed: {}", failure.sentence()));
+            }
         }
         lines.push(line);
     }

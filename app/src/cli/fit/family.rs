@@ -8,7 +8,6 @@ use palpate_model::families::by_key;
 use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
-use palpate_protocols::analysis::Stretch;
 use palpate_protocols::runner::Stopwatch;
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
@@ -68,11 +67,7 @@ pub(super) fn run(
             "--picture is for one record; name a single session or table",
         ));
     }
-    let stretch = match args.unload {
-        true => Stretch::WithUnload,
-        false => Stretch::RampHold,
-    };
-    let named = sources::read(&found, columns, stretch, output)?;
+    let named = sources::read(&found, columns, args.wanted(), output)?;
     let borrowed: Vec<(&str, &[FitSample])> = named.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let fit = fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;

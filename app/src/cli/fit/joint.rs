@@ -5,7 +5,6 @@ use super::Recipe;
 use super::sources::{self, Recording};
 use crate::report::text;
 use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
-use palpate_protocols::analysis::Stretch;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -35,7 +34,7 @@ pub(super) fn run(
         ));
     }
     let shared = names(shared);
-    let records = sources::read(&found, recipe.columns.as_ref(), Stretch::RampHold, output)?;
+    let records = sources::read(&found, recipe.columns.as_ref(), recipe.wanted, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {

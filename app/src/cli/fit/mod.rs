@@ -15,6 +15,7 @@ use clap::Args;
 use intervals::Intervals;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitOptions, FitReport, Systematic};
+use palpate_protocols::analysis::{SourceError, Stretch, Wanted};
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -61,6 +62,9 @@ pub struct FitArgs {
     /// Leave out what the calibration's own errors add to the intervals of a session
     #[arg(long)]
     no_systematic: bool,
+    /// Take sessions though they were rejected
+    #[arg(long)]
+    include_rejected: bool,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -69,17 +73,36 @@ pub struct FitArgs {
     pub json: bool,
 }
 
+impl FitArgs {
+    /// What is asked of the sources.
+    fn wanted(&self) -> Wanted {
+        let stretch = match self.unload {
+            true => Stretch::WithUnload,
+            false => Stretch::RampHold,
+        };
+        Wanted {
+            stretch,
+            is_rejected_included: self.include_rejected,
+        }
+    }
+}
+
 /// How every source is fitted.
 struct Recipe {
     options: FitOptions,
     columns: Option<ColumnNames>,
     is_systematic: bool,
+    wanted: Wanted,
 }
 
 impl Recipe {
     fn fit(&self, path: &Path) -> Result<Fitted, Failure> {
-        let fitted = fit_source(path, self.columns.as_ref(), &self.options);
-        let fitted = fitted.map_err(super::source_failure)?;
+        self.read(path).map_err(super::source_failure)
+    }
+
+    fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
+        let fitted = fit_source(path, self.columns.as_ref(), self.wanted, &self.options);
+        let fitted = fitted?;
         Ok(match self.is_systematic {
             true => fitted.with_systematic(&self.options),
             false => fitted,
@@ -116,6 +139,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         options: options(args)?,
         columns,
         is_systematic: !args.no_systematic,
+        wanted: args.wanted(),
     };
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);

@@ -4,7 +4,7 @@ use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
 use palpate_model::fit::FitSample;
-use palpate_protocols::analysis::{self, Stretch};
+use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_sessions::import::ColumnNames;
 use palpate_sessions::log::ReadError;
 use std::fs;
@@ -91,11 +91,11 @@ impl Recording {
     }
 }
 
-/// Reads sources that are looked at together, each once.
+/// Reads sources that are looked at together, each once. Rejected sessions are left out and counted.
 pub(in crate::cli) fn read(
     found: &[PathBuf],
     columns: Option<&ColumnNames>,
-    stretch: Stretch,
+    wanted: Wanted,
     output: &Output,
 ) -> Result<Vec<Recording>, Failure> {
     let mut real: Vec<PathBuf> = found
@@ -110,18 +110,36 @@ pub(in crate::cli) fn read(
         )));
     }
     let one = |path: &PathBuf| {
-        let source = analysis::read_stretch(path, columns, stretch).map_err(source_failure)?;
         let name = path.display().to_string();
+        let source = match analysis::read_stretch(path, columns, wanted) {
+            Err(SourceError::Rejected { reason }) => {
+                output.note(&format!("{name}: rejected, left out: {reason}"));
+                return Ok(None);
+            }
+            source => source.map_err(source_failure)?,
+        };
         for note in &source.notes {
             output.note(&format!("{name}: {note}"));
         }
-        Ok(Recording {
+        Ok(Some(Recording {
             name,
             samples: source.samples,
             specimen: source.specimen,
-        })
+        }))
     };
-    found.iter().map(one).collect()
+    let read: Vec<Option<Recording>> = found.iter().map(one).collect::<Result<_, Failure>>()?;
+    let taken: Vec<Recording> = read.into_iter().flatten().collect();
+    let rejected = found.len() - taken.len();
+    if rejected > 0 {
+        let count = format!("{} sources, {rejected} of them rejected", found.len());
+        if taken.is_empty() {
+            return Err(Failure::usage(format!(
+                "{count}: nothing is left; add --include-rejected to take them all the same"
+            )));
+        }
+        output.note(&count);
+    }
+    Ok(taken)
 }
 
 /// Sources below a folder. Links to folders are not followed, so no walk is endless and nothing

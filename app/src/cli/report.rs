@@ -1,0 +1,54 @@
+//! `palpate report`: what happened in a run, against what its plan said.
+
+use super::Failure;
+use super::output::Output;
+use crate::report::session::fidelity_text;
+use clap::Args;
+use palpate_protocols::edited;
+use palpate_protocols::fidelity::{Fidelity, of_session};
+use palpate_sessions::Verdict;
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Arguments of `palpate report`.
+#[derive(Debug, Args)]
+pub struct ReportArgs {
+    /// Session folder
+    session: PathBuf,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    command: &'static str,
+    session_id: &'a str,
+    ending: Option<&'a str>,
+    reason: Option<&'a str>,
+    verdict: Option<Verdict>,
+    verdict_reason: Option<&'a str>,
+    #[serde(flatten)]
+    fidelity: &'a Fidelity,
+}
+
+pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
+    let edited = edited::open(&args.session).map_err(super::source_failure)?;
+    let session = &edited.session;
+    session.notes.iter().for_each(|note| output.note(note));
+    let fidelity = of_session(session).map_err(super::source_failure)?;
+    let verdict = edited.edits.verdict();
+    let verdict = verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str()));
+    let end = session.end.as_ref();
+    let report = Report {
+        command: "report",
+        session_id: &session.manifest.session_id,
+        ending: end.map(|end| end.outcome.as_str()),
+        reason: end.map(|end| end.reason.as_str()),
+        verdict: verdict.map(|(verdict, _)| verdict),
+        verdict_reason: verdict.map(|(_, reason)| reason),
+        fidelity: &fidelity,
+    };
+    output.result(&report, || fidelity_text(&fidelity, end, verdict));
+    Ok(())
+}

@@ -1,0 +1,268 @@
+//! What is told of a session, what is said of it afterwards, and what happened in it.
+
+use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use palpate_sessions::log::Session;
+use std::fs;
+
+#[test]
+fn what_is_told_stands_in_the_session_and_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let told = [
+        "--specimen",
+        "pig 7",
+        "--about",
+        "specimen.source=pig stomach",
+        "--about",
+        "specimen.thickness_mm=11.5",
+        "--about",
+        "series.repeat=2",
+    ];
+    succeeded(&short_run(at, "told", &told));
+    let info = palpate(at, &["info", "told", "--json"]);
+    let info = json(&info);
+    assert_eq!(info["about"]["specimen.thickness_mm"], 11.5);
+    assert_eq!(info["about"]["series.repeat"], 2);
+    assert_eq!(info["signal"]["sample_rate_hz"], 1000.0);
+    let text = stdout(&palpate(at, &["info", "told"]));
+    assert!(text.contains("specimen.source pig stomach"), "{text}");
+    assert!(text.contains("filter none"), "{text}");
+    // Who looks for the key finds it in the refusal.
+    let unknown = short_run(at, "never", &["--about", "specimen.colour=red"]);
+    assert_eq!(unknown.status.code(), Some(2));
+    assert!(
+        stderr(&unknown).contains("specimen.hydration"),
+        "{}",
+        stderr(&unknown)
+    );
+    let beyond = ["--about", "series.repeat=4", "--about", "series.repeats=3"];
+    let beyond = short_run(at, "never", &beyond);
+    assert_eq!(beyond.status.code(), Some(2));
+    assert!(stderr(&beyond).contains("repeat 4 of 3"));
+    assert!(!at.join("never").exists());
+}
+
+#[test]
+fn a_run_ends_with_a_verdict_and_a_report_of_its_targets() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = json(&short_run(at, "fine", &["--unload", "1.5", "--json"]));
+    assert_eq!(run["verdict"], "valid", "{run}");
+    let report = json(&palpate(at, &["report", "fine", "--json"]));
+    assert_eq!(
+        (&report["ending"], &report["verdict"]),
+        (&"finish".into(), &"valid".into())
+    );
+    assert_eq!(
+        (&report["dropped"], &report["late"]),
+        (&0.into(), &0.into())
+    );
+    let targets = report["targets"].as_array().unwrap();
+    let achieved = |step: &str, quantity: &str| {
+        let one = targets
+            .iter()
+            .find(|one| one["step"] == step && one["quantity"] == quantity);
+        one.unwrap_or_else(|| panic!("{step} {quantity} in {report}"))["achieved"]
+            .as_f64()
+            .unwrap()
+    };
+    // A whole number of 15 um pulses is 6 mm, and the clock is exact.
+    assert!((achieved("ramp", "depth") - 6.0).abs() <= 0.0075);
+    assert!((achieved("ramp", "speed") - 3.0).abs() < 1e-6);
+    assert!((achieved("ramp", "speed by pulses") - 3.0).abs() < 0.01);
+    assert!((achieved("unload", "speed") - 1.5).abs() < 1e-6);
+    assert!((achieved("hold", "duration") - 1.0).abs() < 1e-9);
+    let time = &report["time_use"];
+    let total: f64 = ["set_up_s", "motion_s", "hold_s", "waiting_s"]
+        .iter()
+        .map(|name| time[name].as_f64().unwrap())
+        .sum();
+    assert!((total - run["duration_s"].as_f64().unwrap()).abs() < 0.01);
+    assert!((time["hold_s"].as_f64().unwrap() - 1.0).abs() < 0.002);
+    let text = stdout(&palpate(at, &["report", "fine"]));
+    assert!(
+        text.contains("all met") && text.contains("waiting"),
+        "{text}"
+    );
+}
+
+#[test]
+fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "run", &[]));
+    let info = json(&palpate(at, &["info", "run", "--json"]));
+    assert_eq!(info["edits"].as_array().unwrap().len(), 1);
+    let before = Session::open(&at.join("run")).unwrap();
+    let found = palpate_protocols::edited::contacts(&before)[0].position.0;
+    let log = fs::read(at.join("run/000.mcap")).unwrap();
+    let position = format!("{}", found - 0.25);
+    let correct = |position: &str, reason: &str| {
+        palpate(
+            at,
+            &[
+                "correct-contact",
+                "run",
+                "--position",
+                position,
+                "--reason",
+                reason,
+                "--by",
+                "Ada",
+                "--json",
+            ],
+        )
+    };
+    let corrected = correct(&position, "seen on the video");
+    succeeded(&corrected);
+    let change = json(&corrected)["depth_change_mm"].as_f64().unwrap();
+    assert!((change - 0.25).abs() < 1e-12);
+    let after = palpate_protocols::edited::open(&at.join("run"))
+        .unwrap()
+        .session;
+    let mut moved = 0;
+    for (old, new) in before.rows.iter().zip(&after.rows) {
+        match (old.depth, new.depth) {
+            (Some(old), Some(new)) => {
+                assert_eq!(new, old + change);
+                moved += 1;
+            }
+            (old, new) => assert_eq!(old, new),
+        }
+        assert_eq!(
+            (old.force, old.volts, old.pulses),
+            (new.force, new.volts, new.pulses)
+        );
+    }
+    assert!(moved > 3000);
+    // Every reader says so, and the log is what it was.
+    for args in [
+        &["fit", "run"][..],
+        &["info", "run"],
+        &["export", "run", "--format", "csv"],
+        &["report", "run"],
+    ] {
+        let output = palpate(at, args);
+        let all = stdout(&output) + &stderr(&output);
+        assert!(
+            all.contains("contact 1 was corrected") && all.contains("seen on the video"),
+            "{args:?}: {all}"
+        );
+    }
+    assert_eq!(fs::read(at.join("run/000.mcap")).unwrap(), log);
+    let replay = json(&palpate(at, &["replay", "run", "--json"]));
+    assert_eq!(
+        (
+            &replay["differing"],
+            &replay["sessions"][0]["depth_difference_mm"]
+        ),
+        (&0.into(), &0.0.into())
+    );
+    // Where it cannot have been.
+    for (position, told) in [
+        ("-1", "outside the rig's travel"),
+        ("x", "not a finite number"),
+    ] {
+        let refused = correct(position, "why");
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(stderr(&refused).contains(told), "{}", stderr(&refused));
+    }
+    let mute = correct("41", " ");
+    assert_eq!(mute.status.code(), Some(2));
+    assert!(stderr(&mute).contains("needs a reason"));
+}
+
+#[test]
+fn a_rejected_session_is_left_out_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (name, seed) in [("all/a", "1"), ("all/b", "2"), ("all/c", "3")] {
+        succeeded(&short_run(at, name, &["--seed", seed]));
+    }
+    let reject = palpate(
+        at,
+        &[
+            "verdict",
+            "all/b",
+            "rejected",
+            "--reason",
+            "hair under the probe",
+            "--by",
+            "Ada",
+            "--json",
+        ],
+    );
+    succeeded(&reject);
+    let reject = json(&reject);
+    assert_eq!(
+        (&reject["was"], &reject["verdict"]),
+        (&"valid".into(), &"rejected".into())
+    );
+    let alone = palpate(at, &["fit", "all/b"]);
+    assert_eq!(alone.status.code(), Some(2));
+    assert!(
+        stderr(&alone).contains("rejected (hair under the probe)"),
+        "{}",
+        stderr(&alone)
+    );
+    succeeded(&palpate(at, &["fit", "all/b", "--include-rejected"]));
+    let batch = palpate(at, &["fit", "all", "--json"]);
+    succeeded(&batch);
+    let text = stdout(&batch);
+    let lines: Vec<serde_json::Value> = text
+        .lines()
+        .map(|line| serde_json::from_str(line).unwrap())
+        .collect();
+    assert_eq!(lines.len(), 3);
+    assert_eq!(lines[1]["rejected"], "hair under the probe");
+    assert!(lines[0]["samples"].is_u64() && lines[2]["samples"].is_u64());
+    assert!(
+        stderr(&batch).contains("3 sources, 1 of them rejected"),
+        "{}",
+        stderr(&batch)
+    );
+    let together = palpate(at, &["fit", "all", "--share", "body"]);
+    succeeded(&together);
+    assert!(
+        stdout(&together).contains("2 records together"),
+        "{}",
+        stdout(&together)
+    );
+    assert!(stderr(&together).contains("3 sources, 1 of them rejected"));
+    // A second thought is one more line; the first stays.
+    let again = [
+        "verdict",
+        "all/b",
+        "suspect",
+        "--reason",
+        "the hair was outside",
+    ];
+    succeeded(&palpate(at, &again));
+    let info = json(&palpate(at, &["info", "all/b", "--json"]));
+    assert_eq!(
+        (&info["verdict"], info["edits"].as_array().unwrap().len()),
+        (&"suspect".into(), 3)
+    );
+    let fit = palpate(at, &["fit", "all/b"]);
+    succeeded(&fit);
+    assert!(stderr(&fit).contains("the hair was outside"));
+    // Words put into somebody's mouth are noticed by every reader.
+    let edits = at.join("all/b/edits.jsonl");
+    let changed = fs::read_to_string(&edits)
+        .unwrap()
+        .replace("hair under", "air under");
+    fs::write(&edits, changed).unwrap();
+    for args in [
+        &["fit", "all/b"][..],
+        &["info", "all/b"],
+        &["verdict", "all/b", "valid", "--reason", "x"],
+    ] {
+        let refused = palpate(at, args);
+        assert_eq!(refused.status.code(), Some(1), "{args:?}");
+        assert!(
+            stderr(&refused).contains("line 2 of"),
+            "{}",
+            stderr(&refused)
+        );
+    }
+}

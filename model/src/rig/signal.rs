@@ -1,0 +1,126 @@
+//! What a reader must know of the signal: how it was sampled, and what may stand in it that was never there.
+
+use super::description::RigDescription;
+use serde::{Deserialize, Serialize};
+
+/// Mains frequencies in Hz.
+const MAINS_HZ: [f64; 2] = [50.0, 60.0];
+/// Harmonics looked at: those that IEC 61000-4-7 has measured.
+const HARMONICS: u32 = 40;
+/// An alias below this frequency in Hz looks like tissue or drift: a ramp or a relaxation of 100 ms and longer.
+const SLOW_HZ: f64 = 10.0;
+
+/// How the load cell's signal was taken.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SignalFacts {
+    /// Samples per second of true time.
+    pub sample_rate_hz: f64,
+    /// What is before the converter to keep higher frequencies out, in words.
+    pub filter: String,
+    /// Lowest and highest signal the converter can tell, in V; `None` without a converter.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub range_v: Option<[f64; 2]>,
+    /// One count of the converter in V.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub resolution_v: Option<f64>,
+    /// What can appear at a frequency that it does not have.
+    pub aliasing: String,
+}
+
+impl RigDescription {
+    /// How this rig takes its signal: one sample a controller tick.
+    #[must_use]
+    pub fn signal(&self) -> SignalFacts {
+        let rate = 1.0 / self.tick().0;
+        let filter = if self.settings.is_empty() {
+            "not known: the rig does not say whether there is one before the converter"
+        } else {
+            "none: the simulated cell is sampled as it is"
+        };
+        SignalFacts {
+            sample_rate_hz: rate,
+            filter: filter.into(),
+            range_v: self.adc.map(|adc| {
+                [adc.counts_min, adc.counts_max]
+                    .map(|counts| f64::from(counts) * adc.volts_per_count)
+            }),
+            resolution_v: self.adc.map(|adc| adc.volts_per_count),
+            aliasing: self.aliasing(rate),
+        }
+    }
+
+    fn aliasing(&self, rate: f64) -> String {
+        let nyquist = 0.5 * rate;
+        let mut sentence = format!(
+            "without a filter all above {nyquist:.0} Hz appears below it, such as the steps of the motor from {:.2} mm/s on",
+            nyquist * self.mm_per_pulse
+        );
+        for mains in MAINS_HZ {
+            let harmonics = (1..=HARMONICS).map(|n| f64::from(n) * mains);
+            let worst = harmonics
+                .filter(|hz| *hz > nyquist)
+                .map(|hz| (hz, (hz - (hz / rate).round() * rate).abs()))
+                .find(|(_, seen)| *seen < SLOW_HZ);
+            if let Some((hz, seen)) = worst {
+                sentence += &format!(
+                    "; {hz:.0} Hz, a harmonic of {mains:.0} Hz mains, would be seen at {seen:.1} Hz"
+                );
+            }
+        }
+        sentence
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::rig::{AdcDescription, RigDescription};
+    use crate::units::{MmPerS, MmPerS2, Position, Volts};
+
+    fn rig(tick_nanos: u64) -> RigDescription {
+        RigDescription {
+            name: "bench".into(),
+            identity: "bench".into(),
+            settings: std::collections::BTreeMap::new(),
+            mm_per_pulse: 0.015,
+            travel: Position(100.0),
+            tick_nanos,
+            speed_quantum: MmPerS(0.03),
+            speed_max: MmPerS(9.0),
+            acceleration: MmPerS2(15.36),
+            adc: Some(AdcDescription {
+                counts_min: -32768,
+                counts_max: 32767,
+                volts_per_count: 0.001,
+            }),
+            noise_expected: Volts(0.001),
+        }
+    }
+
+    #[test]
+    fn a_harmonic_on_the_sampling_rate_looks_like_an_offset() {
+        let signal = rig(1_000_000).signal();
+        assert!((signal.sample_rate_hz - 1000.0).abs() < 1e-9);
+        assert_eq!(signal.range_v, Some([-32.768, 32.767]));
+        // 20 x 50 Hz is the sampling rate itself; 17 x 60 Hz = 1020 Hz is seen at 20 Hz, which is no slow one.
+        let text = &signal.aliasing;
+        assert!(
+            text.contains("above 500 Hz") && text.contains("7.50 mm/s"),
+            "{text}"
+        );
+        assert!(
+            text.contains("1000 Hz, a harmonic of 50 Hz mains, would be seen at 0.0 Hz"),
+            "{text}"
+        );
+        assert!(signal.filter.starts_with("not known"));
+    }
+
+    #[test]
+    fn another_clock_has_other_aliases() {
+        // 976 us: 1024.59 Hz; 60 Hz x 17 = 1020 Hz is seen at 4.6 Hz, 50 Hz x 41 is beyond the list.
+        let text = rig(976_000).signal().aliasing;
+        assert!(
+            text.contains("1020 Hz, a harmonic of 60 Hz mains, would be seen at 4.6 Hz"),
+            "{text}"
+        );
+    }
+}

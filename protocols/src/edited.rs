@@ -1,0 +1,115 @@
+//! A session as its edits leave it: the way every reader but replay opens one.
+//!
+//! A corrected contact moves every depth that was counted from it by the difference, and stands in the
+//! decision that found it. The log itself stays as it is.
+
+use crate::analysis::SourceError;
+use palpate_model::units::Position;
+use palpate_sessions::edits::{Edits, Verdict};
+use palpate_sessions::log::Session;
+use palpate_sessions::record::{Entry, EntryKind};
+use serde_json::Value;
+use std::path::Path;
+
+/// A session with its edits made.
+#[derive(Clone, Debug)]
+pub struct Edited {
+    /// The session, its notes telling what was corrected and doubted.
+    pub session: Session,
+    /// The edits.
+    pub edits: Edits,
+}
+
+impl Edited {
+    /// Why the session was rejected, if it was.
+    #[must_use]
+    pub fn rejection(&self) -> Option<&str> {
+        match self.edits.verdict() {
+            Some((Verdict::Rejected, edit)) => Some(&edit.reason),
+            _ => None,
+        }
+    }
+}
+
+/// Opens a session folder, or one file of it, and makes its edits.
+pub fn open(path: &Path) -> Result<Edited, SourceError> {
+    let mut session = Session::open(path)?;
+    let edits = Edits::read(path, &session.manifest.session_id)?;
+    correct(&mut session, &edits);
+    if edits.is_torn {
+        let note = "the last edit was begun and never finished; it does not count";
+        session.notes.push(note.into());
+    }
+    if let Some((verdict @ (Verdict::Suspect | Verdict::Rejected), edit)) = edits.verdict() {
+        session
+            .notes
+            .push(format!("{verdict}, says {}: {}", edit.by, edit.reason));
+    }
+    Ok(Edited { session, edits })
+}
+
+/// A contact that a session found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundContact {
+    /// Samples before it; those that follow count their depth from it.
+    pub after_sample: u64,
+    /// Position from home.
+    pub position: Position,
+}
+
+/// Every contact a session found, in order.
+#[must_use]
+pub fn contacts(session: &Session) -> Vec<FoundContact> {
+    let found = session.entries.iter().filter_map(|entry| {
+        Some(FoundContact {
+            after_sample: entry.after_sample,
+            position: Position(found_at(entry)?.as_f64()?),
+        })
+    });
+    found.collect()
+}
+
+/// The position in a decision that found contact.
+fn found_at(entry: &Entry) -> Option<&Value> {
+    let body = &entry.body;
+    let is_found = entry.kind == EntryKind::Decision
+        && body.get("effect")? == "record"
+        && body.get("record")? == "contact_found";
+    is_found.then(|| body.get("position"))?
+}
+
+fn correct(session: &mut Session, edits: &Edits) {
+    let contacts = contacts(session);
+    for (index, found) in contacts.iter().enumerate() {
+        let number = index as u32 + 1;
+        let Some((position, edit)) = edits.contact(number) else {
+            continue;
+        };
+        let until = contacts
+            .get(index + 1)
+            .map(|next| next.after_sample as usize);
+        let last = session.rows.len();
+        let range = (found.after_sample as usize).min(last)..until.unwrap_or(last).min(last);
+        let deeper = found.position.depth_from(position);
+        for depth in session.rows[range]
+            .iter_mut()
+            .filter_map(|row| row.depth.as_mut())
+        {
+            *depth += deeper.0;
+        }
+        let mut entries = session
+            .entries
+            .iter_mut()
+            .filter(|entry| found_at(entry).is_some());
+        if let Some(at) = entries
+            .nth(index)
+            .and_then(|entry| entry.body.get_mut("position"))
+        {
+            *at = position.0.into();
+        }
+        session.notes.push(format!(
+            "contact {number} was corrected from {:.3} to {:.3} mm by {}: {}; depths count from there",
+            found.position.0, position.0, edit.by, edit.reason
+        ));
+    }
+}

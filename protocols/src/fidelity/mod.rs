@@ -1,0 +1,256 @@
+//! How well a run did what its plan said: speeds, depths, forces and durations against their targets,
+//! samples that are missing or came late, and what the time went to.
+//!
+//! [`FidelityMeter`] takes samples and decisions one by one, so that a run is judged in the memory of a few
+//! numbers a step, while it goes on or from its log.
+
+mod measure;
+mod verdict;
+
+pub use verdict::first_verdict;
+
+use crate::analysis::{SourceError, decisions};
+use crate::engine::{Effect, EndingKind, Record};
+use crate::plans::Plan;
+use measure::Measuring;
+use palpate_model::rig::{Phase, RigDescription};
+use palpate_sessions::log::Session;
+use palpate_sessions::record::Row;
+use serde::Serialize;
+
+/// A sample that comes so much later than the one before explains, in s, is late: two scheduler slices of a
+/// desktop host.
+pub const LATE_S: f64 = 0.020;
+
+/// One target of a step, and what became of it.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Achieved {
+    /// Index of the step in the plan.
+    pub step_index: usize,
+    /// What the step does, as its phase is called.
+    pub step: &'static str,
+    /// Which repeat it belongs to; 0 where nothing is repeated.
+    pub cycle: u32,
+    /// What was to be kept: `speed`, `speed by pulses`, `depth`, `force`, `duration`, `amplitude` or `frequency`.
+    pub quantity: &'static str,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What was wanted.
+    pub target: f64,
+    /// What was done.
+    pub achieved: f64,
+    /// The difference in percent of the target; `None` for a target of 0.
+    pub error_percent: Option<f64>,
+    /// Largest difference that is no fault, in the unit.
+    pub allowed: f64,
+    /// Whether the difference is within it.
+    pub is_within: bool,
+}
+
+/// What a session's time went to, in s.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct TimeUse {
+    /// Self-test, homing, tare, finding contact, moving by hand.
+    pub set_up_s: f64,
+    /// Ramps, unloading, sines, retracts.
+    pub motion_s: f64,
+    /// At constant depth or force, and under a weight.
+    pub hold_s: f64,
+    /// Rests, questions, pauses, after a stop.
+    pub waiting_s: f64,
+}
+
+impl TimeUse {
+    fn add(&mut self, phase: Phase, seconds: f64) {
+        let kind = match phase {
+            Phase::Idle
+            | Phase::SelfTest
+            | Phase::Home
+            | Phase::CheckHome
+            | Phase::Tare
+            | Phase::Contact
+            | Phase::Jog => &mut self.set_up_s,
+            Phase::Ramp | Phase::Unload | Phase::Sine | Phase::Retract => &mut self.motion_s,
+            Phase::Hold | Phase::Creep | Phase::Weigh => &mut self.hold_s,
+            Phase::Rest | Phase::Prompt | Phase::Paused | Phase::Stopped | Phase::Ended => {
+                &mut self.waiting_s
+            }
+        };
+        *kind += seconds;
+    }
+
+    /// All of it.
+    #[must_use]
+    pub fn total_s(&self) -> f64 {
+        self.set_up_s + self.motion_s + self.hold_s + self.waiting_s
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Fidelity {
+    /// Every target of every completed step, in the order done.
+    pub targets: Vec<Achieved>,
+    /// Samples there are.
+    pub samples: u64,
+    /// Samples that are missing between them, by the controller's clock.
+    pub dropped: u64,
+    /// Samples that came more than [`LATE_S`] later than the one before explains.
+    pub late: u64,
+    /// The longest such delay in s.
+    pub late_worst_s: f64,
+    /// What the time went to.
+    pub time_use: TimeUse,
+    /// Samples taken while something was measured.
+    pub measured: u64,
+    /// What else speaks against the run: steps left out, monitors, missed pulses.
+    pub remarks: Vec<String>,
+}
+
+impl Fidelity {
+    /// The targets that were missed.
+    pub fn missed(&self) -> impl Iterator<Item = &Achieved> {
+        self.targets.iter().filter(|one| !one.is_within)
+    }
+}
+
+/// Remarks kept: more would tell no more.
+const REMARKS_MAX: usize = 20;
+
+/// Follows a run.
+#[derive(Clone, Debug)]
+pub struct FidelityMeter {
+    plan: Plan,
+    rig: RigDescription,
+    found: Fidelity,
+    current: Option<Measuring>,
+    last: Option<Row>,
+}
+
+impl FidelityMeter {
+    /// A meter for a run of a plan on a rig.
+    #[must_use]
+    pub fn new(plan: &Plan, rig: &RigDescription) -> Self {
+        Self {
+            plan: plan.clone(),
+            rig: rig.clone(),
+            found: Fidelity::default(),
+            current: None,
+            last: None,
+        }
+    }
+
+    /// Takes a decision. Those that a sample led to come before [`FidelityMeter::row`] of that sample.
+    pub fn effect(&mut self, effect: &Effect) {
+        match effect {
+            Effect::Record(record) => self.record(record),
+            Effect::Finished(outcome) if outcome.ending == EndingKind::Finish => self.complete(),
+            Effect::Finished(_) => self.current = None,
+            Effect::Command(_) | Effect::ByHand(_) => {}
+        }
+    }
+
+    fn record(&mut self, record: &Record) {
+        match record {
+            Record::PhaseStarted { step_index, .. } => {
+                if self
+                    .current
+                    .as_ref()
+                    .is_some_and(|one| one.step_index == *step_index)
+                {
+                    return;
+                }
+                self.complete();
+                let planned = self.plan.steps.get(*step_index);
+                self.current =
+                    planned.map(|planned| Measuring::new(*step_index, planned, &self.rig));
+            }
+            Record::ForceReached { force, .. } => {
+                if let Some(current) = &mut self.current {
+                    current.force_reached(*force);
+                }
+            }
+            Record::HoldEndedEarly { .. } | Record::HoldSteady { .. } => {
+                if let Some(current) = &mut self.current {
+                    current.has_no_duration();
+                }
+            }
+            // What is interrupted has no duration or speed to be judged by.
+            Record::Paused { .. } | Record::FinishedEarly | Record::EndingStarted { .. } => {
+                self.current = None
+            }
+            Record::StepFailed { .. } => {
+                self.current = None;
+                self.remark(record);
+            }
+            Record::MonitorTripped { .. } | Record::InterlockTripped { .. } => self.remark(record),
+            Record::HomeChecked { missed_pulses } if missed_pulses.abs() > 1 => self.remark(record),
+            _ => {}
+        }
+    }
+
+    fn remark(&mut self, record: &Record) {
+        if self.found.remarks.len() < REMARKS_MAX {
+            self.found.remarks.push(record.to_string());
+        }
+    }
+
+    /// The step in progress has come to its end.
+    fn complete(&mut self) {
+        if let (Some(current), Some(last)) = (self.current.take(), &self.last) {
+            current.finish(last, &mut self.found.targets);
+        }
+    }
+
+    /// Takes a sample.
+    pub fn row(&mut self, row: &Row) {
+        let tick_secs = self.rig.tick().0;
+        self.found.samples += 1;
+        let is_measuring = matches!(
+            row.phase,
+            Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Sine | Phase::Unload | Phase::Weigh
+        );
+        self.found.measured += u64::from(is_measuring);
+        let before = self.last.map_or(0, |last| last.host.0);
+        let arrived = row.host.0.saturating_sub(before) as f64 * 1e-9;
+        self.found.time_use.add(row.phase, arrived);
+        // A controller that restarted counts from zero again: nothing is known to be missing.
+        if let Some(ticks) = self.last.and_then(|last| row.tick.checked_sub(last.tick)) {
+            self.found.dropped += ticks.saturating_sub(1);
+            let delay = arrived - ticks as f64 * tick_secs;
+            if delay > LATE_S {
+                self.found.late += 1;
+                self.found.late_worst_s = self.found.late_worst_s.max(delay);
+            }
+        }
+        if let Some(current) = &mut self.current {
+            current.row(row);
+        }
+        self.last = Some(*row);
+    }
+
+    /// What was found until now.
+    #[must_use]
+    pub fn found(&self) -> &Fidelity {
+        &self.found
+    }
+}
+
+/// The fidelity of a recorded session.
+pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
+    let plan: Plan =
+        serde_json::from_value(session.manifest.plan.clone()).map_err(|err| SourceError::Plan {
+            detail: err.to_string(),
+        })?;
+    let decisions = decisions(session)?;
+    let mut meter = FidelityMeter::new(&plan, &session.manifest.rig);
+    let mut next = decisions.iter().peekable();
+    for (index, row) in session.rows.iter().enumerate() {
+        while let Some((_, effect)) = next.next_if(|(after, _)| *after <= index as u64 + 1) {
+            meter.effect(effect);
+        }
+        meter.row(row);
+    }
+    next.for_each(|(_, effect)| meter.effect(effect));
+    Ok(meter.found)
+}

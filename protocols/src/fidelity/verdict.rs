@@ -1,0 +1,152 @@
+//! The first verdict on a session, given by the program when the run ends. People may change it.
+
+use super::{Achieved, Fidelity};
+use crate::engine::{EndingKind, Outcome};
+use palpate_sessions::edits::Verdict;
+
+/// Reasons that stand in a verdict; the report has all.
+const REASONS_MAX: usize = 3;
+
+/// What a session is worth by how it ended and how well it did what its plan said, and why.
+///
+/// A run that did not finish is suspect, or rejected if nothing was measured.
+#[must_use]
+pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String) {
+    if outcome.ending != EndingKind::Finish {
+        let how = format!("ended by {}: {}", outcome.ending, outcome.reason);
+        return match fidelity.measured {
+            0 => (Verdict::Rejected, format!("nothing was measured; {how}")),
+            _ => (Verdict::Suspect, how),
+        };
+    }
+    let mut reasons = Vec::new();
+    if fidelity.dropped > 0 {
+        reasons.push(format!("{} samples are missing", fidelity.dropped));
+    }
+    reasons.extend(fidelity.remarks.iter().cloned());
+    reasons.extend(fidelity.missed().map(sentence));
+    match reasons.len() {
+        0 => (
+            Verdict::Valid,
+            format!(
+                "finished, {} targets met, no sample missing",
+                fidelity.targets.len()
+            ),
+        ),
+        count => {
+            let mut text = reasons[..count.min(REASONS_MAX)].join("; ");
+            if count > REASONS_MAX {
+                text += &format!("; and {} more, see 'palpate report'", count - REASONS_MAX);
+            }
+            (Verdict::Suspect, text)
+        }
+    }
+}
+
+fn sentence(one: &Achieved) -> String {
+    let cycle = match one.cycle {
+        0 => String::new(),
+        cycle => format!(" of cycle {cycle}"),
+    };
+    format!(
+        "step {} ({}{cycle}): {} {:.4} {unit} instead of {:.4} {unit}",
+        one.step_index + 1,
+        one.step,
+        one.quantity,
+        one.achieved,
+        one.target,
+        unit = one.unit
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn outcome(ending: EndingKind) -> Outcome {
+        Outcome {
+            ending,
+            reason: "because".into(),
+        }
+    }
+
+    fn target(achieved: f64) -> Achieved {
+        Achieved {
+            step_index: 4,
+            step: "ramp",
+            cycle: 2,
+            quantity: "depth",
+            unit: "mm",
+            target: 20.0,
+            achieved,
+            error_percent: None,
+            allowed: 0.015,
+            is_within: (achieved - 20.0).abs() <= 0.015,
+        }
+    }
+
+    #[test]
+    fn a_run_is_worth_what_it_did() {
+        let fine = Fidelity {
+            targets: vec![target(20.0)],
+            measured: 1,
+            ..Fidelity::default()
+        };
+        let of = |ending, fidelity: &Fidelity| first_verdict(&outcome(ending), fidelity);
+        let (verdict, reason) = of(EndingKind::Finish, &fine);
+        assert_eq!(verdict, Verdict::Valid);
+        assert!(reason.contains("1 targets met"), "{reason}");
+        for (change, told) in [
+            (
+                Fidelity {
+                    dropped: 7,
+                    ..fine.clone()
+                },
+                "7 samples are missing",
+            ),
+            (
+                Fidelity {
+                    targets: vec![target(19.9)],
+                    ..fine.clone()
+                },
+                "step 5 (ramp of cycle 2): depth 19.9000 mm instead of 20.0000 mm",
+            ),
+            (
+                Fidelity {
+                    remarks: vec!["too warm".into()],
+                    ..fine.clone()
+                },
+                "too warm",
+            ),
+            (
+                Fidelity {
+                    targets: vec![target(1.0); 9],
+                    ..fine.clone()
+                },
+                "and 6 more, see 'palpate report'",
+            ),
+        ] {
+            let (verdict, reason) = of(EndingKind::Finish, &change);
+            assert_eq!(verdict, Verdict::Suspect);
+            assert!(reason.contains(told), "{reason}");
+        }
+        for ending in [
+            EndingKind::Stop,
+            EndingKind::Abort,
+            EndingKind::Halt,
+            EndingKind::Interlock,
+        ] {
+            let (verdict, reason) = of(ending, &fine);
+            assert_eq!(verdict, Verdict::Suspect);
+            assert!(
+                reason.contains(ending.name()) && reason.contains("because"),
+                "{reason}"
+            );
+            let nothing = Fidelity {
+                measured: 0,
+                ..fine.clone()
+            };
+            assert_eq!(of(ending, &nothing).0, Verdict::Rejected);
+        }
+    }
+}

@@ -1,0 +1,355 @@
+//! What a reader asks of a record beside its samples: the specimen, the probe, the place in a series.
+//!
+//! [`KEYS`] is the one list of what can be told. The command line, protocol files that ask before a start
+//! and the manifest all use it.
+
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::collections::BTreeMap;
+use thiserror::Error;
+
+/// What a value must be.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Kind {
+    /// Words.
+    Text,
+    /// A number of the unit, above the limit or, if `is_limit_allowed`, at it.
+    Number {
+        /// Unit, as it ends the key.
+        unit: &'static str,
+        /// Lowest value.
+        above: f64,
+        /// Whether the limit itself is possible.
+        is_limit_allowed: bool,
+    },
+    /// A whole number from 1.
+    Count,
+}
+
+/// One thing that can be told about a session.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Key {
+    /// Its name, the unit at its end.
+    pub name: &'static str,
+    /// What it means, for a person who is asked.
+    pub meaning: &'static str,
+    /// What a value must be.
+    pub kind: Kind,
+}
+
+const fn text(name: &'static str, meaning: &'static str) -> Key {
+    Key {
+        name,
+        meaning,
+        kind: Kind::Text,
+    }
+}
+
+const fn count(name: &'static str, meaning: &'static str) -> Key {
+    Key {
+        name,
+        meaning,
+        kind: Kind::Count,
+    }
+}
+
+const fn length(name: &'static str, meaning: &'static str) -> Key {
+    Key {
+        name,
+        meaning,
+        kind: Kind::Number {
+            unit: "mm",
+            above: 0.0,
+            is_limit_allowed: false,
+        },
+    }
+}
+
+/// Everything that can be told, in the order it is shown. The first three are labels of their own in the
+/// manifest.
+pub const KEYS: &[Key] = &[
+    text("operator", "who runs it"),
+    text("specimen", "what is indented: the specimen's name"),
+    text("indenter", "the probe, in words"),
+    text(
+        "specimen.source",
+        "animal or material, organ, and who supplied it",
+    ),
+    Key {
+        name: "specimen.since_death_h",
+        meaning: "hours from death to the test",
+        kind: Kind::Number {
+            unit: "h",
+            above: 0.0,
+            is_limit_allowed: true,
+        },
+    },
+    text("specimen.storage", "how and how long it was stored"),
+    Key {
+        name: "specimen.temperature_c",
+        meaning: "its temperature in the test, degrees Celsius",
+        kind: Kind::Number {
+            unit: "degrees Celsius",
+            // Absolute zero: what is below was not measured.
+            above: -273.15,
+            is_limit_allowed: false,
+        },
+    },
+    text("specimen.hydration", "how it was kept moist"),
+    length("specimen.thickness_mm", "its thickness under the probe"),
+    text("specimen.mounting", "how it was held, and on what"),
+    length("indenter.diameter_mm", "diameter of the probe"),
+    text("indenter.tip", "shape of its tip: flat, spherical, conical"),
+    text("indenter.material", "what the probe is made of"),
+    text("series.id", "name of the series the session belongs to"),
+    count("series.specimen", "number of the specimen in the series"),
+    count("series.repeat", "which repeat on this specimen, from 1"),
+    count("series.repeats", "how many repeats are planned"),
+];
+
+/// Something cannot be told about a session.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum AboutError {
+    /// No such key.
+    #[error("nothing is called '{key}'; choose from {}", names())]
+    UnknownKey {
+        /// What was given.
+        key: String,
+    },
+    /// Not `KEY=VALUE`.
+    #[error("'{text}' is not KEY=VALUE, as in specimen.thickness_mm=12")]
+    NotAPair {
+        /// What was given.
+        text: String,
+    },
+    /// The value cannot be.
+    #[error("{key} cannot be '{value}'; give {wanted}")]
+    Value {
+        /// The key.
+        key: &'static str,
+        /// What was given.
+        value: String,
+        /// What is possible.
+        wanted: String,
+    },
+    /// A repeat beyond the last.
+    #[error("repeat {repeat} of {repeats} cannot be; correct series.repeat or series.repeats")]
+    Repeat {
+        /// Which repeat.
+        repeat: u64,
+        /// Of how many.
+        repeats: u64,
+    },
+}
+
+fn names() -> String {
+    let names: Vec<&str> = KEYS.iter().map(|key| key.name).collect();
+    names.join(", ")
+}
+
+/// The key of a name.
+pub fn key(name: &str) -> Result<&'static Key, AboutError> {
+    KEYS.iter()
+        .find(|key| key.name == name)
+        .ok_or_else(|| AboutError::UnknownKey {
+            key: name.to_owned(),
+        })
+}
+
+impl Key {
+    /// The value of a text, or what is wrong with it.
+    pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
+        let value = value.trim();
+        let refused = |wanted: String| AboutError::Value {
+            key: self.name,
+            value: value.to_owned(),
+            wanted,
+        };
+        match self.kind {
+            Kind::Text if value.is_empty() => Err(refused("some words".into())),
+            Kind::Text => Ok(value.into()),
+            Kind::Count => match value.parse::<u64>() {
+                Ok(count) if count > 0 => Ok(count.into()),
+                _ => Err(refused("a whole number from 1".into())),
+            },
+            Kind::Number {
+                unit,
+                above,
+                is_limit_allowed,
+            } => match value.parse::<f64>() {
+                Ok(number)
+                    if number.is_finite()
+                        && (number > above || is_limit_allowed && number >= above) =>
+                {
+                    Ok(number.into())
+                }
+                _ => {
+                    let from = if is_limit_allowed { "from" } else { "above" };
+                    Err(refused(format!("a number of {unit} {from} {above}")))
+                }
+            },
+        }
+    }
+}
+
+/// What was told, by key. Keys of later versions are kept as they are read.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct About {
+    told: BTreeMap<String, Value>,
+}
+
+impl About {
+    /// Whether nothing was told.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.told.is_empty()
+    }
+
+    /// The value of a key, if it was told.
+    #[must_use]
+    pub fn get(&self, key: &str) -> Option<&Value> {
+        self.told.get(key)
+    }
+
+    /// What was told, in the order of [`KEYS`], then what this version does not know. Text without quotes.
+    #[must_use]
+    pub fn lines(&self) -> Vec<(&str, String)> {
+        let place = |name: &str| KEYS.iter().position(|key| key.name == name);
+        let mut told: Vec<(&str, &Value)> =
+            self.told.iter().map(|(k, v)| (k.as_str(), v)).collect();
+        told.sort_by_key(|(name, _)| (place(name).unwrap_or(KEYS.len()), *name));
+        let plain = |value: &Value| {
+            value
+                .as_str()
+                .map_or_else(|| value.to_string(), str::to_owned)
+        };
+        told.into_iter()
+            .map(|(name, value)| (name, plain(value)))
+            .collect()
+    }
+}
+
+/// Who and what a session is about.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Labels {
+    /// Who ran it.
+    pub operator: String,
+    /// What was indented.
+    pub specimen: String,
+    /// With what.
+    pub indenter: String,
+    /// What else is told.
+    #[serde(default, skip_serializing_if = "About::is_empty")]
+    pub about: About,
+}
+
+impl Labels {
+    /// Tells one thing; a thing told before is replaced.
+    pub fn tell(&mut self, name: &str, value: &str) -> Result<(), AboutError> {
+        let key = key(name.trim())?;
+        let value = key.parse(value)?;
+        let words = || value.as_str().unwrap_or_default().to_owned();
+        match key.name {
+            "operator" => self.operator = words(),
+            "specimen" => self.specimen = words(),
+            "indenter" => self.indenter = words(),
+            name => {
+                self.about.told.insert(name.to_owned(), value);
+            }
+        }
+        Ok(())
+    }
+
+    /// Tells what a `KEY=VALUE` says.
+    pub fn tell_pair(&mut self, pair: &str) -> Result<(), AboutError> {
+        let (name, value) = pair.split_once('=').ok_or_else(|| AboutError::NotAPair {
+            text: pair.to_owned(),
+        })?;
+        self.tell(name, value)
+    }
+
+    /// Whether a thing of [`KEYS`] was told.
+    #[must_use]
+    pub fn is_told(&self, name: &str) -> bool {
+        let is_there = |text: &str| !text.trim().is_empty();
+        match name {
+            "operator" => is_there(&self.operator),
+            "specimen" => is_there(&self.specimen),
+            "indenter" => is_there(&self.indenter),
+            name => self.about.get(name).is_some(),
+        }
+    }
+
+    /// What only shows once everything is told.
+    pub fn check(&self) -> Result<(), AboutError> {
+        let count = |name| self.about.get(name).and_then(Value::as_u64);
+        match (count("series.repeat"), count("series.repeats")) {
+            (Some(repeat), Some(repeats)) if repeat > repeats => {
+                Err(AboutError::Repeat { repeat, repeats })
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_told_comes_back_in_the_order_of_the_list() {
+        let mut labels = Labels::default();
+        for pair in [
+            "series.repeat=2",
+            "indenter.diameter_mm=12",
+            "specimen.source=pig stomach = fundus",
+            "operator=Ada",
+            "specimen.temperature_c=-4.5",
+            "specimen.since_death_h=0",
+        ] {
+            labels.tell_pair(pair).unwrap();
+        }
+        assert_eq!(labels.operator, "Ada");
+        assert!(labels.is_told("operator") && !labels.is_told("specimen"));
+        let lines = labels.about.lines();
+        let expected = [
+            ("specimen.source", "pig stomach = fundus"),
+            ("specimen.since_death_h", "0.0"),
+            ("specimen.temperature_c", "-4.5"),
+            ("indenter.diameter_mm", "12.0"),
+            ("series.repeat", "2"),
+        ];
+        let lines: Vec<(&str, &str)> = lines.iter().map(|(k, v)| (*k, v.as_str())).collect();
+        assert_eq!(lines, expected);
+        let text = serde_json::to_string(&labels).unwrap();
+        assert_eq!(serde_json::from_str::<Labels>(&text).unwrap(), labels);
+    }
+
+    #[test]
+    fn what_cannot_be_is_refused_with_what_can() {
+        for (pair, told) in [
+            ("specimen.colour=red", "specimen.thickness_mm"),
+            ("specimen", "KEY=VALUE"),
+            ("specimen.thickness_mm=0", "a number of mm above 0"),
+            ("specimen.thickness_mm=NaN", "a number of mm above 0"),
+            ("specimen.since_death_h=-1", "a number of h from 0"),
+            ("specimen.temperature_c=-300", "above -273.15"),
+            ("series.repeat=0", "a whole number from 1"),
+            ("series.repeat=1.5", "a whole number from 1"),
+            ("operator= ", "some words"),
+        ] {
+            let mut labels = Labels::default();
+            let refusal = labels.tell_pair(pair).unwrap_err().to_string();
+            assert!(refusal.contains(told), "{pair}: {refusal}");
+            assert_eq!(labels, Labels::default());
+        }
+        let mut labels = Labels::default();
+        labels.tell_pair("series.repeat=4").unwrap();
+        labels.check().unwrap();
+        labels.tell_pair("series.repeats=3").unwrap();
+        let refusal = labels.check().unwrap_err().to_string();
+        assert!(refusal.contains("repeat 4 of 3"), "{refusal}");
+    }
+}

@@ -1,0 +1,281 @@
+//! What people, or the program at the end of a run, say of a session afterwards. Nothing is ever written
+//! over: the log stays as it is, and every edit stays in `edits.jsonl` beside it. Of several verdicts, or
+//! several corrections of one contact, the last counts.
+
+use crate::chain::{self, ChainError};
+use crate::folder::{LOCK_FILE, segment_number};
+use crate::lock::{HolderLock, LockError};
+use chrono::{DateTime, Utc};
+use palpate_model::units::Position;
+use serde::{Deserialize, Serialize};
+use std::fmt;
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use thiserror::Error;
+
+/// Name of the file of edits in a session folder.
+pub const EDITS_FILE: &str = "edits.jsonl";
+
+/// What a session is worth.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Verdict {
+    /// Nothing speaks against it.
+    Valid,
+    /// Something does; it is used, and every reader is told.
+    Suspect,
+    /// It is not used unless asked for, and stays in the counts.
+    Rejected,
+}
+
+impl Verdict {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Valid => "valid",
+            Self::Suspect => "suspect",
+            Self::Rejected => "rejected",
+        }
+    }
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.word())
+    }
+}
+
+impl FromStr for Verdict {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        [Self::Valid, Self::Suspect, Self::Rejected]
+            .into_iter()
+            .find(|one| one.word() == text)
+            .ok_or_else(|| format!("'{text}' is no verdict; give valid, suspect or rejected"))
+    }
+}
+
+/// What is said.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "edit", rename_all = "lowercase")]
+pub enum Change {
+    /// What the session is worth.
+    Verdict {
+        /// That.
+        verdict: Verdict,
+    },
+    /// Where contact really was.
+    Contact {
+        /// Which of the contacts the session found, from 1.
+        number: u32,
+        /// Position from home.
+        position_mm: Position,
+        /// Position that was found, from home.
+        was_mm: Position,
+    },
+}
+
+/// One edit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Edit {
+    /// When it was made.
+    pub at: DateTime<Utc>,
+    /// By whom.
+    pub by: String,
+    /// Why.
+    pub reason: String,
+    /// What.
+    #[serde(flatten)]
+    pub change: Change,
+}
+
+/// Edits could not be read or made.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum EditError {
+    /// The file is not as it was written, or the disk refuses.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The session is still being recorded.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// A later version wrote it.
+    #[error("line {line} of {} is an edit that this palpate does not know ({detail}); update palpate", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// Which line, from 1.
+        line: usize,
+        /// The parser's words.
+        detail: String,
+    },
+    /// Nobody would know why.
+    #[error("an edit needs a reason; say why in a few words")]
+    NoReason,
+    /// A part of a recording, or a file, has no place for edits.
+    #[error("{} is not a session folder; name the folder", path.display())]
+    NotAFolder {
+        /// What was named.
+        path: PathBuf,
+    },
+}
+
+/// Every edit of a session, in the order made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Edits {
+    /// The edits.
+    pub all: Vec<Edit>,
+    /// Whether the last one was begun and never finished, as a crash leaves it.
+    pub is_torn: bool,
+}
+
+impl Edits {
+    /// Reads the edits of a session, given its folder or a log file in it. A log file under another name
+    /// than a session's has none.
+    pub fn read(session: &Path, session_id: &str) -> Result<Self, EditError> {
+        let Some(path) = edits_file(session) else {
+            return Ok(Self::default());
+        };
+        let chain = chain::read(&path, session_id)?;
+        let edit = |(index, body)| {
+            serde_json::from_value(body).map_err(|err| EditError::Unknown {
+                path: path.clone(),
+                line: index + 1,
+                detail: err.to_string(),
+            })
+        };
+        let all: Result<Vec<Edit>, EditError> =
+            chain.bodies.into_iter().enumerate().map(edit).collect();
+        Ok(Self {
+            all: all?,
+            is_torn: chain.is_torn,
+        })
+    }
+
+    /// The verdict that counts, with the edit that says why.
+    #[must_use]
+    pub fn verdict(&self) -> Option<(Verdict, &Edit)> {
+        self.all.iter().rev().find_map(|edit| match edit.change {
+            Change::Verdict { verdict } => Some((verdict, edit)),
+            Change::Contact { .. } => None,
+        })
+    }
+
+    /// The correction that counts of a contact, numbered from 1.
+    #[must_use]
+    pub fn contact(&self, number: u32) -> Option<(Position, &Edit)> {
+        self.all.iter().rev().find_map(|edit| match edit.change {
+            Change::Contact {
+                number: own,
+                position_mm,
+                ..
+            } if own == number => Some((position_mm, edit)),
+            _ => None,
+        })
+    }
+}
+
+fn edits_file(session: &Path) -> Option<PathBuf> {
+    if session.is_dir() {
+        return Some(session.join(EDITS_FILE));
+    }
+    let name = session.file_name()?.to_str()?;
+    segment_number(name).map(|_| session.with_file_name(EDITS_FILE))
+}
+
+/// Adds an edit to a session folder whose recording has ended.
+pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
+    if edit.reason.trim().is_empty() {
+        return Err(EditError::NoReason);
+    }
+    if !folder.is_dir() {
+        return Err(EditError::NotAFolder {
+            path: folder.into(),
+        });
+    }
+    let _lock = HolderLock::acquire(&folder.join(LOCK_FILE))?;
+    let path = folder.join(EDITS_FILE);
+    let body = serde_json::to_value(edit).map_err(|err| ChainError::Io {
+        what: "added to",
+        path: path.clone(),
+        source: err.into(),
+    })?;
+    Ok(chain::append(&path, session_id, body)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chrono::TimeZone;
+
+    fn edit(reason: &str, change: Change) -> Edit {
+        Edit {
+            at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
+            by: "Ada".into(),
+            reason: reason.into(),
+            change,
+        }
+    }
+
+    fn verdict(verdict: Verdict) -> Change {
+        Change::Verdict { verdict }
+    }
+
+    #[test]
+    fn the_last_counts_and_all_are_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let contact = |number, mm| Change::Contact {
+            number,
+            position_mm: Position(mm),
+            was_mm: Position(41.0),
+        };
+        let edits = [
+            edit("it finished", verdict(Verdict::Valid)),
+            edit("by eye", contact(1, 41.25)),
+            edit("hair on the probe", verdict(Verdict::Rejected)),
+            edit("again, with the video", contact(1, 0.1 + 0.2)),
+        ];
+        for one in &edits {
+            add_edit(at, "id", one).unwrap();
+        }
+        let read = Edits::read(at, "id").unwrap();
+        assert_eq!(read.all, edits);
+        let (worth, why) = read.verdict().unwrap();
+        assert_eq!(
+            (worth, why.reason.as_str()),
+            (Verdict::Rejected, "hair on the probe")
+        );
+        assert_eq!(read.contact(1).unwrap().0, Position(0.1 + 0.2));
+        assert!(read.contact(2).is_none());
+        // A segment belongs to the same session; a file of another name to none.
+        assert_eq!(Edits::read(&at.join("001.mcap"), "id").unwrap(), read);
+        assert_eq!(
+            Edits::read(&at.join("alone.mcap"), "id").unwrap(),
+            Edits::default()
+        );
+    }
+
+    #[test]
+    fn an_edit_needs_a_reason_a_folder_and_an_ended_recording() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let none = add_edit(at, "id", &edit(" ", verdict(Verdict::Valid))).unwrap_err();
+        assert!(none.to_string().contains("needs a reason"));
+        let no_folder = add_edit(&at.join("x"), "id", &edit("why", verdict(Verdict::Valid)));
+        assert!(
+            no_folder
+                .unwrap_err()
+                .to_string()
+                .contains("name the folder")
+        );
+        let held = HolderLock::acquire(&at.join(LOCK_FILE)).unwrap();
+        let busy = add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap_err();
+        assert!(busy.to_string().contains("in use by process"), "{busy}");
+        drop(held);
+        add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap();
+        assert_eq!(Edits::read(at, "id").unwrap().all.len(), 1);
+    }
+}
