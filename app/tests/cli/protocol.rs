@@ -91,7 +91,7 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
     for (more, words) in [
         (
             &["--operator", "Ada"][..],
-            "specimen.storage (how it was kept)",
+            "asks before it starts for: specimen.storage",
         ),
         (&["--about", "specimen.storag=x"], "specimen.storag"),
         (
