@@ -77,10 +77,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
     assert_eq!(plan["version"], 3);
     assert_eq!(plan["source"]["values"]["depth"], "6mm");
     let manifest = serde_json::to_value(&session.manifest).unwrap();
-    assert_eq!(
-        manifest["about"]["specimen"]["storage"], "saline",
-        "{manifest}"
-    );
+    assert_eq!(manifest["about"]["specimen.storage"], "saline");
     assert_eq!(session.manifest.operator, "Ada");
 }
 
