@@ -32,8 +32,8 @@ steps = [
 "#;
 
 fn with_mine() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("mine.toml"), MINE).unwrap();
+    let folder = tempfile::tempdir().expect("a folder can be made");
+    std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file can be written");
     folder
 }
 
