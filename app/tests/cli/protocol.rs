@@ -32,8 +32,8 @@ steps = [
 "#;
 
 fn with_mine() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().expect("a folder can be made");
-    std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file can be written");
+    let folder = tempfile::tempdir().expect("a file that can be read");
+    std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file that can be written");
     folder
 }
 
@@ -60,7 +60,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
         "depth=6mm",
         "--operator",
         "Ada",
-        "--about",
+        "--ask",
         "specimen.storage=saline",
     ];
     let run = run_mine(at, &told);
@@ -76,8 +76,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
     let plan = &session.manifest.plan;
     assert_eq!(plan["version"], 3);
     assert_eq!(plan["source"]["values"]["depth"], "6mm");
-    let manifest = serde_json::to_value(&session.manifest).unwrap();
-    assert_eq!(manifest["about"]["specimen.storage"], "saline");
+    assert_eq!(plan["source"]["answers"]["specimen.storage"], "saline");
     assert_eq!(session.manifest.operator, "Ada");
 }
 
@@ -88,9 +87,9 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
     for (more, words) in [
         (
             &["--operator", "Ada"][..],
-            "asks before it starts for: specimen.storage",
+            "specimen.storage (how it was kept)",
         ),
-        (&["--about", "specimen.storag=x"], "specimen.storag"),
+        (&["--ask", "operater=Ada"], "did you mean 'operator'?"),
         (
             &["--set", "depth=12 mm"],
             "parameter 'depth': 12 mm is too large; give 10 mm or less",

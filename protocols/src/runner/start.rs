@@ -116,6 +116,10 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     } else {
         Vec::new()
     };
+    let mut signal = bench.rig.signal();
+    if let Some(filter) = request.labels.about.get("signal.filter") {
+        signal.filter = filter.as_str().unwrap_or_default().into();
+    }
     let manifest = Manifest {
         record_version: RECORD_VERSION,
         session_id: session_id.clone(),
@@ -126,7 +130,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         specimen: request.labels.specimen.clone(),
         indenter: request.labels.indenter.clone(),
         about: request.labels.about.clone(),
-        signal: Some(bench.rig.signal()),
+        signal: Some(signal),
         rig: bench.rig.as_ref().clone(),
         limits: request.limits,
         calibration: json("calibration", serde_json::to_value(&request.calibration))?,
