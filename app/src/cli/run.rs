@@ -53,7 +53,7 @@ pub enum RunCommand {
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
     /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
-    #[arg(value_name = "NAME|FILE", required = true)]
+    #[arg(value_name = "NAME|FILE")]
     protocol: Option<String>,
     #[command(flatten)]
     values: ValueArgs,
@@ -82,33 +82,14 @@ pub(super) struct HowArgs {
     #[arg(long, default_value = "blunt 12 mm probe")]
     pub(super) indenter: String,
     /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
-    #[arg(long, value_name = "KEY=VALUE", alias = "ask")]
+    #[arg(long, value_name = "KEY=VALUE")]
     about: Vec<String>,
-    /// Accept what the preview or the daily check asks to acknowledge; it is recorded
+    /// Accept what the preview asks to acknowledge; it is recorded
     #[arg(long)]
     pub(super) acknowledge: bool,
     /// Only tell what would happen
     #[arg(long)]
     pub(super) preview: bool,
-}
-
-impl HowArgs {
-    /// Who and what, as told by the arguments.
-    fn labels(&self) -> Result<Labels, Failure> {
-        let mut labels = Labels {
-            operator: self.operator.clone(),
-            specimen: self.specimen.clone(),
-            indenter: self.indenter.clone(),
-            about: About::default(),
-        };
-        for pair in &self.about {
-            labels
-                .tell_pair(pair)
-                .map_err(|err| Failure::usage(format!("--about: {err}")))?;
-        }
-        labels.check().map_err(Failure::usage)?;
-        Ok(labels)
-    }
 }
 
 /// Arguments of `palpate run ramp-hold`.
@@ -176,8 +157,8 @@ fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
         until: args.hold_until,
         unload: args.unload.map(MmPerS),
     };
-    let labels = args.how.labels()?;
     let bench = super::rig::open(&args.how.rig)?;
+    let labels = labels(&args.how)?;
     carry_out(params.plan(), bench, &args.how, labels, output)
 }
 
@@ -195,7 +176,7 @@ fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
     let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) =
         super::protocol::sound(name, &args.values.values(), &bench, output)?;
-    let labels = how.labels()?;
+    let labels = labels(how)?;
     if !how.preview {
         protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
@@ -269,6 +250,23 @@ fn carry_out(
         return Err(Failure::failed("the runner ended without a run"));
     };
     report(view, output)
+}
+
+/// Who and what, as told by the arguments.
+fn labels(args: &HowArgs) -> Result<Labels, Failure> {
+    let mut labels = Labels {
+        operator: args.operator.clone(),
+        specimen: args.specimen.clone(),
+        indenter: args.indenter.clone(),
+        about: About::default(),
+    };
+    for pair in &args.about {
+        labels
+            .tell_pair(pair)
+            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+    }
+    labels.check().map_err(Failure::usage)?;
+    Ok(labels)
 }
 
 /// The first signal stops, the second halts.
