@@ -16,6 +16,7 @@ use palpate_app::workers::fit::{Refit, fit_source};
 use palpate_drivers::sim::SimSettings;
 use palpate_model::fit::{FitOptions, FitReport};
 use palpate_model::rig::Phase;
+use palpate_protocols::analysis::Wanted;
 use palpate_protocols::runner::{LogLine, RunView, TimeScale};
 use std::path::PathBuf;
 use std::time::Duration;
@@ -155,7 +156,7 @@ impl Flow {
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();
         let options = FitOptions::default();
-        let fitted = fit_source(&session, None, &options);
+        let fitted = fit_source(&session, None, Wanted::whatever_it_is_worth(), &options);
         let result = match fitted.map(|fitted| fitted.with_systematic(&options)) {
             Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
             Err(err) => Err(err.to_string()),

@@ -183,6 +183,7 @@ impl ProtocolForm {
             out: self.session_folder(),
             labels: self.labels.clone(),
             is_acknowledged: self.is_acknowledged(),
+            to_acknowledge: Vec::new(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
         })
