@@ -42,7 +42,7 @@ enum Command {
     /// Open the window
     Window(rig::RigArgs),
     /// Run a protocol without a window
-    Run(run::RunArgs),
+    Run(Box<run::RunArgs>),
     /// List, check, show or preview protocols
     #[command(subcommand)]
     Protocol(protocol::ProtocolCommand),

@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use super::rig::RigArgs;
+use super::run::HowArgs;
 use crate::report::programme::Page;
 use palpate_protocols::programme::{
     Done, Event, Laboratory, Programme, RunError, run as carry_out,
@@ -21,20 +22,9 @@ const PAGE_FILE: &str = "summary.html";
 /// Name of the calibration in force at the end.
 const CALIBRATION_FILE: &str = "calibration.json";
 
-/// What a programme is run with.
-pub(super) struct ProgrammeArgs<'a> {
-    /// Its file.
-    pub file: &'a Path,
-    /// The rig.
-    pub rig: &'a RigArgs,
-    /// Folder for everything it leaves; to go on, the one it was begun in.
-    pub out: Option<&'a Path>,
-    /// Who runs it, where that is not what the file says.
-    pub operator: &'a str,
-    /// With which probe.
-    pub indenter: &'a str,
-    /// Only tell what would happen.
-    pub preview: bool,
+/// Whether a name is the file of a programme.
+pub(super) fn is_one(name: &str) -> bool {
+    read(Path::new(name)).is_ok_and(|text| Programme::is_meant(&text))
 }
 
 #[derive(Serialize)]
@@ -49,19 +39,30 @@ struct Report<'a> {
     told: &'a Page,
 }
 
-pub(super) fn run(args: &ProgrammeArgs<'_>, output: &Output) -> Result<(), Failure> {
-    let text = read(args.file).map_err(Failure::usage)?;
-    let mut programme = read_programme(args.file, &text)?;
-    if !args.operator.is_empty() {
-        programme.operator = args.operator.to_owned();
+pub(super) fn run(
+    file: &Path,
+    how: &HowArgs,
+    values: &BTreeMap<String, String>,
+    output: &Output,
+) -> Result<(), Failure> {
+    if !values.is_empty() {
+        return Err(Failure::usage(
+            "a programme sets its values itself; change them in its file",
+        ));
     }
-    let rig_args = with_settings(args.rig, &programme.simulated)?;
-    if args.preview {
+    let text = read(file).map_err(Failure::usage)?;
+    let mut programme = read_programme(file, &text)?;
+    if !how.operator.is_empty() {
+        programme.operator.clone_from(&how.operator);
+    }
+    programme.is_acknowledged |= how.acknowledge;
+    let rig_args = with_settings(&how.rig, &programme.simulated)?;
+    if how.preview {
         output.text_only(|| contents(&programme));
         return Ok(());
     }
-    let folder = match args.out {
-        Some(folder) => folder.to_path_buf(),
+    let folder = match &how.out {
+        Some(folder) => folder.clone(),
         None => {
             let library = library_folder().map_err(Failure::usage)?;
             new_programme_folder(&library, &programme.name, wall_now().into())
@@ -90,7 +91,7 @@ pub(super) fn run(args: &ProgrammeArgs<'_>, output: &Output) -> Result<(), Failu
         calibration: bench.calibration,
         folder: &folder,
         answers,
-        indenter: args.indenter.to_owned(),
+        indenter: how.indenter.clone(),
     };
     let done = watch(&programme, &checksum(&text), laboratory, output)?;
     drop(runner);

@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::output::Output;
+use super::programme;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
@@ -17,7 +18,7 @@ use palpate_protocols::runner::{
 };
 use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
@@ -25,7 +26,7 @@ use std::time::Duration;
 
 /// Arguments of `palpate run`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct RunArgs {
     #[command(subcommand)]
     command: Option<RunCommand>,
@@ -54,7 +55,7 @@ pub enum RunCommand {
 /// Arguments of `palpate run NAME|FILE`.
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
-    /// A built-in protocol ('palpate protocol list') or a protocol file
+    /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
     #[arg(value_name = "NAME|FILE", required = true)]
     protocol: Option<String>,
     #[command(flatten)]
@@ -68,30 +69,30 @@ pub struct ProtocolArgs {
 
 /// On which rig, into which folder, by whom.
 #[derive(Debug, Args)]
-struct HowArgs {
+pub(super) struct HowArgs {
     #[command(flatten)]
-    rig: RigArgs,
+    pub(super) rig: RigArgs,
     /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
     #[arg(long)]
-    out: Option<PathBuf>,
+    pub(super) out: Option<PathBuf>,
     /// Who runs it
     #[arg(long, default_value = "")]
-    operator: String,
+    pub(super) operator: String,
     /// What is indented
     #[arg(long, default_value = "")]
     specimen: String,
     /// With which probe
     #[arg(long, default_value = "blunt 12 mm probe")]
-    indenter: String,
-    /// Tell more of specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
+    pub(super) indenter: String,
+    /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE", alias = "ask")]
     about: Vec<String>,
     /// Accept what the preview or the daily check asks to acknowledge; it is recorded
     #[arg(long)]
-    acknowledge: bool,
+    pub(super) acknowledge: bool,
     /// Only tell what would happen
     #[arg(long)]
-    preview: bool,
+    pub(super) preview: bool,
 }
 
 impl HowArgs {
@@ -183,22 +184,25 @@ fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
     carry_out(params.plan(), bench, &args.how, labels, output)
 }
 
-/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told.
+/// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
 fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
         return Err(Failure::usage(
             "name a protocol; 'palpate protocol list' tells which there are",
         ));
     };
-    let bench = super::rig::open(&args.how.rig)?;
+    let how = &args.how;
+    if programme::is_one(name) {
+        return programme::run(Path::new(name), how, &args.values.values(), output);
+    }
+    let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) =
         super::protocol::sound(name, &args.values.values(), &bench, output)?;
-    let how = &args.how;
     let labels = how.labels()?;
     if !how.preview {
-        protocol.check_told(&labels).map_err(|reason| {
+        protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
-                "{reason}; add --about operator=Ada or the like for each"
+                "{reason}; add --operator, --specimen or --about KEY=VALUE for each"
             ))
         })?;
     }
@@ -213,6 +217,7 @@ fn carry_out(
     output: &Output,
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let request = RunRequest {
         plan,
         calibration: bench.calibration,
@@ -265,7 +270,7 @@ fn carry_out(
 }
 
 /// What today's daily check of the rig says to a plan.
-fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
+pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
     let library = library_folder().ok();
     let name = &bench.rig.description().name;
     let is_virtual = bench.rig.is_virtual();

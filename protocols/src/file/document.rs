@@ -5,7 +5,6 @@ use super::problem::{Problems, suggestion};
 use super::scope::names_in;
 use super::tree::{self, Node, Table, Value};
 use super::{LANGUAGE, Protocol, parameter};
-use palpate_sessions::about;
 use std::collections::BTreeSet;
 
 const KEYS: [&str; 11] = [
@@ -80,7 +79,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
         source,
         ask,
         parameters,
-        crc32: format!("{:08x}", crc32fast::hash(text.as_bytes())),
+        crc32: palpate_sessions::text::checksum(text),
         limits: root.get("limits").cloned(),
         monitors: root.get("monitor").cloned(),
         procedure,
@@ -152,7 +151,10 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         );
         return Vec::new();
     };
-    let known: Vec<&str> = about::KEYS.iter().map(|key| key.name).collect();
+    let known: Vec<&str> = palpate_sessions::about::KEYS
+        .iter()
+        .map(|key| key.name)
+        .collect();
     let mut ask: Vec<String> = Vec::new();
     for item in items {
         match &item.value {

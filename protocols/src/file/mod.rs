@@ -173,13 +173,12 @@ impl Protocol {
     }
 
     /// Whether everything it asks for was told; else what to tell.
-    pub fn check_told(&self, labels: &Labels) -> Result<(), String> {
+    pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
         let is_open = |key: &&Key| {
             self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
         };
-        let open: Vec<String> = KEYS
-            .iter()
-            .filter(is_open)
+        let open = KEYS.iter().filter(is_open);
+        let open: Vec<String> = open
             .map(|key| format!("{} ({})", key.name, key.meaning))
             .collect();
         if open.is_empty() {
