@@ -32,8 +32,8 @@ steps = [
 "#;
 
 fn with_mine() -> tempfile::TempDir {
-    let folder = tempfile::tempdir().unwrap();
-    std::fs::write(folder.path().join("mine.toml"), MINE).unwrap();
+    let folder = tempfile::tempdir().expect("a file that can be read");
+    std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file that can be written");
     folder
 }
 
