@@ -313,8 +313,9 @@ mod tests {
         session.rows.drain(hold + 500..hold + 503);
         let found = of_session(&session).unwrap();
         assert_eq!((found.dropped, found.late), (3, 1));
+        // Arrival itself varies by half a millisecond.
         assert!(
-            (found.late_worst_s - 0.05).abs() < 1e-6,
+            (found.late_worst_s - 0.05).abs() < 1e-3,
             "{}",
             found.late_worst_s
         );
