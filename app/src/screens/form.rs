@@ -25,6 +25,8 @@ pub struct Bench {
     pub curve: Curve,
     /// Interlock thresholds.
     pub limits: Limits,
+    /// What must be acknowledged before any run, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
 }
 
 /// The form of a ramp and hold.
@@ -103,9 +105,12 @@ impl ProtocolForm {
         self.hold.check(check_hold);
         check_optional(&mut self.until, |percent| rule(percent).check());
         check_optional(&mut self.unload, |speed| rig.check_speed(MmPerS(speed)));
-        let checked = self.params().map(|params| Checked {
-            preview: preview(&params.plan(), rig, &bench.limits, &bench.curve, is_homed),
-            params,
+        let checked = self.params().map(|params| {
+            let plan = params.plan();
+            let mut preview = preview(&plan, rig, &bench.limits, &bench.curve, is_homed);
+            let beside = bench.to_acknowledge.iter().cloned();
+            preview.acknowledgements.extend(beside);
+            Checked { params, preview }
         });
         self.checked = Some((key, checked));
     }
@@ -183,6 +188,7 @@ impl ProtocolForm {
             out: self.session_folder(),
             labels: self.labels.clone(),
             is_acknowledged: self.is_acknowledged(),
+            to_acknowledge: bench.to_acknowledge.clone(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
         })
@@ -266,6 +272,7 @@ mod tests {
             curve: calibration.curve().unwrap(),
             calibration,
             limits: Limits::for_travel(rig.description().travel),
+            to_acknowledge: Vec::new(),
         };
         (rig.description().clone(), bench)
     }
@@ -278,6 +285,19 @@ mod tests {
         form.hold.text = hold.into();
         form.refresh(&rig, &bench, false);
         (form, bench)
+    }
+
+    #[test]
+    fn a_failed_daily_check_asks_for_the_box_to_be_ticked() {
+        let (rig, mut bench) = bench();
+        bench.to_acknowledge = vec!["the daily check failed".into()];
+        let mut form = ProtocolForm::default();
+        form.refresh(&rig, &bench, false);
+        assert!(form.request(&bench).is_none());
+        form.acknowledge(true);
+        let request = form.request(&bench).unwrap();
+        assert!(request.is_acknowledged);
+        assert_eq!(request.to_acknowledge, bench.to_acknowledge);
     }
 
     #[test]

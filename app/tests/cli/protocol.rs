@@ -60,7 +60,7 @@ fn a_file_runs_and_its_session_says_which_it_was() {
         "depth=6mm",
         "--operator",
         "Ada",
-        "--ask",
+        "--about",
         "specimen.storage=saline",
     ];
     let run = run_mine(at, &told);
@@ -76,7 +76,8 @@ fn a_file_runs_and_its_session_says_which_it_was() {
     let plan = &session.manifest.plan;
     assert_eq!(plan["version"], 3);
     assert_eq!(plan["source"]["values"]["depth"], "6mm");
-    assert_eq!(plan["source"]["answers"]["specimen.storage"], "saline");
+    let stored = session.manifest.about.get("specimen.storage");
+    assert_eq!(stored, Some(&"saline".into()));
     assert_eq!(session.manifest.operator, "Ada");
 }
 
@@ -87,9 +88,12 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
     for (more, words) in [
         (
             &["--operator", "Ada"][..],
-            "specimen.storage (how it was kept)",
+            "specimen.storage (how and how long it was stored)",
         ),
-        (&["--ask", "operater=Ada"], "did you mean 'operator'?"),
+        (
+            &["--about", "operater=Ada"],
+            "choose from operator, specimen",
+        ),
         (
             &["--set", "depth=12 mm"],
             "parameter 'depth': 12 mm is too large; give 10 mm or less",

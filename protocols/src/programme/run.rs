@@ -190,6 +190,7 @@ impl Work<'_> {
                 .labels(&place, specimen)
                 .map_err(|err| refused(err.to_string()))?,
             is_acknowledged: programme.is_acknowledged,
+            to_acknowledge: Vec::new(),
             after_stop: AfterStop::Close,
             answers: self.laboratory.answers,
         };

@@ -50,6 +50,8 @@ pub struct RunRequest {
     pub labels: Labels,
     /// Whether the operator acknowledged what the preview asks to acknowledge.
     pub is_acknowledged: bool,
+    /// What beside the preview is to be acknowledged, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
     /// What follows a stop.
     pub after_stop: AfterStop,
     /// Who answers prompts.
@@ -91,6 +93,9 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         bench.is_homed,
     );
     preview.verdict(request.is_acknowledged).map_err(refused)?;
+    if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
+        return Err(refused(format!("{first}; acknowledge this to go on")));
+    }
     request
         .labels
         .check()
@@ -112,7 +117,13 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
     };
     let acknowledgements = if request.is_acknowledged {
-        preview.acknowledgements.clone()
+        let beside = request.to_acknowledge.iter();
+        preview
+            .acknowledgements
+            .iter()
+            .chain(beside)
+            .cloned()
+            .collect()
     } else {
         Vec::new()
     };
