@@ -107,7 +107,7 @@ fn the_ramp_and_hold_is_the_plan_it_was() {
 fn a_search_for_contact_without_keys_is_the_usual_one() {
     let plan = plan("zeroing", &[("thickness", "true")]);
     let searches = plan.steps.iter().filter_map(|planned| match planned.step {
-        Step::FindContact(search) | Step::FindBase(search) => Some(search),
+        Step::FindContact(search) => Some(search),
         _ => None,
     });
     let searches: Vec<FindContact> = searches.collect();

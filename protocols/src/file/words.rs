@@ -3,8 +3,8 @@
 use super::args::Args;
 use super::quantity::Kind;
 use crate::plans::{
-    FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Press, Prompt, Settle, Sine,
-    Step, Weigh,
+    FindBase, FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Press, Prompt,
+    Settle, Sine, Step, Weigh,
 };
 use palpate_model::rig::HandAction;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -142,6 +142,39 @@ const CONTACT_KEYS: [Key; 9] = [
     ),
 ];
 
+const BASE_KEYS: [Key; 5] = [
+    key(
+        "speed",
+        Kind::Speed,
+        Need::Usual("0.6 mm/s"),
+        "of the first touch",
+    ),
+    key(
+        "criterion",
+        Kind::Force,
+        Need::Usual("0.05 N"),
+        "force at which the first touch has felt the base",
+    ),
+    key(
+        "retreat",
+        Kind::Length,
+        Need::Usual("0.3 mm"),
+        "way back before the second touch",
+    ),
+    key(
+        "pass_speed",
+        Kind::Speed,
+        Need::Usual("0.03 mm/s"),
+        "of the second touch",
+    ),
+    key(
+        "pass_force",
+        Kind::Force,
+        Need::Usual("0.4 N"),
+        "force that ends the second touch",
+    ),
+];
+
 const HOME_KEYS: [Key; 2] = [
     key("speed", Kind::Speed, Need::Usual("9 mm/s"), "of the search"),
     key(
@@ -204,8 +237,20 @@ pub(super) const WORDS: [Word; 17] = [
     Word {
         name: "find-base",
         about: "Find the base the specimen lay on, with the specimen taken away: its thickness.",
-        keys: &CONTACT_KEYS,
-        build: |args| Ok(Step::FindBase(find(args)?)),
+        keys: &BASE_KEYS,
+        build: |args| {
+            let mut search = FindBase::default();
+            for (name, field) in [
+                ("speed", &mut search.approach_speed.0),
+                ("criterion", &mut search.criterion.0),
+                ("retreat", &mut search.retreat_mm),
+                ("pass_speed", &mut search.pass_speed.0),
+                ("pass_force", &mut search.pass_force.0),
+            ] {
+                *field = args.maybe(name).unwrap_or(*field);
+            }
+            Ok(Step::FindBase(search))
+        },
     },
     Word {
         name: "ramp",
