@@ -319,9 +319,10 @@ mod tests {
             "{}",
             found.late_worst_s
         );
+        // A ramp that ends short takes some of its braking for cruise.
         let speed = of(&found, "ramp", "speed");
         assert!(
-            !speed.is_within && (speed.error_percent.unwrap() + 3.0).abs() < 0.01,
+            !speed.is_within && (speed.error_percent.unwrap() + 3.0).abs() < 0.05,
             "{speed:?}"
         );
         assert!(of(&found, "ramp", "speed by pulses").is_within);
