@@ -200,6 +200,13 @@ impl WorkbenchApp {
             match command {
                 Command::Start => self.start(),
                 Command::Stop => self.operator(Operator::Stop),
+                Command::Halt => self.operator(Operator::Halt),
+                Command::Wish(wish) => {
+                    let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
+                    if let Some(Ok(choice)) = choice {
+                        self.operator(choice);
+                    }
+                }
                 Command::Retract => {
                     if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
                         self.operator(Operator::Retract);

@@ -10,6 +10,7 @@ use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
 use crate::shell::activity::{Activity, Intent, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
+use crate::shell::run_strip::{is_controllable, run_strip_ui};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use crate::workers::fit::Refit;
@@ -143,6 +144,12 @@ impl WorkbenchApp {
                 let specimen = &self.form.labels.specimen;
                 top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
             });
+        if let Some(run) = run_in_progress(&self.snapshot).filter(|run| is_controllable(run)) {
+            Panel::top("run_strip")
+                .resizable(false)
+                .frame(frame(ui, false))
+                .show(ui, |ui| run_strip_ui(ui, run, commands));
+        }
         Panel::left("rail")
             .exact_size(rail::WIDTH)
             .resizable(false)
