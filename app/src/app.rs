@@ -6,6 +6,7 @@ use crate::plots::force_time::TimeView;
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
 use crate::screens::models::ModelsScreen;
+use crate::screens::run_middle::{Chooser, Middle};
 use crate::screens::trade::TradeScreen;
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
 use crate::shell::event_log::EventLog;
@@ -54,6 +55,8 @@ pub struct WorkbenchApp {
     pub(crate) dialog: PathDialog,
     pub(crate) plots: PlotCache,
     pub(crate) refitter: Refitter,
+    pub(crate) middle: Middle,
+    pub(crate) chooser: Chooser,
     pub(crate) time_view: TimeView,
     pub(crate) screen: Screen,
     pub(crate) models: ModelsScreen,
@@ -108,6 +111,8 @@ impl WorkbenchApp {
             dialog: PathDialog::default(),
             plots,
             refitter: Refitter::default(),
+            middle: Middle::default(),
+            chooser: Chooser::default(),
             time_view: TimeView::default(),
             screen: Screen::default(),
             models: ModelsScreen::default(),
@@ -219,6 +224,9 @@ impl WorkbenchApp {
                         self.refusal = Some(format!("the dialog cannot be opened: {err}"));
                     }
                 }
+                Command::View(view) => self.middle = view,
+                Command::TakeProtocol(name) => self.take_protocol(name),
+                Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
                 Command::Work => match self.screen {
                     Screen::Run => {}
                     Screen::Models => self.models.start(ctx),
@@ -245,6 +253,20 @@ impl WorkbenchApp {
         }
     }
 
+    /// Takes a built-in protocol into the form, unless what stands there runs.
+    fn take_protocol(&mut self, name: &str) {
+        if run_in_progress(&self.snapshot).is_none() && self.intent() == Intent::None {
+            self.form.choose_built_in(name);
+            self.middle = Middle::Course;
+        }
+    }
+
+    fn read_protocol(&mut self, read: impl FnOnce(&mut Chooser) -> std::io::Result<()>) {
+        if let Err(err) = read(&mut self.chooser) {
+            self.refusal = Some(format!("the protocol cannot be read: {err}"));
+        }
+    }
+
     fn operator(&mut self, choice: Operator) {
         if let Err(reason) = self.runner.operator(choice) {
             self.refusal = Some(reason);
@@ -262,7 +284,10 @@ impl WorkbenchApp {
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
         match self.runner.request(Request::Run(Box::new(request), reply)) {
-            Ok(()) => self.start = Start::Asked(answer),
+            Ok(()) => {
+                self.start = Start::Asked(answer);
+                self.middle = Middle::Measured;
+            }
             Err(reason) => self.refusal = Some(reason),
         }
     }
@@ -318,7 +343,18 @@ impl eframe::App for WorkbenchApp {
         match self.dialog.poll() {
             Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
             Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),
+            Some((Ask::Protocol, path)) => self.read_protocol(|chooser| chooser.read(&path, ctx)),
             None => {}
+        }
+        if let Some((path, text)) = self.chooser.poll() {
+            // What runs stands in the form until it has ended.
+            if run_in_progress(&self.snapshot).is_none() && self.intent() == Intent::None {
+                self.form.choose_file(&path, text);
+                self.middle = match self.form.protocol {
+                    Ok(_) => Middle::Course,
+                    Err(_) => Middle::Choose,
+                };
+            }
         }
         self.models.poll();
         self.extremes.poll();

@@ -1,5 +1,6 @@
 //! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
 
+use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
 use crate::workers::path_dialog::Ask;
@@ -23,6 +24,12 @@ pub enum Command {
     ListPorts,
     /// Choose a folder or a file in a dialog of its own.
     Choose(Ask),
+    /// Show the protocols, the expected course or what was measured.
+    View(Middle),
+    /// Take a built-in protocol into the form.
+    TakeProtocol(&'static str),
+    /// Read the protocol file whose path is typed.
+    OpenProtocol,
     /// Begin the work of the screen shown: compare models, measure, test.
     Work,
     /// End the work of the screen shown.

@@ -5,9 +5,11 @@ use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{TimeView, force_time_ui};
 use crate::plots::residual::residual_ui;
+use crate::screens::form::Checked;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
+use crate::screens::run_middle::{Middle, expected_ui, views_ui};
 use crate::shell::activity::{Activity, Intent, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
@@ -141,7 +143,7 @@ impl WorkbenchApp {
             .resizable(false)
             .frame(frame(ui, false))
             .show(ui, |ui| {
-                let specimen = &self.form.labels.specimen;
+                let specimen = self.form.specimen();
                 top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
             });
         if let Some(run) = run_in_progress(&self.snapshot).filter(|run| is_controllable(run)) {
@@ -221,7 +223,7 @@ impl WorkbenchApp {
             });
         CentralPanel::default()
             .frame(frame(ui, true))
-            .show(ui, |ui| self.plots_ui(ui));
+            .show(ui, |ui| self.middle_ui(ui, commands));
     }
 
     fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
@@ -252,6 +254,18 @@ impl WorkbenchApp {
                     protocol_ui(ui, &mut self.form, &facts, commands);
                 });
         });
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        views_ui(ui, self.middle, commands);
+        match self.middle {
+            Middle::Choose => {
+                let is_dialog_open = self.dialog.is_open();
+                self.chooser.ui(ui, &self.form, is_dialog_open, commands);
+            }
+            Middle::Course => expected_ui(ui, self.form.checked()),
+            Middle::Measured => self.plots_ui(ui),
+        }
     }
 
     fn plots_ui(&mut self, ui: &mut Ui) {
@@ -287,10 +301,7 @@ impl WorkbenchApp {
             });
         }
         ui.label(RichText::new("Force over depth").heading().strong());
-        let depth = self
-            .form
-            .checked()
-            .map_or(30.0, |checked| checked.params.depth.0);
+        let depth = self.form.checked().map_or(0.0, Checked::deepest_mm);
         force_depth_ui(ui, &self.plots, depth);
     }
 }

@@ -10,4 +10,5 @@ pub mod preview_view;
 pub mod protocol_panel;
 pub mod results_panel;
 pub mod rig_panel;
+pub mod run_middle;
 pub mod trade;

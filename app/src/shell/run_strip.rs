@@ -148,7 +148,7 @@ fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Com
                 wish_ui(ui, run, Wish::Confirm, "Done  F2", commands);
                 wish_ui(ui, run, Wish::Decline, "Not done", commands);
                 let left = match run.pause {
-                    PauseView::Paused { .. } => "waits until you resume".into(),
+                    PauseView::Paused { .. } => "the pause stops this clock".into(),
                     _ => format!("{} left to answer", clock(prompt.time_left.0)),
                 };
                 ui.label(RichText::new(left).color(tokens.text_quiet));

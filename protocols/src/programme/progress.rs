@@ -123,7 +123,7 @@ impl Progress {
                 let own = self.attempts(task, repeat);
                 (task, repeat, own)
             })
-            .find(|(_, _, own)| !own.iter().any(|ending| *ending == Some("finish")))
+            .find(|(_, _, own)| !own.contains(&Some("finish")))
             .map(|(task, repeat, own)| Place {
                 task,
                 repeat,
