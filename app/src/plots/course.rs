@@ -43,7 +43,7 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint]) {
                 .x_axis_label(axis)
                 .y_axis_label(y_axis)
                 .include_y(0.0)
-                .link_axis(Id::new("course"), [true, false])
+                .link_axis(Id::unique("course"), [true, false])
                 .label_formatter(|hover| match hover {
                     HoverPosition::NearDataPoint { position, .. } => {
                         Some(format!("{:.2}\n{:.3}", position.x, position.y))
