@@ -3,6 +3,7 @@
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::force_time::TimeView;
+use crate::screens::calibration::{CalibrationScreen, Facts};
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
 use crate::screens::models::ModelsScreen;
@@ -62,6 +63,7 @@ pub struct WorkbenchApp {
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
     pub(crate) trade: TradeScreen,
+    pub(crate) calibration: CalibrationScreen,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
     start: Start,
@@ -95,6 +97,9 @@ impl WorkbenchApp {
         if let Some(folder) = options.sessions {
             form.folder = folder.display().to_string();
         }
+        let rig = runner.snapshot().rig.description.name.clone();
+        let own = options.calibration.clone();
+        let calibration = CalibrationScreen::new(curves_in.clone(), own, &rig);
         Ok(Self {
             snapshot: runner.snapshot(),
             runner,
@@ -117,6 +122,7 @@ impl WorkbenchApp {
             screen: Screen::default(),
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
+            calibration,
             trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
             refusal: None,
@@ -224,6 +230,14 @@ impl WorkbenchApp {
                         self.refusal = Some(format!("the dialog cannot be opened: {err}"));
                     }
                 }
+                Command::MeasureCalibration => {
+                    self.screen = Screen::Run;
+                    self.take_protocol("load-cell-calibration");
+                }
+                Command::KeepCalibration => {
+                    self.screen = Screen::Calibration;
+                    self.calibration.keep(self.snapshot.run.as_ref(), ctx);
+                }
                 Command::View(view) => self.middle = view,
                 Command::TakeProtocol(name) => self.take_protocol(name),
                 Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
@@ -236,9 +250,10 @@ impl WorkbenchApp {
                         }
                     }
                     Screen::Extremes => self.extremes.start(ctx),
+                    Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
-                    Screen::Run => {}
+                    Screen::Run | Screen::Calibration => {}
                     Screen::Models => self.models.cancel(),
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),
@@ -255,9 +270,36 @@ impl WorkbenchApp {
 
     /// Takes a built-in protocol into the form, unless what stands there runs.
     fn take_protocol(&mut self, name: &str) {
-        if run_in_progress(&self.snapshot).is_none() && self.intent() == Intent::None {
+        if !self.is_busy() {
             self.form.choose_built_in(name);
             self.middle = Middle::Course;
+        }
+    }
+
+    /// What the calibration screen must know of the rest.
+    pub(crate) fn calibration_facts(&self) -> Facts<'_> {
+        Facts {
+            in_use: &self.bench.calibration,
+            is_busy: self.is_busy(),
+            run: self.snapshot.run.as_ref(),
+        }
+    }
+
+    /// Whether a run is in progress or about to start.
+    pub(crate) fn is_busy(&self) -> bool {
+        run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None
+    }
+
+    /// New sessions are read with the calibration chosen on its screen.
+    fn use_calibration(&mut self) {
+        let Ok(calibration) = self.calibration.usable(&self.calibration_facts()) else {
+            return;
+        };
+        // What makes no curve is not usable.
+        if let Ok(curve) = calibration.curve() {
+            self.bench.calibration = calibration.clone();
+            self.bench.curve = curve;
+            self.form.forget();
         }
     }
 
@@ -297,6 +339,7 @@ impl WorkbenchApp {
             Start::None => {}
             Start::Asked(answer) => match answer.try_recv() {
                 Ok(Ok(())) => {
+                    self.plots = PlotCache::for_calibration(&self.bench.calibration);
                     self.start = Start::Granted {
                         seen: self.snapshot.sequence,
                     };
@@ -348,7 +391,7 @@ impl eframe::App for WorkbenchApp {
         }
         if let Some((path, text)) = self.chooser.poll() {
             // What runs stands in the form until it has ended.
-            if run_in_progress(&self.snapshot).is_none() && self.intent() == Intent::None {
+            if !self.is_busy() {
                 self.form.choose_file(&path, text);
                 self.middle = match self.form.protocol {
                     Ok(_) => Middle::Course,
@@ -359,8 +402,12 @@ impl eframe::App for WorkbenchApp {
         self.models.poll();
         self.extremes.poll();
         self.trade.poll();
+        self.calibration.poll();
         if self.screen == Screen::Trade {
             self.trade.shown(ctx);
+        }
+        if self.screen == Screen::Calibration {
+            self.calibration.shown(ctx);
         }
         let rig = &self.snapshot.rig;
         self.form

@@ -30,6 +30,10 @@ pub enum Command {
     TakeProtocol(&'static str),
     /// Read the protocol file whose path is typed.
     OpenProtocol,
+    /// Take the protocol that calibrates the load cell.
+    MeasureCalibration,
+    /// Store the calibration that the last run measured.
+    KeepCalibration,
     /// Begin the work of the screen shown: compare models, measure, test.
     Work,
     /// End the work of the screen shown.

@@ -5,12 +5,13 @@ use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{TimeView, force_time_ui};
 use crate::plots::residual::residual_ui;
+use crate::screens::calibration::Facts;
 use crate::screens::form::Checked;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
 use crate::screens::run_middle::{Middle, expected_ui, views_ui};
-use crate::shell::activity::{Activity, Intent, run_in_progress};
+use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
@@ -167,6 +168,7 @@ impl WorkbenchApp {
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
             Screen::Trade => self.trade_ui(ui, commands),
+            Screen::Calibration => self.calibration_ui(ui, commands),
         }
     }
 
@@ -179,6 +181,21 @@ impl WorkbenchApp {
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.trade.middle_ui(ui));
+    }
+
+    fn calibration_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let facts = Facts {
+            in_use: &self.bench.calibration,
+            is_busy: self.is_busy(),
+            run: self.snapshot.run.as_ref(),
+        };
+        side_ui(ui, Side::Left, |ui| {
+            self.calibration.left_ui(ui, &facts, commands);
+        });
+        side_ui(ui, Side::Right, |ui| self.calibration.right_ui(ui));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.calibration.middle_ui(ui));
     }
 
     fn extremes_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
@@ -228,7 +245,7 @@ impl WorkbenchApp {
 
     fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let verdict = self.start_verdict();
-        let is_busy = run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None;
+        let is_busy = self.is_busy();
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))

@@ -5,7 +5,7 @@ use egui_kittest::kittest::Queryable;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{EndingKind, PauseView};
 use palpate_protocols::runner::{RunView, TimeScale};
-use palpate_sessions::Session;
+use palpate_sessions::{Session, Shelf};
 use palpate_tests::flow::Flow;
 
 /// Opens the list of protocols and takes one by its title.
@@ -29,7 +29,6 @@ fn is_paused(run: &RunView) -> bool {
 
 /// Fills in a short preconditioning of so many cycles.
 fn short_preconditioning(flow: &mut Flow, cycles: &str) {
-    choose(flow, "Preconditioning to a depth");
     for (name, text) in [
         ("operator", "Ada"),
         ("specimen", "S-014"),
@@ -78,6 +77,7 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
 #[test]
 fn an_interrupted_ramp_is_not_resumed_but_finished_early() {
     let mut flow = Flow::open(TimeScale::Factor(10.0));
+    choose(&mut flow, "Preconditioning to a depth");
     short_preconditioning(&mut flow, "3");
     flow.window.key_press(Key::F5);
     flow.wait_for_phase(Phase::Ramp);
@@ -152,4 +152,91 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
     assert_eq!(run.plan_name, "own");
+}
+
+#[test]
+fn a_calibration_is_measured_by_prompts_kept_and_used() {
+    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    flow.click("Calibration");
+    flow.wait("the library", |window| {
+        let mut found = window.query_all_by_label_contains("(built in)");
+        found.next().is_some()
+    });
+    flow.window.check_accessibility();
+    assert!(!flow.is_enabled("Use this one  F6") && flow.says("it is in use"));
+    assert!(!flow.is_enabled("Keep the last run's"));
+    flow.click("Measure...");
+    for (name, text) in [
+        ("operator", "Ada"),
+        ("masses", "240, 540 g"),
+        ("heaviest", "1040"),
+        ("repeats", "1"),
+    ] {
+        flow.type_into(name, text);
+    }
+    flow.click("Start  F5");
+    // None, two up, the heaviest, two down, none.
+    for round in 0..7 {
+        wait_for(&mut flow, "a question or the end", |run| {
+            run.prompt.is_some() || run.outcome.is_some()
+        });
+        assert!(flow.says("State: YOUR TURN"), "round {round}");
+        assert!(flow.says("left to answer") && flow.is_enabled("Not done"));
+        if round == 0 {
+            flow.window.check_accessibility();
+            assert!(flow.says("take everything off the load cell"));
+            flow.click("Done  F2");
+        } else {
+            flow.window.key_press(Key::F2);
+            flow.window.run_steps(2);
+        }
+        wait_for(&mut flow, "the reading", |run| run.prompt.is_none());
+    }
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    flow.window.run_steps(2);
+    flow.click("Keep this calibration");
+    flow.wait("the calibration kept", |window| {
+        let mut found = window.query_all_by_label_contains("kept as ");
+        found.next().is_some()
+    });
+    flow.window.run_steps(2);
+    let shelf = Shelf::open(flow.folder.path());
+    let kept = shelf.in_force("sim").unwrap();
+    assert!(flow.says(&kept.id) && flow.says("in force"));
+    assert!(flow.is_enabled("Use this one  F6"));
+    flow.window.key_press(Key::F6);
+    flow.window.run_steps(3);
+    assert!(flow.says("IN USE, rig sim"));
+    // What is in use reads the next session.
+    flow.click("Run");
+    choose(&mut flow, "Ramp and hold");
+    flow.type_into("hold", "1");
+    flow.click("Start  F5");
+    flow.wait_for_phase(Phase::Home);
+    flow.click("Stop motion  F12");
+    wait_for(&mut flow, "the stop", |run| run.holding.is_some());
+    flow.click("Close session");
+    let run = flow.wait_for_end();
+    let session = Session::open(&run.folder).unwrap();
+    assert_eq!(session.manifest.calibration["name"], "cell of sim");
+}
+
+#[test]
+fn a_declined_prompt_stops_and_keeps_nothing() {
+    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    choose(&mut flow, "Load-cell calibration");
+    flow.type_into("operator", "Ada");
+    flow.click("Start  F5");
+    wait_for(&mut flow, "the question", |run| run.prompt.is_some());
+    flow.click("Not done");
+    wait_for(&mut flow, "the stop", |run| run.holding.is_some());
+    flow.click("Close session");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
+    assert!(
+        flow.window
+            .query_by_label("Keep this calibration")
+            .is_none()
+    );
 }

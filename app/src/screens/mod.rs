@@ -1,6 +1,7 @@
 //! The panels around the plots: rig and protocol on the left, what is known on the right.
 
 pub mod after_stop;
+pub mod calibration;
 pub mod exact_fit;
 pub mod extremes;
 pub mod form;
