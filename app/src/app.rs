@@ -3,9 +3,11 @@
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::force_time::TimeView;
+use crate::screens::calibration::{CalibrationScreen, Facts};
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
 use crate::screens::models::ModelsScreen;
+use crate::screens::run_middle::{Chooser, Middle};
 use crate::screens::trade::TradeScreen;
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
 use crate::shell::event_log::EventLog;
@@ -54,11 +56,14 @@ pub struct WorkbenchApp {
     pub(crate) dialog: PathDialog,
     pub(crate) plots: PlotCache,
     pub(crate) refitter: Refitter,
+    pub(crate) middle: Middle,
+    pub(crate) chooser: Chooser,
     pub(crate) time_view: TimeView,
     pub(crate) screen: Screen,
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
     pub(crate) trade: TradeScreen,
+    pub(crate) calibration: CalibrationScreen,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
     start: Start,
@@ -92,6 +97,9 @@ impl WorkbenchApp {
         if let Some(folder) = options.sessions {
             form.folder = folder.display().to_string();
         }
+        let rig = runner.snapshot().rig.description.name.clone();
+        let own = options.calibration.clone();
+        let calibration = CalibrationScreen::new(curves_in.clone(), own, &rig);
         Ok(Self {
             snapshot: runner.snapshot(),
             runner,
@@ -109,10 +117,13 @@ impl WorkbenchApp {
             dialog: PathDialog::default(),
             plots,
             refitter: Refitter::default(),
+            middle: Middle::default(),
+            chooser: Chooser::default(),
             time_view: TimeView::default(),
             screen: Screen::default(),
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
+            calibration,
             trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
             refusal: None,
@@ -201,6 +212,13 @@ impl WorkbenchApp {
             match command {
                 Command::Start => self.start(),
                 Command::Stop => self.operator(Operator::Stop),
+                Command::Halt => self.operator(Operator::Halt),
+                Command::Wish(wish) => {
+                    let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
+                    if let Some(Ok(choice)) = choice {
+                        self.operator(choice);
+                    }
+                }
                 Command::Retract => {
                     if run_in_progress(&self.snapshot).is_some_and(|run| run.can_retract.is_ok()) {
                         self.operator(Operator::Retract);
@@ -213,6 +231,17 @@ impl WorkbenchApp {
                         self.refusal = Some(format!("the dialog cannot be opened: {err}"));
                     }
                 }
+                Command::MeasureCalibration => {
+                    self.screen = Screen::Run;
+                    self.take_protocol("load-cell-calibration");
+                }
+                Command::KeepCalibration => {
+                    self.screen = Screen::Calibration;
+                    self.calibration.keep(self.snapshot.run.as_ref(), ctx);
+                }
+                Command::View(view) => self.middle = view,
+                Command::TakeProtocol(name) => self.take_protocol(name),
+                Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
                 Command::Work => match self.screen {
                     Screen::Run => {}
                     Screen::Models => self.models.start(ctx),
@@ -222,9 +251,10 @@ impl WorkbenchApp {
                         }
                     }
                     Screen::Extremes => self.extremes.start(ctx),
+                    Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
-                    Screen::Run => {}
+                    Screen::Run | Screen::Calibration => {}
                     Screen::Models => self.models.cancel(),
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),
@@ -236,6 +266,47 @@ impl WorkbenchApp {
                 }),
             }
             ctx.request_repaint();
+        }
+    }
+
+    /// Takes a built-in protocol into the form, unless what stands there runs.
+    fn take_protocol(&mut self, name: &str) {
+        if !self.is_busy() {
+            self.form.choose_built_in(name);
+            self.middle = Middle::Course;
+        }
+    }
+
+    /// What the calibration screen must know of the rest.
+    pub(crate) fn calibration_facts(&self) -> Facts<'_> {
+        Facts {
+            in_use: &self.bench.calibration,
+            is_busy: self.is_busy(),
+            run: self.snapshot.run.as_ref(),
+        }
+    }
+
+    /// Whether a run is in progress or about to start.
+    pub(crate) fn is_busy(&self) -> bool {
+        run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None
+    }
+
+    /// New sessions are read with the calibration chosen on its screen.
+    fn use_calibration(&mut self) {
+        let Ok(calibration) = self.calibration.usable(&self.calibration_facts()) else {
+            return;
+        };
+        // What makes no curve is not usable.
+        if let Ok(curve) = calibration.curve() {
+            self.bench.calibration = calibration.clone();
+            self.bench.curve = curve;
+            self.form.forget();
+        }
+    }
+
+    fn read_protocol(&mut self, read: impl FnOnce(&mut Chooser) -> std::io::Result<()>) {
+        if let Err(err) = read(&mut self.chooser) {
+            self.refusal = Some(format!("the protocol cannot be read: {err}"));
         }
     }
 
@@ -256,7 +327,10 @@ impl WorkbenchApp {
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
         match self.runner.request(Request::Run(Box::new(request), reply)) {
-            Ok(()) => self.start = Start::Asked(answer),
+            Ok(()) => {
+                self.start = Start::Asked(answer);
+                self.middle = Middle::Measured;
+            }
             Err(reason) => self.refusal = Some(reason),
         }
     }
@@ -266,6 +340,7 @@ impl WorkbenchApp {
             Start::None => {}
             Start::Asked(answer) => match answer.try_recv() {
                 Ok(Ok(())) => {
+                    self.plots = PlotCache::for_calibration(&self.bench.calibration);
                     self.start = Start::Granted {
                         seen: self.snapshot.sequence,
                     };
@@ -312,13 +387,28 @@ impl eframe::App for WorkbenchApp {
         match self.dialog.poll() {
             Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
             Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),
+            Some((Ask::Protocol, path)) => self.read_protocol(|chooser| chooser.read(&path, ctx)),
             None => {}
+        }
+        if let Some((path, text)) = self.chooser.poll() {
+            // What runs stands in the form until it has ended.
+            if !self.is_busy() {
+                self.form.choose_file(&path, text);
+                self.middle = match self.form.protocol {
+                    Ok(_) => Middle::Course,
+                    Err(_) => Middle::Choose,
+                };
+            }
         }
         self.models.poll();
         self.extremes.poll();
         self.trade.poll();
+        self.calibration.poll();
         if self.screen == Screen::Trade {
             self.trade.shown(ctx);
+        }
+        if self.screen == Screen::Calibration {
+            self.calibration.shown(ctx);
         }
         let rig = &self.snapshot.rig;
         self.form

@@ -1,6 +1,8 @@
 //! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
 
+use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
+use crate::shell::run_strip::Wish;
 use crate::workers::path_dialog::Ask;
 
 /// One thing the user asked for.
@@ -10,6 +12,10 @@ pub enum Command {
     Start,
     /// Stop motion, now.
     Stop,
+    /// Cut the motion, now, without braking.
+    Halt,
+    /// Pause, resume, finish early, abort or answer a prompt, where the run allows it.
+    Wish(Wish),
     /// After a stop: leave the tissue.
     Retract,
     /// After a stop: end the session where the probe stands.
@@ -18,6 +24,16 @@ pub enum Command {
     ListPorts,
     /// Choose a folder or a file in a dialog of its own.
     Choose(Ask),
+    /// Show the protocols, the expected course or what was measured.
+    View(Middle),
+    /// Take a built-in protocol into the form.
+    TakeProtocol(&'static str),
+    /// Read the protocol file whose path is typed.
+    OpenProtocol,
+    /// Take the protocol that calibrates the load cell.
+    MeasureCalibration,
+    /// Store the calibration that the last run measured.
+    KeepCalibration,
     /// Begin the work of the screen shown: compare models, measure, test.
     Work,
     /// End the work of the screen shown.
@@ -38,10 +54,14 @@ impl Commands {
         self.0.push(command);
     }
 
-    /// Everything asked for, a stop before all else; leaves nothing behind.
+    /// Everything asked for, a halt and then a stop before all else; leaves nothing behind.
     pub fn take(&mut self) -> Vec<Command> {
         let mut commands = std::mem::take(&mut self.0);
-        commands.sort_by_key(|command| *command != Command::Stop);
+        commands.sort_by_key(|command| match command {
+            Command::Halt => 0,
+            Command::Stop => 1,
+            _ => 2,
+        });
         commands
     }
 }
@@ -53,12 +73,22 @@ mod tests {
     #[test]
     fn a_stop_overtakes_what_was_asked_before() {
         let mut commands = Commands::default();
-        for command in [Command::Start, Command::ListPorts, Command::Stop] {
+        for command in [
+            Command::Start,
+            Command::ListPorts,
+            Command::Stop,
+            Command::Halt,
+        ] {
             commands.push(command);
         }
         assert_eq!(
             commands.take(),
-            [Command::Stop, Command::Start, Command::ListPorts]
+            [
+                Command::Halt,
+                Command::Stop,
+                Command::Start,
+                Command::ListPorts
+            ]
         );
         assert!(commands.take().is_empty());
     }

@@ -5,11 +5,15 @@ use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{TimeView, force_time_ui};
 use crate::plots::residual::residual_ui;
+use crate::screens::calibration::Facts;
+use crate::screens::form::Checked;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig_panel::rig_ui;
-use crate::shell::activity::{Activity, Intent, run_in_progress};
+use crate::screens::run_middle::{Middle, expected_ui, views_ui};
+use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
+use crate::shell::run_strip::{is_controllable, run_strip_ui};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use crate::workers::fit::Refit;
@@ -143,9 +147,15 @@ impl WorkbenchApp {
             .resizable(false)
             .frame(frame(ui, false))
             .show(ui, |ui| {
-                let specimen = &self.form.labels.specimen;
+                let specimen = self.form.specimen();
                 top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
             });
+        if let Some(run) = run_in_progress(&self.snapshot).filter(|run| is_controllable(run)) {
+            Panel::top("run_strip")
+                .resizable(false)
+                .frame(frame(ui, false))
+                .show(ui, |ui| run_strip_ui(ui, run, commands));
+        }
         Panel::left("rail")
             .exact_size(rail::WIDTH)
             .resizable(false)
@@ -161,6 +171,7 @@ impl WorkbenchApp {
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
             Screen::Trade => self.trade_ui(ui, commands),
+            Screen::Calibration => self.calibration_ui(ui, commands),
         }
     }
 
@@ -173,6 +184,21 @@ impl WorkbenchApp {
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.trade.middle_ui(ui));
+    }
+
+    fn calibration_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let facts = Facts {
+            in_use: &self.bench.calibration,
+            is_busy: self.is_busy(),
+            run: self.snapshot.run.as_ref(),
+        };
+        side_ui(ui, Side::Left, |ui| {
+            self.calibration.left_ui(ui, &facts, commands);
+        });
+        side_ui(ui, Side::Right, |ui| self.calibration.right_ui(ui));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.calibration.middle_ui(ui));
     }
 
     fn extremes_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
@@ -217,12 +243,12 @@ impl WorkbenchApp {
             });
         CentralPanel::default()
             .frame(frame(ui, true))
-            .show(ui, |ui| self.plots_ui(ui));
+            .show(ui, |ui| self.middle_ui(ui, commands));
     }
 
     fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let verdict = self.start_verdict();
-        let is_busy = run_in_progress(&self.snapshot).is_some() || self.intent() != Intent::None;
+        let is_busy = self.is_busy();
         Panel::bottom("start")
             .resizable(false)
             .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
@@ -248,6 +274,18 @@ impl WorkbenchApp {
                     protocol_ui(ui, &mut self.form, &facts, commands);
                 });
         });
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        views_ui(ui, self.middle, commands);
+        match self.middle {
+            Middle::Choose => {
+                let is_dialog_open = self.dialog.is_open();
+                self.chooser.ui(ui, &self.form, is_dialog_open, commands);
+            }
+            Middle::Course => expected_ui(ui, self.form.checked()),
+            Middle::Measured => self.plots_ui(ui),
+        }
     }
 
     fn plots_ui(&mut self, ui: &mut Ui) {
@@ -283,10 +321,7 @@ impl WorkbenchApp {
             });
         }
         ui.label(RichText::new("Force over depth").heading().strong());
-        let depth = self
-            .form
-            .checked()
-            .map_or(30.0, |checked| checked.params.depth.0);
+        let depth = self.form.checked().map_or(0.0, Checked::deepest_mm);
         force_depth_ui(ui, &self.plots, depth);
     }
 }

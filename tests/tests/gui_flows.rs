@@ -132,8 +132,9 @@ fn every_sentence_of_a_report_is_on_the_screen() {
 fn a_wrong_speed_gives_a_sentence_and_no_start() {
     let mut flow = Flow::open(TimeScale::Max);
     for (text, sentence) in [
-        ("fast", "'fast' is not a finite number"),
-        ("0,75", "write it with a point"),
+        ("fast", "\"fast\" is not a speed"),
+        ("0,75", "write a point, not a comma"),
+        ("3 mm", "\"3 mm\" is a length"),
         ("0.7501", "cannot make 0.7501 mm/s"),
         ("900", "outside what rig sim makes"),
         ("", "a number is missing"),

@@ -17,7 +17,7 @@ pub(super) fn band_of(tokens: &Tokens) -> Color32 {
 }
 
 /// Gives a plot the common look.
-pub(super) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+pub(crate) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
     plot.allow_scroll(false)
         .set_margin_fraction(vec2(0.01, 0.03))
         .grid_color(tokens.line)

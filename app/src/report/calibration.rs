@@ -54,7 +54,25 @@ impl Entry {
         }
     }
 
-    fn state(&self) -> String {
+    /// The line of one that comes with its rig and is in no library.
+    #[must_use]
+    pub fn built_in(document: &Calibration) -> Self {
+        Self {
+            id: format!("{} (built in)", document.name),
+            name: document.name.clone(),
+            rig: document.rig.clone(),
+            cell: document.cell.clone(),
+            taken_at: document.taken_at.clone(),
+            age_days: None,
+            valid_days: document.valid_days(),
+            is_in_force: false,
+            superseded_by: None,
+        }
+    }
+
+    /// Whether it is in force, superseded, expired or only older, in words.
+    #[must_use]
+    pub fn state(&self) -> String {
         let is_old = self
             .age_days
             .is_some_and(|age| age > i64::from(self.valid_days));

@@ -6,7 +6,7 @@ use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, sentence_lines, title};
 use super::svg::{Ink, Panel, Svg};
 use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
-use palpate_model::calibration::{Calibration, Direction, Term};
+use palpate_model::calibration::{Calibration, CalibrationError, Direction, Term};
 use palpate_model::units::{Newtons, Volts};
 
 /// Places along the force axis: more than a pixel has.
@@ -27,9 +27,73 @@ impl Axis {
     }
 }
 
-fn shade(svg: &mut Svg, panel: &Panel, told: &Told) {
-    for flat in &told.quality.flat {
-        panel.shade(svg, [flat.from_n, flat.to_n], LIGHT.line);
+/// Everything a picture of a calibration draws over force in N.
+#[derive(Clone, Debug)]
+pub struct Curves {
+    /// Lowest and highest force drawn.
+    pub x: [f64; 2],
+    /// Signal in V up to the heaviest weight.
+    pub signal: Vec<[f64; 2]>,
+    /// Signal in V beyond it, where the curve only goes on.
+    pub beyond: Vec<[f64; 2]>,
+    /// Readings in V of loading and of unloading.
+    pub readings: [Vec<[f64; 2]>; 2],
+    /// What the curve misses of each reading, in mN.
+    pub misses: [Vec<[f64; 2]>; 2],
+    /// Local sensitivity in V/N.
+    pub slope: Vec<[f64; 2]>,
+    /// Standard uncertainty of a force in mN; zero where nothing is stated.
+    pub sigma: Vec<[f64; 2]>,
+    /// Ends of the flat stretches in N.
+    pub flat: Vec<[f64; 2]>,
+}
+
+impl Curves {
+    /// The curves of a calibration that has been told of.
+    pub fn of(calibration: &Calibration, told: &Told) -> Result<Self, CalibrationError> {
+        let (curve, points) = (calibration.curve()?, calibration.points()?);
+        let (first, last) = curve.force_range();
+        let x = [first.0, last.0 + BEYOND * (last.0 - first.0)];
+        let axis = Axis(x);
+        let zero = points
+            .first()
+            .filter(|point| point.newtons.0 == 0.0)
+            .map_or(0.0, |point| {
+                point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0
+            });
+        let signal = axis.along(|force| curve.volts_from_newtons(Newtons(force)).0 + zero);
+        let (signal, beyond) = signal.into_iter().partition(|point| point[0] <= last.0);
+        let mut readings = [Vec::new(), Vec::new()];
+        let mut misses = [Vec::new(), Vec::new()];
+        for point in &points {
+            for reading in &point.readings {
+                let k = usize::from(reading.direction == Direction::Unloading);
+                let force = curve.newtons_from_volts(Volts(reading.volts.0 - zero));
+                readings[k].push([point.newtons.0, reading.volts.0]);
+                misses[k].push([point.newtons.0, (force.0 - point.newtons.0) * 1e3]);
+            }
+        }
+        let flat = told.quality.flat.iter();
+        Ok(Self {
+            x,
+            signal,
+            beyond,
+            readings,
+            misses,
+            slope: axis.along(|force| curve.sensitivity_at(Newtons(force))),
+            sigma: axis.along(|force| in_mn(told.uncertainty.sigma(Newtons(force)))),
+            flat: flat.map(|flat| [flat.from_n, flat.to_n]).collect(),
+        })
+    }
+}
+
+fn in_mn(sigma: Option<Newtons>) -> f64 {
+    sigma.map_or(0.0, |sigma| sigma.0 * 1e3)
+}
+
+fn shade(svg: &mut Svg, panel: &Panel, flat: &[[f64; 2]]) {
+    for ends in flat {
+        panel.shade(svg, *ends, LIGHT.line);
     }
 }
 
@@ -39,49 +103,33 @@ pub fn picture(calibration: &Calibration, told: &Told) -> String {
     let mut svg = Svg::new(WIDTH);
     let line = format!("{}; {}", calibration.curve, calibration.source);
     title(&mut svg, &calibration.name, &line);
-    let (Ok(curve), Ok(points)) = (calibration.curve(), calibration.points()) else {
+    let Ok(curves) = Curves::of(calibration, told) else {
         // Only what has a curve and points was told of.
         return svg.finish(70.0, LIGHT.canvas, &calibration.name);
     };
-    let (first, last) = curve.force_range();
-    let x = [first.0, last.0 + BEYOND * (last.0 - first.0)];
-    let axis = Axis(x);
-    let zero = points
-        .first()
-        .filter(|point| point.newtons.0 == 0.0)
-        .map_or(0.0, |point| {
-            point.volts.0 - curve.volts_from_newtons(Newtons(0.0)).0
-        });
-    let signal = axis.along(|force| curve.volts_from_newtons(Newtons(force)).0 + zero);
-    let mut readings = [Vec::new(), Vec::new()];
-    let mut misses = [Vec::new(), Vec::new()];
-    for point in &points {
-        for reading in &point.readings {
-            let k = usize::from(reading.direction == Direction::Unloading);
-            let force = curve.newtons_from_volts(Volts(reading.volts.0 - zero));
-            readings[k].push([point.newtons.0, reading.volts.0]);
-            misses[k].push([point.newtons.0, (force.0 - point.newtons.0) * 1e3]);
-        }
-    }
+    let Curves {
+        x,
+        signal,
+        beyond,
+        readings,
+        misses,
+        slope,
+        flat,
+        ..
+    } = &curves;
+    let x = *x;
     let place = |top: f64, bottom: f64| [LEFT, top, RIGHT, bottom];
 
     let upper = Panel::around(
         place(84.0, 320.0),
         x,
-        &[&signal, &readings[0], &readings[1]],
+        &[signal, beyond, &readings[0], &readings[1]],
     );
-    shade(&mut svg, &upper, told);
+    shade(&mut svg, &upper, flat);
     upper.axes(&mut svg, ["", "signal (V)"], look());
-    let is_inside = |point: &&[f64; 2]| point[0] <= last.0;
-    let inside: Vec<[f64; 2]> = signal.iter().filter(is_inside).copied().collect();
-    let beyond: Vec<[f64; 2]> = signal
-        .iter()
-        .filter(|point| !is_inside(point))
-        .copied()
-        .collect();
-    upper.line(&mut svg, &inside, LIGHT.text, 1.4);
-    upper.line(&mut svg, &beyond, LIGHT.text_quiet, 0.8);
-    dots(&mut svg, &upper, &readings);
+    upper.line(&mut svg, signal, LIGHT.text, 1.4);
+    upper.line(&mut svg, beyond, LIGHT.text_quiet, 0.8);
+    dots(&mut svg, &upper, readings);
     let mut legend = vec![("loading", LIGHT.series)];
     if !readings[1].is_empty() {
         legend.push(("unloading", LIGHT.limit));
@@ -96,18 +144,17 @@ pub fn picture(calibration: &Calibration, told: &Told) -> String {
         x,
         &[&misses[0], &misses[1], &[[0.0, -1.0], [0.0, 1.0]]],
     );
-    shade(&mut svg, &missed, told);
+    shade(&mut svg, &missed, flat);
     missed.axes(&mut svg, ["", "residual (mN)"], look());
     missed.line(&mut svg, &[[x[0], 0.0], [x[1], 0.0]], LIGHT.text_quiet, 0.8);
-    dots(&mut svg, &missed, &misses);
+    dots(&mut svg, &missed, misses);
 
-    let slope = axis.along(|force| curve.sensitivity_at(Newtons(force)));
-    let middle = Panel::around(place(486.0, 600.0), x, &[&slope, &[[0.0, 0.0]]]);
-    shade(&mut svg, &middle, told);
+    let middle = Panel::around(place(486.0, 600.0), x, &[slope, &[[0.0, 0.0]]]);
+    shade(&mut svg, &middle, flat);
     middle.axes(&mut svg, ["", "slope (V/N)"], look());
-    middle.line(&mut svg, &slope, LIGHT.text, 1.4);
+    middle.line(&mut svg, slope, LIGHT.text, 1.4);
 
-    let y = uncertainty(&mut svg, told, axis);
+    let y = uncertainty(&mut svg, told, &curves);
     let mut y = y + 2.0 * LINE + 30.0;
     for finding in &told.quality.findings {
         y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), finding);
@@ -120,17 +167,16 @@ pub fn picture(calibration: &Calibration, told: &Told) -> String {
 }
 
 /// The lowest panel; returns where it ends.
-fn uncertainty(svg: &mut Svg, told: &Told, axis: Axis) -> f64 {
+fn uncertainty(svg: &mut Svg, told: &Told, curves: &Curves) -> f64 {
     let (top, bottom) = (654.0, 820.0);
     let own = &told.uncertainty;
-    let in_mn = |sigma: Option<Newtons>| sigma.map_or(0.0, |sigma| sigma.0 * 1e3);
-    let whole = axis.along(|force| in_mn(own.sigma(Newtons(force))));
+    let axis = Axis(curves.x);
     let panel = Panel::around(
         [LEFT, top, RIGHT, bottom],
         axis.0,
-        &[&whole, &[[0.0, 0.0], [0.0, 1.0]]],
+        &[&curves.sigma, &[[0.0, 0.0], [0.0, 1.0]]],
     );
-    shade(svg, &panel, told);
+    shade(svg, &panel, &curves.flat);
     panel.axes(svg, ["force (N)", "u (mN)"], look());
     if !own.is_stated() {
         let ink = Ink::plain(LIGHT.text_quiet);
@@ -157,7 +203,7 @@ fn uncertainty(svg: &mut Svg, told: &Told, axis: Axis) -> f64 {
             legend.push((term.word(), ink));
         }
     }
-    panel.line(svg, &whole, LIGHT.text, 2.2);
+    panel.line(svg, &curves.sigma, LIGHT.text, 2.2);
     names(svg, top - 14.0, &legend);
     bottom
 }

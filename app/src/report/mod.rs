@@ -2,7 +2,7 @@
 //! pictures share, the pictures themselves, and the page of the extremes.
 
 pub mod calibration;
-mod calibration_plot;
+pub mod calibration_plot;
 pub mod cycles;
 pub mod extremes;
 pub mod family;

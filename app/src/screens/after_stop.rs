@@ -1,5 +1,6 @@
 //! After a stop: why, and the two ways on. At the end: how it ended and where the data is.
 
+use super::calibration::can_keep;
 use crate::command::{Command, Commands};
 use crate::shell::activity::is_planned;
 use crate::theme::Tokens;
@@ -14,6 +15,9 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
         section_ui(ui, "Run ended");
         outcome_ui(ui, outcome);
         log_ui(ui, run);
+        if can_keep(Some(run)).is_ok() && ui.button("Keep this calibration").clicked() {
+            commands.push(Command::KeepCalibration);
+        }
     } else if let Some(ending) = &run.holding {
         section_ui(ui, "Run stopped, axis holds");
         outcome_ui(ui, ending);

@@ -1,6 +1,7 @@
 //! The panels around the plots: rig and protocol on the left, what is known on the right.
 
 pub mod after_stop;
+pub mod calibration;
 pub mod exact_fit;
 pub mod extremes;
 pub mod form;
@@ -10,4 +11,5 @@ pub mod preview_view;
 pub mod protocol_panel;
 pub mod results_panel;
 pub mod rig_panel;
+pub mod run_middle;
 pub mod trade;

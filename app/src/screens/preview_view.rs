@@ -12,8 +12,12 @@ pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let Some(checked) = form.checked() else {
         ui.label(
-            RichText::new("No preview until the fields above are right").color(tokens.text_quiet),
+            RichText::new("No preview until the protocol and its values are right")
+                .color(tokens.text_quiet),
         );
+        for problem in form.problems() {
+            ui.label(RichText::new(problem.to_string()).color(tokens.alarm_text));
+        }
         return;
     };
     let preview = &checked.preview;
@@ -21,7 +25,8 @@ pub fn preview_ui(ui: &mut Ui, form: &ProtocolForm) {
     for refusal in &preview.refusals {
         ui.label(RichText::new(format!("Refused: {refusal}")).color(tokens.alarm_text));
     }
-    for note in &preview.notes {
+    let warnings = checked.warnings.iter().map(ToString::to_string);
+    for note in warnings.chain(preview.notes.iter().cloned()) {
         ui.label(
             RichText::new(format!("Note: {note}"))
                 .color(tokens.text_quiet)

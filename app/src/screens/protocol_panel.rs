@@ -1,14 +1,16 @@
-//! The protocol: who, what, how fast, how deep, how long, where to; and the start.
+//! The protocol that was chosen: its parameters, what it asks for, where sessions go; and the start.
 
-use super::form::ProtocolForm;
+use super::form::{ParamField, ProtocolForm, ToldField};
 use super::preview_view::{acknowledgement_ui, preview_ui};
+use super::run_middle::Middle;
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::quantity_input::{form_label, quantity_ui, text_ui};
+use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::workers::path_dialog::Ask;
-use eframe::egui::{Button, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
+use palpate_protocols::file::{Kind, What};
 
 /// What the panel must know beside the form.
 pub struct ProtocolFacts<'a> {
@@ -23,6 +25,9 @@ pub struct ProtocolFacts<'a> {
 /// Opacity of locked fields; enough contrast is left to read their values.
 const LOCKED_ALPHA: f32 = 0.8;
 
+/// Things to tell that every session has a field for; the others are folded away until asked for.
+const ALWAYS: [&str; 3] = ["operator", "specimen", "indenter"];
+
 /// Draws the form and the preview.
 pub fn protocol_ui(
     ui: &mut Ui,
@@ -30,33 +35,130 @@ pub fn protocol_ui(
     facts: &ProtocolFacts<'_>,
     commands: &mut Commands,
 ) {
-    section_ui(ui, "Ramp and hold");
+    head_ui(ui, form, facts, commands);
     ui.scope(|ui| {
         // Locked while a run goes on, but still to be read: it says what is running.
         ui.visuals_mut().disabled_alpha = LOCKED_ALPHA;
-        ui.add_enabled_ui(!facts.is_busy, |ui| fields_ui(ui, form, facts, commands));
+        ui.add_enabled_ui(!facts.is_busy, |ui| {
+            for field in &mut form.fields {
+                parameter_ui(ui, field);
+            }
+            told_ui(ui, &mut form.told);
+            folder_ui(ui, form, facts, commands);
+        });
     });
     section_ui(ui, "Preview");
     preview_ui(ui, form);
 }
 
-fn fields_ui(
-    ui: &mut Ui,
-    form: &mut ProtocolForm,
-    facts: &ProtocolFacts<'_>,
-    commands: &mut Commands,
-) {
-    text_ui(ui, "operator", &mut form.labels.operator);
-    text_ui(ui, "specimen", &mut form.labels.specimen);
-    text_ui(ui, "indenter", &mut form.labels.indenter);
-    quantity_ui(ui, "speed", "mm/s", &mut form.speed);
-    quantity_ui(ui, "depth", "mm from contact", &mut form.depth);
-    quantity_ui(ui, "hold", "s", &mut form.hold);
-    quantity_ui(ui, "end at", "% of tau known", &mut form.until);
-    quantity_ui(ui, "unload", "mm/s, recorded", &mut form.unload);
-    folder_ui(ui, form, facts, commands);
+fn head_ui(ui: &mut Ui, form: &ProtocolForm, facts: &ProtocolFacts<'_>, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let title = match (&form.protocol, &form.file) {
+        (Ok(protocol), _) => protocol.title.clone(),
+        (Err(_), Some(file)) => file.display().to_string(),
+        (Err(_), None) => "No protocol".into(),
+    };
+    section_ui(ui, &title);
+    if let Ok(protocol) = &form.protocol {
+        let about = RichText::new(&protocol.about)
+            .color(tokens.text_quiet)
+            .small();
+        ui.add(Label::new(about).wrap())
+            .on_hover_text(&protocol.source);
+    }
+    let button = Button::new("Change protocol...");
+    if ui.add_enabled(!facts.is_busy, button).clicked() {
+        commands.push(Command::View(Middle::Choose));
+    }
 }
 
+fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let hint = field.hint();
+    if field.parameter.kind == Kind::Flag {
+        let mut is_on = field.text == "true";
+        let tick = ui.checkbox(&mut is_on, field.parameter.name.as_str());
+        if tick.on_hover_text(hint).changed() {
+            field.text = is_on.to_string();
+        }
+        return;
+    }
+    let is_wide = field.parameter.is_list || field.parameter.kind == Kind::Text;
+    let is_focused = ui
+        .horizontal(|ui| {
+            let label = form_label(ui, &field.parameter.name).on_hover_text(&hint);
+            let input = TextEdit::singleline(&mut field.text).char_limit(400);
+            let input = if is_wide {
+                input.desired_width(ui.available_width() - 10.0)
+            } else {
+                input.desired_width(76.0).align(Align2::RIGHT_CENTER)
+            };
+            let is_left_out = field.parameter.default.what == What::None;
+            let input = if is_left_out {
+                input.hint_text("none")
+            } else {
+                input
+            };
+            let input = ui.add(input).labelled_by(label.id).on_hover_text(&hint);
+            if !is_wide {
+                ui.label(RichText::new(field.unit).color(tokens.text_quiet));
+            }
+            input.has_focus()
+        })
+        .inner;
+    if is_focused {
+        ui.add(Label::new(RichText::new(hint).color(tokens.text_quiet).small()).wrap());
+    }
+    if let Err(reason) = &field.value {
+        ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    }
+}
+
+/// Everything that can be told: what is always there, what the protocol asks for, and the rest folded away.
+fn told_ui(ui: &mut Ui, told: &mut [ToldField]) {
+    let is_shown = |one: &ToldField| one.is_asked || ALWAYS.contains(&one.key.name);
+    for field in told.iter_mut().filter(|one| is_shown(one)) {
+        one_told_ui(ui, field);
+    }
+    let is_told = |one: &ToldField| !is_shown(one) && !one.text.is_empty();
+    let count = told.iter().filter(|one| is_told(one)).count();
+    let title = match count {
+        0 => "More about specimen, probe and series".into(),
+        count => format!("More about specimen, probe and series ({count} told)"),
+    };
+    CollapsingHeader::new(title)
+        .id_salt("more_told")
+        .show(ui, |ui| {
+            for field in told.iter_mut().filter(|one| !is_shown(one)) {
+                one_told_ui(ui, field);
+            }
+        });
+}
+
+fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.horizontal(|ui| {
+        let label = if ALWAYS.contains(&field.key.name) {
+            form_label(ui, field.key.name)
+        } else {
+            ui.label(field.key.name)
+        };
+        let width = ui.available_width() - 10.0;
+        let input = TextEdit::singleline(&mut field.text)
+            .desired_width(width)
+            .char_limit(200);
+        let input = match field.is_asked {
+            true => input.hint_text("asked for"),
+            false => input,
+        };
+        ui.add(input)
+            .labelled_by(label.id)
+            .on_hover_text(field.key.meaning);
+    });
+    if let Some(reason) = &field.error {
+        ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    }
+}
 fn folder_ui(
     ui: &mut Ui,
     form: &mut ProtocolForm,

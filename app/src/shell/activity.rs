@@ -1,7 +1,7 @@
 //! What the rig and the run are doing, as word, shape and tone. Never colour alone.
 
 use palpate_model::rig::AxisStatus;
-use palpate_protocols::engine::EndingKind;
+use palpate_protocols::engine::{EndingKind, PauseView};
 use palpate_protocols::runner::{RunView, Snapshot};
 
 /// Drawn beside the word, so that the state is read without colour.
@@ -15,6 +15,10 @@ pub enum Shape {
     Square,
     /// Something is wrong.
     Diamond,
+    /// Paused.
+    Bars,
+    /// A person is asked for something.
+    Question,
 }
 
 /// How loud the state is.
@@ -105,6 +109,12 @@ pub fn activity(snapshot: &Snapshot, intent: Intent) -> Activity {
         }
         (Some(_), _) => Activity::new("STOPPED", Shape::Diamond, Tone::Alarm),
         (None, Phase::Stopped) => Activity::new("STOPPING", Shape::Square, Tone::Notice),
+        (None, _) if matches!(run.pause, PauseView::Paused { .. }) => {
+            Activity::new("PAUSED", Shape::Bars, Tone::Notice)
+        }
+        (None, _) if run.prompt.is_some() => {
+            Activity::new("YOUR TURN", Shape::Question, Tone::Notice)
+        }
         (None, phase) => Activity::new(phase.name().to_uppercase(), Shape::Triangle, Tone::Active),
     }
 }

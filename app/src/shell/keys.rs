@@ -1,16 +1,23 @@
 //! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
 
 use super::rail::Screen;
+use super::run_strip::Wish;
 use crate::command::{Command, Commands};
 use eframe::egui::{Context, InputState, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
-pub const KEYS: [(Key, Command); 5] = [
+pub const KEYS: [(Key, Command); 11] = [
     (Key::F12, Command::Stop),
     (Key::Escape, Command::Stop),
+    (Key::F11, Command::Halt),
+    (Key::F2, Command::Wish(Wish::Confirm)),
+    (Key::F4, Command::Wish(Wish::PauseAfter)),
     (Key::F5, Command::Start),
     (Key::F6, Command::Work),
+    (Key::F7, Command::Wish(Wish::Pause)),
     (Key::F8, Command::Retract),
+    (Key::F9, Command::Wish(Wish::Resume)),
+    (Key::F10, Command::Wish(Wish::Finish)),
 ];
 
 /// Reads the keys once per frame.

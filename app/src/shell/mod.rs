@@ -5,4 +5,5 @@ pub mod event_log;
 pub mod frame_meter;
 pub mod keys;
 pub mod rail;
+pub mod run_strip;
 pub mod top_bar;

@@ -9,7 +9,7 @@ pub const WIDTH: f32 = 100.0;
 /// What stands between the top bar and the event log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Screen {
-    /// Ramp and hold: rig, protocol, plots, what is known.
+    /// A protocol: rig, parameters, plots, what is known.
     #[default]
     Run,
     /// Which model a recording needs.
@@ -18,11 +18,19 @@ pub enum Screen {
     Trade,
     /// What happens at the ends of every range.
     Extremes,
+    /// Which calibrations there are and what they are worth.
+    Calibration,
 }
 
 impl Screen {
     /// All, in the order of a day's work.
-    pub const ALL: [Self; 4] = [Self::Run, Self::Models, Self::Trade, Self::Extremes];
+    pub const ALL: [Self; 5] = [
+        Self::Run,
+        Self::Models,
+        Self::Trade,
+        Self::Extremes,
+        Self::Calibration,
+    ];
 
     /// Name on the rail.
     #[must_use]
@@ -32,16 +40,18 @@ impl Screen {
             Self::Models => "Models",
             Self::Trade => "Trade",
             Self::Extremes => "Extremes",
+            Self::Calibration => "Calibration",
         }
     }
 
     /// What it is for, for the rail's hint.
     const fn purpose(self) -> &'static str {
         match self {
-            Self::Run => "run a ramp and hold and fit it",
+            Self::Run => "run a protocol and see what comes of it",
             Self::Models => "how much model a recording needs",
             Self::Trade => "what accuracy costs on this machine",
             Self::Extremes => "what is right and what is refused at the ends of every range",
+            Self::Calibration => "volts to newtons: which calibrations there are",
         }
     }
 
@@ -53,6 +63,7 @@ impl Screen {
             Self::Models => Key::Num2,
             Self::Trade => Key::Num3,
             Self::Extremes => Key::Num4,
+            Self::Calibration => Key::Num5,
         }
     }
 }

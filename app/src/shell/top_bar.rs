@@ -12,6 +12,9 @@ use palpate_protocols::runner::{RunView, Snapshot};
 /// Height of the bar's content in points.
 pub const HEIGHT: f32 = 52.0;
 
+/// Width of the run's name and progress in points.
+const RUN_WIDTH: f32 = 226.0;
+
 /// Draws the bar. `specimen` is the one of the run in progress or of the form.
 pub fn top_bar_ui(
     ui: &mut Ui,
@@ -22,12 +25,12 @@ pub fn top_bar_ui(
 ) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
-        badge_ui(ui, activity, vec2(152.0, HEIGHT));
+        badge_ui(ui, activity, vec2(146.0, HEIGHT));
         ui.add_space(6.0);
         run_ui(ui, snapshot.run.as_ref(), specimen);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
             stop_ui(ui, is_motion_possible(snapshot), commands);
-            ui.add_space(6.0);
+            halt_ui(ui, commands);
             numbers_ui(ui, snapshot);
         });
     });
@@ -44,17 +47,30 @@ fn stop_ui(ui: &mut Ui, is_motion_possible: bool, commands: &mut Commands) {
     };
     let button = button
         .stroke(Stroke::new(2.0, tokens.alarm_fill))
-        .min_size(vec2(180.0, HEIGHT));
+        .min_size(vec2(176.0, HEIGHT));
     if ui.add(button).clicked() {
         commands.push(Command::Stop);
     }
 }
 
+/// The harder way to stop: no braking, and position zero is lost.
+fn halt_ui(ui: &mut Ui, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let button = Button::new("Halt  F11")
+        .fill(tokens.control)
+        .stroke(Stroke::new(1.0, tokens.alarm_fill))
+        .min_size(vec2(72.0, HEIGHT));
+    let hint = "cut the motion without braking; the axis must be homed again";
+    if ui.add(button).on_hover_text(hint).clicked() {
+        commands.push(Command::Halt);
+    }
+}
+
 fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let size = vec2(270.0, HEIGHT);
+    let size = vec2(RUN_WIDTH, HEIGHT);
     ui.allocate_ui_with_layout(size, Layout::top_down(Align::Min), |ui| {
-        ui.set_width(270.0);
+        ui.set_width(RUN_WIDTH);
         ui.spacing_mut().item_spacing.y = 2.0;
         let specimen = match specimen.trim() {
             "" => "specimen not named".to_string(),
@@ -76,11 +92,14 @@ fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {
 
 /// Where the run is and how long it goes on.
 fn run_line(run: &RunView) -> String {
-    let step = format!(
-        "step {} of {}",
-        (run.step_index + 1).min(run.steps.len()),
-        run.steps.len()
-    );
+    let step = match run.cycle_starts.last() {
+        Some((_, cycle)) if run.cycles > 1 => format!("cycle {cycle} of {}", run.cycles),
+        _ => format!(
+            "step {} of {}",
+            (run.step_index + 1).min(run.steps.len()),
+            run.steps.len()
+        ),
+    };
     match (&run.outcome, &run.holding) {
         (Some(outcome), _) => format!("{} after {}", outcome.ending, clock(run.now.seconds().0)),
         (None, Some(_)) => format!("{step}, waits for retract or close"),
@@ -109,10 +128,10 @@ fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
         .and_then(|derived| derived.force)
         .map(|force| force.0);
     let velocity = derived.map(|derived| derived.velocity.0);
-    number_ui(ui, "velocity v", "mm/s", number(velocity, 2), 116.0);
-    number_ui(ui, "position x", "mm", number(position, 3), 130.0);
-    number_ui(ui, "depth", "mm", number(depth, 3), 116.0);
-    number_ui(ui, "force F", "N", number(force, 3), 112.0);
+    number_ui(ui, "velocity v", "mm/s", number(velocity, 2), 110.0);
+    number_ui(ui, "position x", "mm", number(position, 3), 118.0);
+    number_ui(ui, "depth", "mm", number(depth, 3), 100.0);
+    number_ui(ui, "force F", "N", number(force, 3), 100.0);
 }
 
 /// A number of fixed decimals, or dashes where there is none. Minus zero is zero.

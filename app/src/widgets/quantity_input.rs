@@ -70,22 +70,6 @@ pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityFiel
     has_changed
 }
 
-/// Draws a labelled line of free text; true when it changed.
-pub fn text_ui(ui: &mut Ui, name: &str, text: &mut String) -> bool {
-    ui.horizontal(|ui| {
-        let label = form_label(ui, name);
-        let width = ui.available_width() - 10.0;
-        ui.add(
-            TextEdit::singleline(text)
-                .desired_width(width)
-                .char_limit(200),
-        )
-        .labelled_by(label.id)
-        .changed()
-    })
-    .inner
-}
-
 /// A label of fixed width, so that inputs stand in one column.
 pub fn form_label(ui: &mut Ui, name: &str) -> eframe::egui::Response {
     use eframe::egui::{Label, Layout, vec2};

@@ -51,6 +51,16 @@ fn shape_at(painter: &Painter, shape: Shape, center: Pos2, ink: Color32) {
             let rect = Rect::from_center_size(center, vec2(1.7 * r, 1.7 * r));
             painter.rect_filled(rect, CornerRadius::ZERO, ink);
         }
+        Shape::Bars => {
+            for x in [-0.85, 0.25] {
+                let bar = Rect::from_min_max(at(x, -0.9), at(x + 0.6, 0.9));
+                painter.rect_filled(bar, CornerRadius::ZERO, ink);
+            }
+        }
+        Shape::Question => {
+            let font = FontId::proportional(22.0);
+            painter.text(center, Align2::CENTER_CENTER, "?", font, ink);
+        }
         Shape::Triangle => {
             let corners = vec![at(-0.8, -1.0), at(1.0, 0.0), at(-0.8, 1.0)];
             painter.add(Ink::convex_polygon(corners, ink, Stroke::NONE));

@@ -13,6 +13,8 @@ pub enum Ask {
     Session,
     /// A table to compare models on.
     Table,
+    /// A protocol to run.
+    Protocol,
 }
 
 /// A dialog that may be open.
@@ -36,6 +38,10 @@ impl PathDialog {
             Ask::Table => dialog
                 .set_title("Table of a recording")
                 .add_filter("tables", &["csv", "tsv", "txt"])
+                .pick_file(),
+            Ask::Protocol => dialog
+                .set_title("Protocol")
+                .add_filter("protocols", &["toml"])
                 .pick_file(),
         };
         self.0.start(

@@ -45,6 +45,8 @@ pub(super) struct ActiveRun {
     force_peak: Option<Newtons>,
     events: VecDeque<LogLine>,
     phases: Arc<Vec<(f64, Phase)>>,
+    cycle_starts: Arc<Vec<(f64, u32)>>,
+    cycles: u32,
     time_use: BTreeMap<&'static str, u64>,
     /// Why the log failed, and whether the engine knows.
     log_failure: Option<String>,
@@ -65,6 +67,7 @@ impl ActiveRun {
         let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         let fidelity = FidelityMeter::new(&config.plan, &config.rig);
+        let cycles = config.plan.steps.iter().map(|planned| planned.cycle).max();
         Self {
             engine: Some(State::new(Arc::new(config))),
             preview,
@@ -84,6 +87,8 @@ impl ActiveRun {
             force_peak: None,
             events: VecDeque::new(),
             phases: Arc::new(Vec::new()),
+            cycle_starts: Arc::new(Vec::new()),
+            cycles: cycles.unwrap_or(0),
             time_use: BTreeMap::new(),
             log_failure: None,
             is_log_failure_told: false,
@@ -185,6 +190,15 @@ impl ActiveRun {
     fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
         let derived = state.derived();
         self.samples += 1;
+        let cycle = state.cycle();
+        if cycle > 0
+            && self
+                .cycle_starts
+                .last()
+                .is_none_or(|(_, last)| *last != cycle)
+        {
+            Arc::make_mut(&mut self.cycle_starts).push((now.seconds().0, cycle));
+        }
         if let Some(force) = derived.force {
             if self.force_peak.is_none_or(|peak| force > peak) {
                 self.force_peak = Some(force);
@@ -202,7 +216,7 @@ impl ActiveRun {
             force: derived.force.map(|force| force.0),
             depth: derived.depth.map(|depth| depth.0),
             phase: state.phase(),
-            cycle: state.cycle(),
+            cycle,
         };
         self.fidelity.row(&row);
         let result = self
@@ -355,6 +369,8 @@ impl ActiveRun {
             }),
             next_checkpoint: self.next_checkpoint(state, step_index),
             cycle: state.cycle(),
+            cycles: self.cycles,
+            cycle_starts: Arc::clone(&self.cycle_starts),
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
             outcome: self.outcome.clone(),

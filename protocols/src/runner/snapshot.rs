@@ -86,6 +86,10 @@ pub struct RunView {
     pub next_checkpoint: Option<(usize, String)>,
     /// Repeat of the measurement, from 1; 0 where nothing is measured.
     pub cycle: u32,
+    /// Repeats the plan measures; 0 or 1 where it is no series.
+    pub cycles: u32,
+    /// Session time in s at which each repeat began, with its number.
+    pub cycle_starts: Arc<Vec<(f64, u32)>>,
     /// Set while the run waits for retract or close after a stop.
     pub holding: Option<Outcome>,
     /// Whether a retract is possible now, or why not.

@@ -1,0 +1,279 @@
+//! The calibrations of the library: which there are, what the chosen one is worth, which is in use; and a new one
+//! from the last run.
+
+mod plots;
+
+use crate::command::{Command, Commands};
+use crate::report::calibration::Entry;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::quantity_input::form_label;
+use crate::widgets::reason_button::reason_button;
+use crate::workers::Job;
+use crate::workers::calibrations::{Shelved, Shown, keep, read};
+use eframe::egui::{Button, Context, Label, RichText, TextEdit, Ui, vec2};
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::Phase;
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::runner::RunView;
+use std::path::{Path, PathBuf};
+
+/// The screen's state.
+pub struct CalibrationScreen {
+    library: Result<PathBuf, String>,
+    /// The rig's own, which needs no library, and the rig's name.
+    own: (Calibration, String),
+    job: Job<Result<Shelved, String>>,
+    shelved: Option<Result<Shelved, String>>,
+    chosen: usize,
+    name: String,
+}
+
+/// What the screen must know of the rest of the window.
+pub struct Facts<'a> {
+    /// The calibration new sessions are read with.
+    pub in_use: &'a Calibration,
+    /// Whether a run is in progress or about to start.
+    pub is_busy: bool,
+    /// The last run.
+    pub run: Option<&'a RunView>,
+}
+
+/// Whether a run measured a calibration, or why not.
+pub fn can_keep(run: Option<&RunView>) -> Result<&Path, String> {
+    let has_weighed = |run: &&RunView| run.phases.iter().any(|(_, phase)| *phase == Phase::Weigh);
+    let Some(run) = run.filter(has_weighed) else {
+        return Err("the last run weighed nothing; measure first".into());
+    };
+    match &run.outcome {
+        None => Err("the run goes on".into()),
+        Some(outcome) if outcome.ending != EndingKind::Finish => {
+            Err("the last run did not finish; a calibration must be complete".into())
+        }
+        Some(_) => Ok(&run.folder),
+    }
+}
+
+impl CalibrationScreen {
+    /// A screen for the library, which is read when it is first shown.
+    #[must_use]
+    pub fn new(library: Result<PathBuf, String>, own: Calibration, rig: &str) -> Self {
+        Self {
+            library,
+            name: format!("cell of {rig}"),
+            own: (own, rig.to_owned()),
+            job: Job::default(),
+            shelved: None,
+            chosen: 0,
+        }
+    }
+
+    /// Reads the library, the first time.
+    pub fn shown(&mut self, ctx: &Context) {
+        if self.shelved.is_none() && !self.job.is_busy() {
+            let (library, own, ctx) = (self.library.clone(), self.own.clone(), ctx.clone());
+            let work = move || library.map(|library| read(&library, own, None));
+            self.begin(work, ctx);
+        }
+    }
+
+    /// Stores what a run measured and reads the library again.
+    pub fn keep(&mut self, run: Option<&RunView>, ctx: &Context) {
+        let (Ok(folder), name) = (can_keep(run), self.name.trim().to_owned()) else {
+            return;
+        };
+        if name.is_empty() || self.job.is_busy() {
+            return;
+        }
+        let (library, own, ctx) = (self.library.clone(), self.own.clone(), ctx.clone());
+        let folder = folder.to_owned();
+        let work = move || {
+            let library = library?;
+            let id = keep(&library, &folder, &name);
+            Ok(read(&library, own, Some(id)))
+        };
+        self.begin(work, ctx);
+    }
+
+    fn begin(
+        &mut self,
+        work: impl FnOnce() -> Result<Shelved, String> + Send + 'static,
+        ctx: Context,
+    ) {
+        let done = move || ctx.request_repaint();
+        if let Err(err) = self.job.start("calibrations", work, done) {
+            self.shelved = Some(Err(format!("the library cannot be read: {err}")));
+        }
+    }
+
+    /// Fetches what was read.
+    pub fn poll(&mut self) {
+        if let Some(answer) = self.job.poll() {
+            if let Ok(Shelved {
+                kept: Some(Ok(id)),
+                shown,
+                ..
+            }) = &answer
+            {
+                let place = shown.iter().position(|one| one.entry.id == *id);
+                self.chosen = place.unwrap_or(0);
+            }
+            self.shelved = Some(answer);
+        }
+    }
+
+    fn shown_one(&self) -> Option<&Shown> {
+        self.shelved.as_ref()?.as_ref().ok()?.shown.get(self.chosen)
+    }
+
+    /// The chosen calibration, if it may be used now, or why not.
+    pub fn usable(&self, facts: &Facts<'_>) -> Result<&Calibration, String> {
+        let one = self.shown_one().ok_or("the library is not read yet")?;
+        if facts.is_busy {
+            return Err("a run is in progress".into());
+        }
+        if one.calibration == *facts.in_use {
+            return Err("it is in use".into());
+        }
+        if let Err(reason) = &one.told {
+            return Err(reason.clone());
+        }
+        Ok(&one.calibration)
+    }
+
+    /// Which there are, and what to do with them.
+    pub fn left_ui(&mut self, ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        section_ui(ui, "Calibrations");
+        let quiet = |text: String| RichText::new(text).color(tokens.text_quiet).small();
+        let alarm = |text: &str| RichText::new(text).color(tokens.alarm_text);
+        match &self.shelved {
+            None => {
+                ui.label(quiet("reading the library".into()));
+            }
+            Some(Err(reason)) => {
+                ui.add(Label::new(alarm(reason)).wrap());
+            }
+            Some(Ok(shelved)) => {
+                for (index, one) in shelved.shown.iter().enumerate() {
+                    let is_chosen = index == self.chosen;
+                    let button = Button::selectable(is_chosen, &one.entry.id)
+                        .min_size(vec2(ui.available_width(), 24.0));
+                    if ui.add(button).clicked() {
+                        self.chosen = index;
+                    }
+                    let is_used = one.calibration == *facts.in_use;
+                    ui.add(Label::new(quiet(state_words(&one.entry, is_used))).wrap());
+                }
+                for reason in &shelved.unreadable {
+                    ui.add(Label::new(alarm(reason).small()).wrap());
+                }
+            }
+        }
+        ui.add_space(8.0);
+        let verdict = self.usable(facts).map(|_| ());
+        if reason_button(ui, "Use this one  F6", vec2(150.0, 30.0), &verdict) {
+            commands.push(Command::Work);
+        }
+        section_ui(ui, "A new one");
+        let button = Button::new("Measure...").min_size(vec2(150.0, 28.0));
+        if ui.add_enabled(!facts.is_busy, button).clicked() {
+            commands.push(Command::MeasureCalibration);
+        }
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "name");
+            let input = TextEdit::singleline(&mut self.name)
+                .desired_width(ui.available_width() - 10.0)
+                .char_limit(80);
+            ui.add(input).labelled_by(label.id);
+        });
+        let verdict = match (can_keep(facts.run), self.name.trim().is_empty()) {
+            (Err(reason), _) => Err(reason),
+            (Ok(_), true) => Err("give it a name first".into()),
+            (Ok(_), false) => Ok(()),
+        };
+        if reason_button(ui, "Keep the last run's", vec2(150.0, 28.0), &verdict) {
+            commands.push(Command::KeepCalibration);
+        }
+        if let Some(Ok(shelved)) = &self.shelved {
+            match &shelved.kept {
+                Some(Ok(id)) => {
+                    ui.add(Label::new(quiet(format!("kept as {id}"))).wrap());
+                }
+                Some(Err(reason)) => {
+                    ui.add(Label::new(alarm(&format!("Not kept: {reason}"))).wrap());
+                }
+                None => {}
+            }
+        }
+    }
+
+    /// The chosen one as plots.
+    pub fn middle_ui(&self, ui: &mut Ui) {
+        if let Some(Shown {
+            told: Ok((_, curves)),
+            ..
+        }) = self.shown_one()
+        {
+            plots::curves_ui(ui, curves);
+        }
+    }
+
+    /// What is known of the chosen one.
+    pub fn right_ui(&self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        section_ui(ui, "Chosen calibration");
+        let Some(one) = self.shown_one() else {
+            ui.label(RichText::new("none yet").color(tokens.text_quiet));
+            return;
+        };
+        let document = &one.calibration;
+        let taken = document.taken_at.clone();
+        for (name, value) in [
+            ("name", document.name.clone()),
+            ("source", document.source.clone()),
+            ("taken", taken.unwrap_or_else(|| "not stated".into())),
+            ("rig", document.rig.clone()),
+            ("operator", document.operator.clone()),
+            ("curve", document.curve.to_string()),
+        ] {
+            if !value.is_empty() {
+                fact_ui(ui, name, value);
+            }
+        }
+        let findings = match &one.told {
+            Ok((told, _)) => &told.quality.findings,
+            Err(reason) => {
+                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+                return;
+            }
+        };
+        section_ui(ui, "Findings");
+        if findings.is_empty() {
+            ui.label(RichText::new("none").color(tokens.text_quiet));
+        }
+        for finding in findings {
+            ui.add(Label::new(finding).wrap());
+        }
+        if !one.doubts.is_empty() {
+            section_ui(ui, "Doubts");
+        }
+        for doubt in &one.doubts {
+            ui.add(Label::new(RichText::new(doubt).color(tokens.alarm_text)).wrap());
+        }
+    }
+}
+
+/// Age and state, and whether new sessions are read with it.
+fn state_words(entry: &Entry, is_used: bool) -> String {
+    let mut words = Vec::new();
+    if is_used {
+        words.push("IN USE".to_owned());
+    }
+    if !entry.rig.is_empty() {
+        words.push(format!("rig {}", entry.rig));
+    }
+    words.extend(entry.age_days.map(|age| format!("{age} d old")));
+    words.push(entry.state());
+    words.join(", ")
+}

@@ -1,0 +1,191 @@
+//! A parameter of a protocol as it is typed, and a thing that is told about the session.
+
+use palpate_model::rig::RigDescription;
+use palpate_model::units::MmPerS;
+use palpate_protocols::file::{Given, Kind, Parameter, What};
+use palpate_sessions::about::Key;
+
+/// A parameter being typed.
+#[derive(Clone, Debug)]
+pub struct ParamField {
+    /// What may be typed.
+    pub parameter: Parameter,
+    /// As typed.
+    pub text: String,
+    /// The unit of a number that is typed without one; empty where there is none.
+    pub unit: &'static str,
+    /// The value as the protocol takes it, or what is wrong in one sentence.
+    pub value: Result<String, String>,
+}
+
+impl ParamField {
+    /// The field of a parameter, with its usual value.
+    #[must_use]
+    pub fn new(parameter: Parameter) -> Self {
+        let usual = &parameter.default;
+        let first = match &usual.what {
+            What::List(items) => items.first().unwrap_or(usual),
+            _ => usual,
+        };
+        let (number, unit) = split(first, parameter.kind);
+        let text = match &usual.what {
+            What::None => String::new(),
+            What::List(_) => usual.text.clone(),
+            _ => number,
+        };
+        Self {
+            value: Ok(usual.text.clone()),
+            text,
+            unit,
+            parameter,
+        }
+    }
+
+    /// Reads the text again; a speed must be one that the rig makes.
+    pub fn check(&mut self, rig: &RigDescription) {
+        self.value = self.read(rig);
+    }
+
+    fn read(&self, rig: &RigDescription) -> Result<String, String> {
+        let text = self.text.trim();
+        if text.is_empty() {
+            return match (&self.parameter.default.what, self.parameter.kind) {
+                (What::None, _) => Ok("none".into()),
+                (_, Kind::Text) => Err("some words are missing here".into()),
+                _ => Err(format!(
+                    "a number is missing here; write it like {}",
+                    self.parameter.default.text
+                )),
+            };
+        }
+        let value = if self.parameter.is_list {
+            let items: Vec<String> = text.split(',').map(|one| self.with_unit(one)).collect();
+            items.join(", ")
+        } else {
+            self.with_unit(text)
+        };
+        let given = self.parameter.read(&value)?;
+        check_speeds(&given, rig)?;
+        Ok(value)
+    }
+
+    /// A bare number gets the unit that stands beside the field.
+    fn with_unit(&self, text: &str) -> String {
+        let text = text.trim();
+        if self.unit.is_empty() || text.parse::<f64>().is_err() {
+            text.to_owned()
+        } else {
+            format!("{text} {}", self.unit)
+        }
+    }
+
+    /// What it is, its range and where the usual value comes from, a line each.
+    #[must_use]
+    pub fn hint(&self) -> String {
+        let one = &self.parameter;
+        let mut lines = vec![one.about.clone()];
+        let unit = one.kind.unit();
+        let range = match (one.min, one.max) {
+            (Some(min), Some(max)) => Some(format!("from {min} to {max} {unit}")),
+            (Some(min), None) => Some(format!("from {min} {unit}")),
+            (None, Some(max)) => Some(format!("up to {max} {unit}")),
+            (None, None) => None,
+        };
+        lines.extend(range.map(|range| range.trim_end().to_owned()));
+        let source = match one.source.as_str() {
+            "" => String::new(),
+            source => format!(" ({source})"),
+        };
+        lines.push(format!("usual: {}{source}", one.default.text));
+        lines.join("\n")
+    }
+}
+
+fn check_speeds(given: &Given, rig: &RigDescription) -> Result<(), String> {
+    match &given.what {
+        What::Number(Kind::Speed, speed) => rig.check_speed(MmPerS(*speed)),
+        What::List(items) => items.iter().try_for_each(|item| check_speeds(item, rig)),
+        _ => Ok(()),
+    }
+}
+
+/// The number of a value as it was written, and its unit.
+fn split(given: &Given, kind: Kind) -> (String, &'static str) {
+    let units = kind.units();
+    let parts = units.iter().find_map(|unit| {
+        let number = given.text.strip_suffix(unit)?.trim();
+        number.parse::<f64>().ok()?;
+        Some((number.to_owned(), *unit))
+    });
+    parts.unwrap_or_else(|| (given.text.clone(), kind.unit()))
+}
+
+/// Something that is told about the session.
+#[derive(Clone, Debug)]
+pub struct ToldField {
+    /// What.
+    pub key: &'static Key,
+    /// As typed; empty where nothing is told.
+    pub text: String,
+    /// What is wrong with it.
+    pub error: Option<String>,
+    /// Whether the protocol asks for it.
+    pub is_asked: bool,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_drivers::sim::SimSettings;
+    use palpate_protocols::file::built_in;
+
+    fn fields(name: &str) -> Vec<ParamField> {
+        let protocol = built_in(name).unwrap().unwrap();
+        protocol
+            .parameters
+            .into_iter()
+            .map(ParamField::new)
+            .collect()
+    }
+
+    fn read(field: &ParamField, text: &str) -> Result<String, String> {
+        let rig = palpate_drivers::open("sim", &SimSettings::default()).unwrap();
+        let mut field = field.clone();
+        field.text = text.into();
+        field.check(rig.description());
+        field.value
+    }
+
+    #[test]
+    fn a_bare_number_has_the_unit_beside_the_field() {
+        let of = |name: &str, field: &str| {
+            let mut all = fields(name).into_iter();
+            all.find(|one| one.parameter.name == field).unwrap()
+        };
+        let rest = of("preconditioning", "rest");
+        assert_eq!((rest.text.as_str(), rest.unit), ("3", "min"));
+        assert_eq!(read(&rest, " 2 ").unwrap(), "2 min");
+        assert_eq!(read(&rest, "5 s").unwrap(), "5 s");
+        let masses = of("load-cell-calibration", "masses");
+        assert_eq!(read(&masses, "500, 0.6 kg").unwrap(), "500 g, 0.6 kg");
+        let unload = of("ramp-hold", "unload");
+        assert_eq!((unload.text.as_str(), unload.unit), ("", "mm/s"));
+        assert_eq!(read(&unload, "").unwrap(), "none");
+        let speeds = of("validation-series", "speeds");
+        for (field, text, words) in [
+            (&speeds, "0.75, 900", "outside what rig sim makes"),
+            (&rest, "", "a number is missing"),
+            (&rest, "soon", "\"soon\" is not a time"),
+            (&rest, "0,5", "write a point, not a comma"),
+        ] {
+            let reason = read(field, text).unwrap_err();
+            assert!(reason.contains(words), "{text}: {reason}");
+        }
+        assert!(rest.hint().contains("usual: 3 min (source thesis"));
+        assert!(
+            of("preconditioning", "cycles")
+                .hint()
+                .contains("from 1 to 200")
+        );
+    }
+}

@@ -1,0 +1,185 @@
+//! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
+
+use super::form::{Checked, ProtocolForm};
+use crate::command::{Command, Commands};
+use crate::plots::course::course_ui;
+use crate::theme::Tokens;
+use crate::workers::Job;
+use crate::workers::path_dialog::Ask;
+use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
+use palpate_protocols::file::{BUILT_IN, Protocol};
+use palpate_sessions::text::read_if_present;
+use std::path::{Path, PathBuf};
+
+/// What stands in the middle of the run screen.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Middle {
+    /// The list of protocols.
+    Choose,
+    /// Depth and force as they are expected.
+    Course,
+    /// What was measured.
+    #[default]
+    Measured,
+}
+
+/// Views and their names.
+const VIEWS: [(Middle, &str); 3] = [
+    (Middle::Choose, "Protocols"),
+    (Middle::Course, "Expected course"),
+    (Middle::Measured, "Measured"),
+];
+
+/// Draws the switch between the views.
+pub fn views_ui(ui: &mut Ui, shown: Middle, commands: &mut Commands) {
+    ui.horizontal(|ui| {
+        for (view, name) in VIEWS {
+            if ui.selectable_label(shown == view, name).clicked() {
+                commands.push(Command::View(view));
+            }
+        }
+    });
+    ui.separator();
+}
+
+/// A file read, or why not.
+type Text = (PathBuf, Result<String, String>);
+
+/// The list of protocols and the file being read.
+pub struct Chooser {
+    built_in: Vec<Protocol>,
+    typed: String,
+    reading: Job<Text>,
+}
+
+impl Default for Chooser {
+    fn default() -> Self {
+        let texts = BUILT_IN.iter().map(|(_, text)| Protocol::read(text));
+        Self {
+            built_in: texts.filter_map(Result::ok).collect(),
+            typed: String::new(),
+            reading: Job::default(),
+        }
+    }
+}
+
+impl Chooser {
+    /// Reads the file whose path is typed; the answer is polled.
+    pub fn read_typed(&mut self, ctx: &Context) -> std::io::Result<()> {
+        let path = PathBuf::from(self.typed.trim());
+        self.read(&path, ctx)
+    }
+
+    /// Reads a file on a thread of its own.
+    pub fn read(&mut self, path: &Path, ctx: &Context) -> std::io::Result<()> {
+        self.typed = path.display().to_string();
+        let (path, ctx) = (path.to_owned(), ctx.clone());
+        let work = move || {
+            let text = match read_if_present(&path) {
+                Ok(Some(text)) => Ok(text),
+                Ok(None) => Err(format!(
+                    "there is no file {}; choose another",
+                    path.display()
+                )),
+                Err(err) => Err(format!(
+                    "{} cannot be read ({err}); give a text file",
+                    path.display()
+                )),
+            };
+            (path, text)
+        };
+        let done = move || ctx.request_repaint();
+        self.reading.start("protocol-file", work, done)
+    }
+
+    /// A file that was read, once.
+    pub fn poll(&mut self) -> Option<Text> {
+        self.reading.poll()
+    }
+
+    /// Draws the list, the field for a file and what is wrong with the file chosen.
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        form: &ProtocolForm,
+        is_dialog_open: bool,
+        commands: &mut Commands,
+    ) {
+        ScrollArea::vertical()
+            .id_salt("protocols")
+            .auto_shrink(false)
+            .show(ui, |ui| {
+                self.file_ui(ui, is_dialog_open, commands);
+                if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
+                    mistakes_ui(ui, file, form);
+                }
+                ui.add_space(8.0);
+                ui.label(RichText::new("Built-in protocols").heading().strong());
+                for protocol in &self.built_in {
+                    let chosen = form.protocol.as_ref().ok();
+                    let is_chosen = form.file.is_none()
+                        && chosen.is_some_and(|chosen| chosen.name == protocol.name);
+                    protocol_ui(ui, protocol, is_chosen, commands);
+                }
+            });
+    }
+
+    fn file_ui(&mut self, ui: &mut Ui, is_dialog_open: bool, commands: &mut Commands) {
+        ui.label(RichText::new("A protocol of your own").heading().strong());
+        ui.horizontal(|ui| {
+            let label = ui.label("protocol file");
+            let width = (ui.available_width() - 250.0).max(120.0);
+            let input = TextEdit::singleline(&mut self.typed)
+                .desired_width(width)
+                .char_limit(4096)
+                .hint_text("a TOML file");
+            ui.add(input).labelled_by(label.id);
+            let can_open = !self.typed.trim().is_empty() && !self.reading.is_busy();
+            if ui.add_enabled(can_open, Button::new("Open")).clicked() {
+                commands.push(Command::OpenProtocol);
+            }
+            let button = Button::new("Open a protocol file...");
+            if ui.add_enabled(!is_dialog_open, button).clicked() {
+                commands.push(Command::Choose(Ask::Protocol));
+            }
+        });
+    }
+}
+
+fn mistakes_ui(ui: &mut Ui, file: &Path, form: &ProtocolForm) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let head = format!("{} cannot run as it is:", file.display());
+    ui.label(RichText::new(head).strong());
+    for problem in form.problems() {
+        let text = RichText::new(problem.to_string()).color(tokens.alarm_text);
+        ui.add(Label::new(text).wrap());
+    }
+    let words = "Correct the file and press Open again.";
+    ui.label(RichText::new(words).color(tokens.text_quiet));
+}
+
+fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let name = BUILT_IN.iter().find(|(name, _)| *name == protocol.name);
+    ui.add_space(4.0);
+    let button = Button::selectable(is_chosen, RichText::new(&protocol.title).strong())
+        .min_size(vec2(280.0, 24.0));
+    if let (true, Some((name, _))) = (ui.add(button).clicked(), name) {
+        commands.push(Command::TakeProtocol(name));
+    }
+    let about = RichText::new(&protocol.about).color(tokens.text_quiet);
+    ui.add(Label::new(about).wrap())
+        .on_hover_text(&protocol.source);
+}
+
+/// Draws what the plan is expected to do.
+pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    match checked {
+        Some(checked) => course_ui(ui, &checked.outline),
+        None => {
+            let words = "nothing to draw until the protocol and its values are right";
+            ui.label(RichText::new(words).color(tokens.text_quiet));
+        }
+    }
+}

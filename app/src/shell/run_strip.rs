@@ -1,0 +1,158 @@
+//! What an operator may ask of the run in progress, on every screen: pause, resume, finish early, abort, and the
+//! answer to a prompt. Stop and halt have their own place in the top bar.
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use crate::widgets::uncertain::clock;
+use eframe::egui::{Button, Frame, Label, Margin, RichText, Stroke, Ui, vec2};
+use palpate_model::rig::Phase;
+use palpate_protocols::engine::{Operator, PauseView};
+use palpate_protocols::runner::{PromptView, RunView};
+
+/// Something to ask of a run that goes on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wish {
+    /// Pause as soon as it is sound.
+    Pause,
+    /// Pause at the next place where that spoils nothing.
+    PauseAfter,
+    /// Go on, or forget a pause that was asked for.
+    Resume,
+    /// While paused: leave out what is left to measure.
+    Finish,
+    /// Stop and mark the run failed.
+    Abort,
+    /// The prompt's work is done.
+    Confirm,
+    /// The prompt's work will not be done.
+    Decline,
+}
+
+impl Wish {
+    /// The operator's choice that asks for it, or why it cannot be asked for now.
+    pub fn operator(self, run: &RunView) -> Result<Operator, String> {
+        let is_paused = matches!(run.pause, PauseView::Paused { .. });
+        let refuse = |reason: &str| Err(reason.to_owned());
+        if !is_controllable(run) {
+            return refuse("the run has stopped");
+        }
+        match (self, run.pause) {
+            (Self::Pause | Self::PauseAfter, _) if is_paused => refuse("the run is paused"),
+            (Self::Pause, _) => Ok(Operator::Pause),
+            (Self::PauseAfter, PauseView::Pending { .. }) => refuse("a pause is asked for already"),
+            (Self::PauseAfter, _) => match &run.next_checkpoint {
+                Some((step_index, _)) => Ok(Operator::PauseAfter {
+                    step_index: *step_index,
+                }),
+                None => refuse("no checkpoint is ahead"),
+            },
+            (Self::Resume, PauseView::None) => refuse("the run is not paused"),
+            (
+                Self::Resume,
+                PauseView::Paused {
+                    no_resume: Some(why),
+                },
+            ) => refuse(why),
+            (Self::Resume, _) => Ok(Operator::Resume),
+            (Self::Finish, _) if is_paused => Ok(Operator::Finish),
+            (Self::Finish, _) => refuse("pause first"),
+            (Self::Abort, _) => Ok(Operator::Abort),
+            (Self::Confirm | Self::Decline, _) if run.prompt.is_none() => {
+                refuse("nothing is asked for")
+            }
+            (Self::Confirm, _) => Ok(Operator::Confirm),
+            (Self::Decline, _) => Ok(Operator::Decline),
+        }
+    }
+}
+
+/// Whether the run goes on and takes wishes: not stopping, stopped or ended.
+#[must_use]
+pub fn is_controllable(run: &RunView) -> bool {
+    run.outcome.is_none() && run.holding.is_none() && run.phase != Phase::Stopped
+}
+
+/// Draws the buttons, the state of the pause in words, and the prompt if there is one.
+pub fn run_strip_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.horizontal(|ui| {
+        let after = match &run.next_checkpoint {
+            Some((_, name)) if name.starts_with("after ") => format!("Pause {name}  F4"),
+            Some((_, name)) => format!("Pause at {name}  F4"),
+            None => "Pause at a checkpoint  F4".into(),
+        };
+        for (wish, text) in [
+            (Wish::Pause, "Pause  F7"),
+            (Wish::PauseAfter, after.as_str()),
+            (Wish::Resume, "Resume  F9"),
+            (Wish::Finish, "Finish early  F10"),
+            (Wish::Abort, "Abort"),
+        ] {
+            wish_ui(ui, run, wish, text, commands);
+        }
+        let words = RichText::new(pause_words(run)).color(tokens.text_quiet);
+        ui.add(Label::new(words).wrap());
+    });
+    if let Some(prompt) = &run.prompt {
+        prompt_ui(ui, run, prompt, commands);
+    }
+}
+
+fn wish_ui(ui: &mut Ui, run: &RunView, wish: Wish, text: &str, commands: &mut Commands) {
+    let verdict = wish.operator(run);
+    let button = Button::new(text).min_size(vec2(0.0, 28.0));
+    let response = ui.add_enabled(verdict.is_ok(), button);
+    let response = match verdict {
+        Err(reason) => response.on_disabled_hover_text(reason),
+        Ok(_) => response,
+    };
+    if response.clicked() {
+        commands.push(Command::Wish(wish));
+    }
+}
+
+/// How the run stands, and why a button beside it is closed.
+fn pause_words(run: &RunView) -> String {
+    match run.pause {
+        PauseView::Paused { no_resume: None } => {
+            "Paused. Resume goes on; finish early leaves out the rest and retracts.".into()
+        }
+        PauseView::Paused {
+            no_resume: Some(why),
+        } => format!("Paused. No resume: {why}. Finish early keeps the data and retracts."),
+        PauseView::Pending { step_index } => match &run.next_checkpoint {
+            Some((index, name)) if *index == step_index => {
+                format!("Will pause {name}; resume takes that back.")
+            }
+            _ => format!(
+                "Will pause behind step {}; resume takes that back.",
+                step_index + 1
+            ),
+        },
+        PauseView::None if run.next_checkpoint.is_none() => {
+            "Running. No checkpoint is ahead; resume and finish early need a pause first.".into()
+        }
+        PauseView::None => "Running. Resume and finish early need a pause first.".into(),
+    }
+}
+
+/// The question, not in the way of anything: motion can still be stopped and panels still be used.
+fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Commands) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    Frame::new()
+        .fill(tokens.canvas)
+        .stroke(Stroke::new(2.0, tokens.notice_fill))
+        .inner_margin(Margin::symmetric(10, 8))
+        .show(ui, |ui| {
+            ui.horizontal(|ui| {
+                wish_ui(ui, run, Wish::Confirm, "Done  F2", commands);
+                wish_ui(ui, run, Wish::Decline, "Not done", commands);
+                let left = match run.pause {
+                    PauseView::Paused { .. } => "the pause stops this clock".into(),
+                    _ => format!("{} left to answer", clock(prompt.time_left.0)),
+                };
+                ui.label(RichText::new(left).color(tokens.text_quiet));
+                ui.add(Label::new(RichText::new(&prompt.message).size(17.0).strong()).wrap());
+            });
+        });
+}

@@ -1,0 +1,88 @@
+//! The library's calibrations read, judged and added to, away from the window's thread.
+
+use crate::report::calibration::{Entry, Told};
+use crate::report::calibration_plot::Curves;
+use palpate_model::calibration::{Bench, Calibration};
+use palpate_protocols::programme::calibration_of;
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::{Session, Shelf, age_days, save_calibration, supersede};
+use std::path::Path;
+
+/// What the library holds, judged, and what was just added to it.
+pub struct Shelved {
+    /// The rig's own first, then those of the library by id.
+    pub shown: Vec<Shown>,
+    /// Why others cannot be read.
+    pub unreadable: Vec<String>,
+    /// Id of the one just stored, or why it was not.
+    pub kept: Option<Result<String, String>>,
+}
+
+/// One calibration with all that is told of it.
+pub struct Shown {
+    /// Its line in the list.
+    pub entry: Entry,
+    /// The document.
+    pub calibration: Calibration,
+    /// What it is like and its curves, or why it makes none.
+    pub told: Result<(Told, Curves), String>,
+    /// What speaks against using it on the rig it is said to be of.
+    pub doubts: Vec<String>,
+}
+
+impl Shown {
+    fn of(entry: Entry, calibration: Calibration, rig: &str) -> Self {
+        let told = Told::of(&calibration).and_then(|told| {
+            let curves = Curves::of(&calibration, &told)?;
+            Ok((told, curves))
+        });
+        Self {
+            told: told.map_err(|err| err.to_string()),
+            doubts: calibration.doubts(&Bench {
+                rig,
+                age_days: entry.age_days,
+                ..Bench::default()
+            }),
+            entry,
+            calibration,
+        }
+    }
+}
+
+/// Reads the library. `own` is the rig's own calibration.
+pub fn read(
+    library: &Path,
+    own: (Calibration, String),
+    kept: Option<Result<String, String>>,
+) -> Shelved {
+    let (own, rig) = own;
+    let now = wall_now();
+    let shelf = Shelf::open(library);
+    let entry = Entry::built_in(&own);
+    let mut shown = vec![Shown {
+        // What comes with the rig needs no date.
+        doubts: Vec::new(),
+        ..Shown::of(entry, own, &rig)
+    }];
+    shown.extend(shelf.kept.iter().map(|kept| {
+        let age = age_days(&kept.calibration, now.into());
+        Shown::of(Entry::of(&shelf, kept, age), kept.calibration.clone(), &rig)
+    }));
+    Shelved {
+        shown,
+        unreadable: shelf.unreadable.iter().map(ToString::to_string).collect(),
+        kept,
+    }
+}
+
+/// Stores the calibration a session measured, in the place of the one in force for its rig; tells its id.
+pub fn keep(library: &Path, session: &Path, name: &str) -> Result<String, String> {
+    let session = Session::open(session).map_err(|err| err.to_string())?;
+    let calibration = calibration_of(&session, name).map_err(|err| err.to_string())?;
+    let shelf = Shelf::open(library);
+    let kept = match shelf.in_force(&calibration.rig) {
+        Some(old) => supersede(library, &old.id, &calibration),
+        None => save_calibration(library, &calibration),
+    };
+    kept.map(|kept| kept.id).map_err(|err| err.to_string())
+}

@@ -1,0 +1,242 @@
+//! Protocols in the window by accessible name: chosen, filled in, paused, resumed, finished early, answered.
+
+use eframe::egui::Key;
+use egui_kittest::kittest::Queryable;
+use palpate_model::rig::Phase;
+use palpate_protocols::engine::{EndingKind, PauseView};
+use palpate_protocols::runner::{RunView, TimeScale};
+use palpate_sessions::{Session, Shelf};
+use palpate_tests::flow::Flow;
+
+/// Opens the list of protocols and takes one by its title.
+fn choose(flow: &mut Flow, title: &str) {
+    flow.click("Change protocol...");
+    flow.click(title);
+    flow.window.run_steps(2);
+}
+
+/// Waits until the run on the screen is as wanted.
+fn wait_for(flow: &mut Flow, what: &str, is_so: impl Fn(&RunView) -> bool) {
+    flow.wait(what, |window| {
+        window.state().snapshot().run.as_ref().is_some_and(&is_so)
+    });
+    flow.window.run_steps(2);
+}
+
+fn is_paused(run: &RunView) -> bool {
+    matches!(run.pause, PauseView::Paused { .. })
+}
+
+/// Fills in a short preconditioning of so many cycles.
+fn short_preconditioning(flow: &mut Flow, cycles: &str) {
+    for (name, text) in [
+        ("operator", "Ada"),
+        ("specimen", "S-014"),
+        ("specimen.source", "pig stomach"),
+        ("cycles", cycles),
+        ("rest", "2 s"),
+        ("depth", "5"),
+        ("speed", "3"),
+    ] {
+        flow.type_into(name, text);
+    }
+}
+
+#[test]
+fn preconditioning_is_paused_after_a_cycle_and_resumed() {
+    let mut flow = Flow::open(TimeScale::Factor(10.0));
+    choose(&mut flow, "Preconditioning to a depth");
+    assert!(flow.says("Depth as planned"));
+    assert!(!flow.is_enabled("Start  F5"));
+    assert!(flow.says("fill in operator, specimen, specimen.source first"));
+    short_preconditioning(&mut flow, "2");
+    assert!(flow.is_enabled("Start  F5"));
+    flow.click("Start  F5");
+    wait_for(&mut flow, "the first cycle", |run| run.cycle == 1);
+    assert!(flow.says("cycle 1 of 2"));
+    flow.window.check_accessibility();
+    assert!(!flow.is_enabled("Resume  F9") && flow.says("need a pause first"));
+    flow.click("Pause after cycle 1  F4");
+    flow.window.run_steps(2);
+    wait_for(&mut flow, "the pause", is_paused);
+    assert!(flow.says("State: PAUSED") && flow.says("Resume goes on"));
+    assert!(!flow.is_enabled("Pause  F7"));
+    assert!(flow.is_enabled("Stop motion  F12") && flow.is_enabled("Halt  F11"));
+    flow.click("Resume  F9");
+    wait_for(&mut flow, "the second cycle", |run| run.cycle == 2);
+    assert!(!flow.says("State: PAUSED") && flow.says("cycle 2 of 2"));
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    let cycles: Vec<u32> = run.cycle_starts.iter().map(|(_, cycle)| *cycle).collect();
+    assert_eq!(cycles, [1, 2]);
+    let session = Session::open(&flow.sessions()[0]).unwrap();
+    assert_eq!(session.manifest.plan["name"], "preconditioning");
+    assert_eq!(session.manifest.specimen, "S-014");
+}
+
+#[test]
+fn an_interrupted_ramp_is_not_resumed_but_finished_early() {
+    let mut flow = Flow::open(TimeScale::Factor(10.0));
+    choose(&mut flow, "Preconditioning to a depth");
+    short_preconditioning(&mut flow, "3");
+    flow.window.key_press(Key::F5);
+    flow.wait_for_phase(Phase::Ramp);
+    flow.window.key_press(Key::F7);
+    wait_for(&mut flow, "the pause", is_paused);
+    assert!(!flow.is_enabled("Resume  F9"));
+    assert!(flow.says("an interrupted indentation is another experiment"));
+    // The key does no more than the button.
+    flow.window.key_press(Key::F9);
+    flow.window.run_steps(10);
+    assert!(flow.run().is_some_and(|run| is_paused(&run)));
+    // On another screen the run can still be steered.
+    flow.click("Trade");
+    flow.window.key_press(Key::F10);
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    assert!(run.cycle_starts.len() == 1 && run.derived.depth.is_some_and(|depth| depth.0 < 0.0));
+}
+
+#[test]
+fn abort_and_halt_end_a_paused_run() {
+    for (control, ending) in [
+        ("Abort", EndingKind::Abort),
+        ("Halt  F11", EndingKind::Halt),
+        ("Stop motion  F12", EndingKind::Stop),
+    ] {
+        let mut flow = Flow::open(TimeScale::Factor(20.0));
+        flow.click("Start  F5");
+        flow.wait_for_phase(Phase::Contact);
+        flow.click("Pause  F7");
+        wait_for(&mut flow, "the pause", is_paused);
+        flow.click(control);
+        wait_for(&mut flow, "the axis at rest", |run| {
+            run.holding.is_some() || run.outcome.is_some()
+        });
+        assert!(!flow.says("State: PAUSED"), "{control}");
+        if flow.run().is_some_and(|run| run.outcome.is_none()) {
+            flow.click("Close session");
+        }
+        let run = flow.wait_for_end();
+        assert_eq!(run.outcome.unwrap().ending, ending, "{control}");
+    }
+}
+
+#[test]
+fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
+    let mut flow = Flow::open(TimeScale::Max);
+    let file = flow.folder.path().join("own.toml");
+    let good = "palpate = 1\nname = \"own\"\nversion = 1\ntitle = \"My own\"\nabout = \"Press and wait.\"\nsource = \"mine\"\n[parameters]\ndeep = { default = \"4 mm\", about = \"how deep\" }\n[procedure]\nsteps = [\n  { do = \"self-test\" },\n  { do = \"home\" },\n  { do = \"tare\" },\n  { do = \"find-contact\" },\n  { do = \"ramp\", speed = \"3 mm/s\", depth = \"$deep\" },\n  { do = \"hold\", for = \"1 s\" },\n  { do = \"retract\" },\n]\n";
+    std::fs::write(&file, good.replace("\"ramp\"", "\"rmap\"")).unwrap();
+    flow.click("Change protocol...");
+    assert!(!flow.is_enabled("Open"));
+    flow.type_into("protocol file", &file.display().to_string());
+    flow.click("Open");
+    flow.wait("the file", |window| {
+        let mut found = window.query_all_by_label_contains("line 15: ");
+        found.next().is_some()
+    });
+    assert!(flow.says("did you mean 'ramp'?"));
+    assert!(!flow.is_enabled("Start  F5"));
+    assert!(flow.says("correct the protocol file or choose another"));
+    std::fs::write(&file, good).unwrap();
+    flow.click("Open");
+    flow.wait("the corrected file", |window| {
+        window.query_by_label("deep").is_some() || window.query_all_by_label("deep").count() > 1
+    });
+    flow.type_into("deep", "1e4");
+    assert!(!flow.is_enabled("Start  F5"));
+    assert!(flow.says("line 15") || flow.says("step 5, ramp"));
+    flow.type_into("deep", "3");
+    flow.click("Start  F5");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    assert_eq!(run.plan_name, "own");
+}
+
+#[test]
+fn a_calibration_is_measured_by_prompts_kept_and_used() {
+    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    flow.click("Calibration");
+    flow.wait("the library", |window| {
+        let mut found = window.query_all_by_label_contains("(built in)");
+        found.next().is_some()
+    });
+    flow.window.check_accessibility();
+    assert!(!flow.is_enabled("Use this one  F6") && flow.says("it is in use"));
+    assert!(!flow.is_enabled("Keep the last run's"));
+    flow.click("Measure...");
+    for (name, text) in [
+        ("operator", "Ada"),
+        ("masses", "240, 540 g"),
+        ("heaviest", "1040"),
+        ("repeats", "1"),
+    ] {
+        flow.type_into(name, text);
+    }
+    flow.click("Start  F5");
+    // None, two up, the heaviest, two down, none.
+    for round in 0..7 {
+        wait_for(&mut flow, "a question or the end", |run| {
+            run.prompt.is_some() || run.outcome.is_some()
+        });
+        assert!(flow.says("State: YOUR TURN"), "round {round}");
+        assert!(flow.says("left to answer") && flow.is_enabled("Not done"));
+        if round == 0 {
+            flow.window.check_accessibility();
+            assert!(flow.says("take everything off the load cell"));
+            flow.click("Done  F2");
+        } else {
+            flow.window.key_press(Key::F2);
+            flow.window.run_steps(2);
+        }
+        wait_for(&mut flow, "the reading", |run| run.prompt.is_none());
+    }
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    flow.window.run_steps(2);
+    flow.click("Keep this calibration");
+    flow.wait("the calibration kept", |window| {
+        let mut found = window.query_all_by_label_contains("kept as ");
+        found.next().is_some()
+    });
+    flow.window.run_steps(2);
+    let shelf = Shelf::open(flow.folder.path());
+    let kept = shelf.in_force("sim").unwrap();
+    assert!(flow.says(&kept.id) && flow.says("in force"));
+    assert!(flow.is_enabled("Use this one  F6"));
+    flow.window.key_press(Key::F6);
+    flow.window.run_steps(3);
+    assert!(flow.says("IN USE, rig sim"));
+    // What is in use reads the next session.
+    flow.click("Run");
+    choose(&mut flow, "Ramp and hold");
+    flow.type_into("hold", "1");
+    flow.click("Start  F5");
+    flow.wait_for_phase(Phase::Home);
+    flow.click("Stop motion  F12");
+    wait_for(&mut flow, "the stop", |run| run.holding.is_some());
+    flow.click("Close session");
+    let run = flow.wait_for_end();
+    let session = Session::open(&run.folder).unwrap();
+    assert_eq!(session.manifest.calibration["name"], "cell of sim");
+}
+
+#[test]
+fn a_declined_prompt_stops_and_keeps_nothing() {
+    let mut flow = Flow::open(TimeScale::Factor(30.0));
+    choose(&mut flow, "Load-cell calibration");
+    flow.type_into("operator", "Ada");
+    flow.click("Start  F5");
+    wait_for(&mut flow, "the question", |run| run.prompt.is_some());
+    flow.click("Not done");
+    wait_for(&mut flow, "the stop", |run| run.holding.is_some());
+    flow.click("Close session");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
+    assert!(
+        flow.window
+            .query_by_label("Keep this calibration")
+            .is_none()
+    );
+}
