@@ -208,7 +208,11 @@ fn carry_out(
         is_acknowledged: how.acknowledge,
         to_acknowledge: gate.to_acknowledge(),
         after_stop: AfterStop::Close,
-        answers: Answers::Confirm,
+        answers: if bench.rig.is_virtual() {
+            Answers::Confirm
+        } else {
+            Answers::Operator
+        },
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(
@@ -252,10 +256,14 @@ fn carry_out(
 
 /// What today's daily check of the rig says to a plan.
 pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
-    let library = library_folder().ok();
     let name = &bench.rig.description().name;
-    let is_virtual = bench.rig.is_virtual();
-    Gate::of(plan, library.as_deref(), name, is_virtual, wall_now()).map_err(Failure::failed)
+    gate_of(plan, name, bench.rig.is_virtual()).map_err(Failure::failed)
+}
+
+/// The same for a rig by its name.
+pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<Gate, String> {
+    let library = library_folder().ok();
+    Gate::of(plan, library.as_deref(), rig, is_virtual, wall_now()).map_err(|err| err.to_string())
 }
 
 /// Runs a request and tells its progress; the snapshot is that of the ended run.
