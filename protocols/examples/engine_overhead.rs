@@ -9,9 +9,15 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Ack, AxisStatus, Limits, Reading, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::{Config, Effect, Input, Operator, State, step};
+use palpate_protocols::file::built_in;
 use palpate_protocols::plans::{HoldRate, Plan, Step};
+use palpate_protocols::preview::preview;
 use palpate_protocols::runner::Stopwatch;
+use std::collections::BTreeMap;
 use std::sync::Arc;
+
+/// Previews timed, for a mean.
+const PREVIEWS: u32 = 1000;
 
 fn rig() -> RigDescription {
     RigDescription {
@@ -68,9 +74,21 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         None => 24,
     };
     let curve = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0)).curve()?;
+    let limits = Limits::for_travel(Position(150.0));
+    let ten_cycles = built_in("preconditioning").ok_or("no preconditioning")?;
+    let ten_cycles = ten_cycles.map_err(|_| "preconditioning has mistakes")?;
+    let ten_cycles = ten_cycles.plan(&BTreeMap::new()).map_err(|_| "no plan")?;
+    let watch = Stopwatch::start();
+    let expected = (0..PREVIEWS).map(|_| {
+        preview(&ten_cycles, &rig(), &limits, &curve, true)
+            .expected
+            .0
+    });
+    let expected = expected.fold(0.0, f64::max);
+    let preview_us = watch.seconds() / f64::from(PREVIEWS) * 1e6;
     let config = Config {
         rig: rig(),
-        limits: Limits::for_travel(Position(150.0)),
+        limits,
         curve,
         plan: plan(hours),
         is_homed: true,
@@ -87,7 +105,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
             let reading = Reading {
                 tick,
                 counts: None,
-                volts: Volts(1.28 + if tick.is_multiple_of(2) { 1e-4 } else { -1e-4 }),
+                // A signal that lives, and steps often enough that no hold is ever steady.
+                volts: Volts(1.28 + 1e-4 * (tick % 2) as f64 + 1e-3 * (tick / 1000 % 7) as f64),
                 pulses: 0,
                 status: AxisStatus::MOTOR_ON,
             };
@@ -107,6 +126,8 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         memory.extend(resident_kb());
     }
     let text = serde_json::json!({
+        "preview_of_ten_cycles_us": preview_us,
+        "ten_cycles_s": expected,
         "hours": hours,
         "samples": tick,
         "ns_per_sample_first_hour": per_hour.first(),
