@@ -235,7 +235,8 @@ impl WorkbenchApp {
                     .id_salt("results")
                     .auto_shrink(false)
                     .show(ui, |ui| {
-                        results_ui(ui, &self.snapshot, self.refit(), commands)
+                        let loops = self.plots.loops();
+                        results_ui(ui, &self.snapshot, self.refit(), loops, commands);
                     });
             });
         CentralPanel::default()
