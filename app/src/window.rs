@@ -268,8 +268,8 @@ impl WorkbenchApp {
                 .id_salt("rig_and_protocol")
                 .auto_shrink(false)
                 .show(ui, |ui| {
-                    rig_ui(ui, &self.snapshot, &self.ports, commands);
                     protocol_ui(ui, &mut self.form, &facts, commands);
+                    rig_ui(ui, &self.snapshot, &self.ports, commands);
                 });
         });
     }
