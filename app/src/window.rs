@@ -238,7 +238,8 @@ impl WorkbenchApp {
                     .id_salt("results")
                     .auto_shrink(false)
                     .show(ui, |ui| {
-                        results_ui(ui, &self.snapshot, self.refit(), commands)
+                        let loops = self.plots.loops();
+                        results_ui(ui, &self.snapshot, self.refit(), loops, commands);
                     });
             });
         CentralPanel::default()
@@ -270,8 +271,8 @@ impl WorkbenchApp {
                 .id_salt("rig_and_protocol")
                 .auto_shrink(false)
                 .show(ui, |ui| {
-                    rig_ui(ui, &self.snapshot, &self.ports, commands);
                     protocol_ui(ui, &mut self.form, &facts, commands);
+                    rig_ui(ui, &self.snapshot, &self.ports, commands);
                 });
         });
     }

@@ -69,6 +69,8 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
     let cycles: Vec<u32> = run.cycle_starts.iter().map(|(_, cycle)| *cycle).collect();
     assert_eq!(cycles, [1, 2]);
+    flow.window.run_steps(2);
+    assert!(flow.says("Peak of each cycle") && flow.says("% of the first"));
     let session = Session::open(&flow.sessions()[0]).unwrap();
     assert_eq!(session.manifest.plan["name"], "preconditioning");
     assert_eq!(session.manifest.specimen, "S-014");

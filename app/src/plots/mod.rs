@@ -8,4 +8,4 @@ mod points;
 pub mod residual;
 pub(crate) mod style;
 
-pub use points::PlotCache;
+pub use points::{CycleLoop, PlotCache};

@@ -103,12 +103,27 @@ impl Series {
     }
 }
 
+/// Loops drawn at once. More lie on each other and cost time in every frame.
+const LOOPS_MAX: usize = 24;
+
+/// One repeat of a series in the plot over depth.
+#[derive(Debug, Default)]
+pub struct CycleLoop {
+    /// Its number, from 1.
+    pub cycle: u32,
+    pub(super) series: Series,
+    /// Its highest force and where it was; `None` before there is one.
+    pub peak: Option<TracePoint>,
+}
+
 /// What both plots draw from.
 #[derive(Debug, Default)]
 pub struct PlotCache {
     trace: Option<Arc<LiveTrace>>,
     pub(super) force_time: Series,
     pub(super) force_depth: Series,
+    /// One for each repeat; empty where nothing is repeated.
+    loops: Vec<CycleLoop>,
     pub(super) samples_per_bucket: u64,
     conversions: u64,
     /// Of the forces drawn; `None` where their calibration cannot tell.
@@ -135,15 +150,21 @@ impl PlotCache {
             .as_ref()
             .is_some_and(|trace| Arc::ptr_eq(trace, &run.trace))
         {
-            self.convert(&run.trace);
+            let starts: &[_] = if run.cycles > 1 {
+                &run.cycle_starts
+            } else {
+                &[]
+            };
+            self.convert(&run.trace, starts);
         }
     }
 
-    fn convert(&mut self, trace: &Arc<LiveTrace>) {
+    fn convert(&mut self, trace: &Arc<LiveTrace>, starts: &[(f64, u32)]) {
         let points = trace.points();
         self.force_time.set(&points, |point| [point.t, point.force]);
         self.force_depth
             .set(&points, |point| [point.depth, point.force]);
+        self.set_loops(&points, starts);
         self.force_time.set_band(self.uncertainty.as_ref());
         self.force_depth.set_band(self.uncertainty.as_ref());
         self.samples_per_bucket = trace.samples_per_bucket();
@@ -151,11 +172,49 @@ impl PlotCache {
         self.trace = Some(Arc::clone(trace));
     }
 
+    /// Cuts the history at the times at which repeats began.
+    fn set_loops(&mut self, points: &[TracePoint], starts: &[(f64, u32)]) {
+        let place = |t: f64| points.partition_point(|point| point.t < t);
+        self.loops.clear();
+        for (i, (start, cycle)) in starts.iter().enumerate() {
+            let end = starts
+                .get(i + 1)
+                .map_or(points.len(), |(end, _)| place(*end));
+            let own = &points[place(*start).min(end)..end];
+            let mut series = Series::default();
+            if starts.len() - i <= LOOPS_MAX {
+                series.set(own, |point| [point.depth, point.force]);
+            }
+            let known = own.iter().filter(|point| point.force.is_finite());
+            self.loops.push(CycleLoop {
+                cycle: *cycle,
+                series,
+                peak: known.copied().max_by(|a, b| a.force.total_cmp(&b.force)),
+            });
+        }
+    }
+
+    /// The repeats so far, oldest first; empty where nothing is repeated.
+    #[must_use]
+    pub fn loops(&self) -> &[CycleLoop] {
+        &self.loops
+    }
+
+    /// The loops that are drawn, oldest first.
+    pub(super) fn drawn_loops(&self) -> &[CycleLoop] {
+        &self.loops[self.loops.len().saturating_sub(LOOPS_MAX)..]
+    }
+
     /// What a reader of the plots must know: that they are thinned or cut. `None` if they are whole.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
         if self.force_time.is_cut || self.force_depth.is_cut {
             return Some("too many gaps to draw; the session holds everything".into());
+        }
+        if self.loops.len() > LOOPS_MAX {
+            return Some(format!(
+                "over depth the newest {LOOPS_MAX} cycles are drawn"
+            ));
         }
         (self.samples_per_bucket > 1)
             .then(|| format!("thinned to min/max of {} samples", self.samples_per_bucket))
@@ -236,7 +295,7 @@ mod tests {
         }
         let thesis = Calibration::thesis();
         let mut cache = PlotCache::for_calibration(&thesis);
-        cache.convert(&Arc::new(trace.clone()));
+        cache.convert(&Arc::new(trace.clone()), &[]);
         let sigma = ForceUncertainty::of(&thesis)
             .unwrap()
             .sigma(Newtons(4.0))
@@ -248,8 +307,36 @@ mod tests {
         // What states nothing has no band.
         let line = Calibration::linear("line", palpate_model::units::Volts(1.0), 0.1, Newtons(9.0));
         let mut cache = PlotCache::for_calibration(&line);
-        cache.convert(&Arc::new(trace));
+        cache.convert(&Arc::new(trace), &[]);
         assert_eq!(cache.force_time.bands("band").count(), 0);
+    }
+
+    #[test]
+    fn every_cycle_is_a_loop_with_its_own_peak() {
+        let mut trace = LiveTrace::new(1000);
+        for i in 0..30 {
+            let (cycle, step) = (i / 10, i % 10);
+            let force = f64::from(step) - 0.1 * f64::from(cycle);
+            let depth = Depth(f64::from(step));
+            trace.push(Seconds(f64::from(i)), depth, Newtons(force));
+        }
+        let mut cache = PlotCache::default();
+        cache.convert(&Arc::new(trace), &[(0.0, 1), (10.0, 2), (20.0, 3)]);
+        let peaks: Vec<f64> = cache
+            .loops()
+            .iter()
+            .map(|one| one.peak.unwrap().force)
+            .collect();
+        assert_eq!(peaks, [9.0, 8.9, 8.8]);
+        assert!(cache.loops().iter().all(|one| one.series.lengths() == [10]));
+        let starts: Vec<(f64, u32)> = (0..30).map(|i| (f64::from(i), i + 1)).collect();
+        let trace = cache.trace.clone().unwrap();
+        cache.convert(&trace, &starts);
+        assert_eq!(
+            (cache.loops().len(), cache.drawn_loops().len()),
+            (30, LOOPS_MAX)
+        );
+        assert!(cache.remark().unwrap().contains("newest 24"));
     }
 
     #[test]
@@ -257,12 +344,12 @@ mod tests {
         let mut trace = LiveTrace::new(4);
         let mut cache = PlotCache::default();
         trace.push(Seconds(0.0), Depth(0.0), Newtons(1.0));
-        cache.convert(&Arc::new(trace.clone()));
+        cache.convert(&Arc::new(trace.clone()), &[]);
         assert_eq!(cache.remark(), None);
         for i in 1..40 {
             trace.push(Seconds(f64::from(i)), Depth(0.0), Newtons(1.0));
         }
-        cache.convert(&Arc::new(trace));
+        cache.convert(&Arc::new(trace), &[]);
         assert!(
             cache
                 .remark()

@@ -38,7 +38,7 @@ pub(crate) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.
-pub(super) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
+pub(crate) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
     let (low, high) = input.bounds;
     let span = high - low;
     if !(span.is_finite() && span > 0.0) {

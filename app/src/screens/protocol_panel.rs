@@ -40,10 +40,13 @@ pub fn protocol_ui(
         // Locked while a run goes on, but still to be read: it says what is running.
         ui.visuals_mut().disabled_alpha = LOCKED_ALPHA;
         ui.add_enabled_ui(!facts.is_busy, |ui| {
+            for field in form.told.iter_mut().filter(|one| is_shown(one)) {
+                one_told_ui(ui, field);
+            }
             for field in &mut form.fields {
                 parameter_ui(ui, field);
             }
-            told_ui(ui, &mut form.told);
+            more_told_ui(ui, &mut form.told);
             folder_ui(ui, form, facts, commands);
         });
     });
@@ -114,12 +117,13 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     }
 }
 
-/// Everything that can be told: what is always there, what the protocol asks for, and the rest folded away.
-fn told_ui(ui: &mut Ui, told: &mut [ToldField]) {
-    let is_shown = |one: &ToldField| one.is_asked || ALWAYS.contains(&one.key.name);
-    for field in told.iter_mut().filter(|one| is_shown(one)) {
-        one_told_ui(ui, field);
-    }
+/// Whether it stands in the form: it always does, or the protocol asks for it.
+fn is_shown(field: &ToldField) -> bool {
+    field.is_asked || ALWAYS.contains(&field.key.name)
+}
+
+/// What else can be told, folded away.
+fn more_told_ui(ui: &mut Ui, told: &mut [ToldField]) {
     let is_told = |one: &ToldField| !is_shown(one) && !one.text.is_empty();
     let count = told.iter().filter(|one| is_told(one)).count();
     let title = match count {

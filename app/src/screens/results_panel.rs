@@ -4,6 +4,7 @@ use super::after_stop::after_stop_ui;
 use super::exact_fit::exact_ui;
 use super::parameters::parameters_ui;
 use crate::command::Commands;
+use crate::plots::CycleLoop;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::step_mark::{StepState, step_ui};
@@ -12,8 +13,17 @@ use eframe::egui::{Label, RichText, Ui};
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::runner::{RunView, Snapshot};
 
+/// Cycles listed; the session has them all.
+const CYCLES_SHOWN: usize = 12;
+
 /// Draws the panel.
-pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, commands: &mut Commands) {
+pub fn results_ui(
+    ui: &mut Ui,
+    snapshot: &Snapshot,
+    refit: Refit<'_>,
+    loops: &[CycleLoop],
+    commands: &mut Commands,
+) {
     let run = snapshot.run.as_ref();
     if let Some(run) = run {
         after_stop_ui(ui, run, commands);
@@ -34,6 +44,7 @@ pub fn results_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, commands: 
             ui.label(RichText::new("no run yet").color(tokens.text_quiet));
         }
     }
+    cycles_ui(ui, loops);
     if let Some(run) = run {
         section_ui(ui, "Steps");
         steps_ui(ui, run);
@@ -81,6 +92,33 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
         "saved",
         format!("through {:.1} s", run.saved_through.seconds().0),
     );
+}
+
+/// The peak of every cycle and how far it is from the first; nothing where nothing is repeated.
+fn cycles_ui(ui: &mut Ui, loops: &[CycleLoop]) {
+    let Some(first) = loops.first().and_then(|one| one.peak) else {
+        return;
+    };
+    section_ui(ui, "Peak of each cycle");
+    let left_out = loops.len().saturating_sub(CYCLES_SHOWN);
+    if left_out > 0 {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let words = format!("the first {left_out} are in the session");
+        ui.label(RichText::new(words).color(tokens.text_quiet).small());
+    }
+    for one in loops.iter().skip(left_out) {
+        if let Some(peak) = one.peak {
+            let change = match one.cycle {
+                1 => String::new(),
+                _ => format!(
+                    ", {:+.1} % of the first",
+                    100.0 * (peak.force / first.force - 1.0)
+                ),
+            };
+            let words = format!("{:.3} N at {:.2} mm{change}", peak.force, peak.depth);
+            fact_ui(ui, &format!("cycle {}", one.cycle), words);
+        }
+    }
 }
 
 fn steps_ui(ui: &mut Ui, run: &RunView) {

@@ -17,9 +17,9 @@ pub enum Middle {
     /// The list of protocols.
     Choose,
     /// Depth and force as they are expected.
+    #[default]
     Course,
     /// What was measured.
-    #[default]
     Measured,
 }
 

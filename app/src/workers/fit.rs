@@ -7,6 +7,7 @@ use eframe::egui::Context;
 use egui_plot::PlotPoint;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
+use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::runner::{RunView, Stopwatch};
@@ -119,7 +120,7 @@ pub struct Refitter {
 impl Refitter {
     /// Fetches an answer, and starts when a run has ended.
     pub fn update(&mut self, ctx: &Context, run: Option<&RunView>) {
-        let ended = run.filter(|run| run.outcome.is_some());
+        let ended = run.filter(|run| run.outcome.is_some() && has_ramp(run));
         let folder = ended.map(|run| &run.folder);
         let is_asked = self.asked.as_ref().map(|(asked, _)| asked) == folder;
         if self.job.is_busy() {
@@ -170,6 +171,11 @@ impl Refitter {
             Some(Err(reason)) => Refit::Refused(reason),
         }
     }
+}
+
+/// Whether a run indented anything: nothing else can be fitted.
+fn has_ramp(run: &RunView) -> bool {
+    run.phases.iter().any(|(_, phase)| *phase == Phase::Ramp)
 }
 
 fn exact(folder: &Path) -> Result<ExactFit, String> {

@@ -162,8 +162,10 @@ impl CalibrationScreen {
                     if ui.add(button).clicked() {
                         self.chosen = index;
                     }
+                    // The rig's own stands first.
+                    let is_own = index == 0;
                     let is_used = one.calibration == *facts.in_use;
-                    ui.add(Label::new(quiet(state_words(&one.entry, is_used))).wrap());
+                    ui.add(Label::new(quiet(state_words(&one.entry, is_own, is_used))).wrap());
                 }
                 for reason in &shelved.unreadable {
                     ui.add(Label::new(alarm(reason).small()).wrap());
@@ -265,7 +267,7 @@ impl CalibrationScreen {
 }
 
 /// Age and state, and whether new sessions are read with it.
-fn state_words(entry: &Entry, is_used: bool) -> String {
+fn state_words(entry: &Entry, is_own: bool, is_used: bool) -> String {
     let mut words = Vec::new();
     if is_used {
         words.push("IN USE".to_owned());
@@ -274,6 +276,10 @@ fn state_words(entry: &Entry, is_used: bool) -> String {
         words.push(format!("rig {}", entry.rig));
     }
     words.extend(entry.age_days.map(|age| format!("{age} d old")));
-    words.push(entry.state());
+    words.push(if is_own {
+        "comes with the rig".into()
+    } else {
+        entry.state()
+    });
     words.join(", ")
 }

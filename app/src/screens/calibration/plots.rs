@@ -1,10 +1,13 @@
 //! The chosen calibration as four plots over force: signal, residual, slope and uncertainty.
 
-use crate::plots::style::quiet;
+use crate::plots::style::{quiet, round_marks};
 use crate::report::calibration_plot::Curves;
 use crate::theme::Tokens;
 use eframe::egui::{Color32, Id, RichText, Ui, vec2};
 use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoints, Points, Span};
+
+/// Labelled steps across one plot, at most: it is half as wide as those of the run.
+const STEPS_ACROSS: f64 = 4.0;
 
 /// Draws all four in the space there is, two beside each other.
 pub fn curves_ui(ui: &mut Ui, curves: &Curves) {
@@ -60,6 +63,7 @@ fn one_ui(
     let tokens = Tokens::of(ui.visuals().dark_mode);
     quiet(Plot::new(title), tokens)
         .x_axis_label("force (N)")
+        .x_grid_spacer(|input| round_marks(input, STEPS_ACROSS))
         .include_y(0.0)
         .link_axis(Id::unique("calibration_force"), [true, false])
         .label_formatter(|hover| match hover {
@@ -70,7 +74,7 @@ fn one_ui(
         })
         .show(ui, |plot_ui| {
             for [from, to] in &curves.flat {
-                let span = Span::new("flat stretch", *from..=*to);
+                let span = Span::new("flat", *from..=*to);
                 plot_ui.span(span.fill(tokens.phase_band).border_color(tokens.line));
             }
             for (i, (line, ink)) in lines.iter().enumerate() {
