@@ -125,8 +125,10 @@ fn parse() -> Result<Cli, ExitCode> {
             Output::text()
         };
         let text = err.to_string();
-        let sentence = text.lines().next().unwrap_or_default();
-        let sentence = sentence.strip_prefix("error: ").unwrap_or(sentence);
+        // What is missing stands in lines of its own under the first.
+        let lines = text.lines().take_while(|line| !line.trim().is_empty());
+        let sentence = lines.map(str::trim).collect::<Vec<_>>().join(" ");
+        let sentence = sentence.strip_prefix("error: ").unwrap_or(&sentence);
         output.error(&format!("{sentence}; see 'palpate --help'"), 2);
         ExitCode::from(2)
     })

@@ -95,7 +95,16 @@ pub(super) fn run(
         indenter: how.indenter.clone(),
         gate: &|plan| {
             let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
-            Ok(gate.to_acknowledge())
+            match gate.to_acknowledge() {
+                // What the file accepts are forces, not a rig that failed.
+                reasons if how.acknowledge => Ok(reasons),
+                reasons => match reasons.first() {
+                    Some(reason) => Err(format!(
+                        "{reason}; or add --acknowledge to run all the same, which is recorded"
+                    )),
+                    None => Ok(reasons),
+                },
+            }
         },
     };
     let done = watch(&programme, &checksum(&text), laboratory, output)?;
@@ -123,7 +132,9 @@ fn watch(
     });
     bar.finish_and_clear();
     result.map_err(|err| match err {
-        RunError::Progress(_) | RunError::Refused { .. } => Failure::usage(err),
+        RunError::Folder(_) | RunError::Progress(_) | RunError::Refused { .. } => {
+            Failure::usage(err)
+        }
         err => Failure::failed(err),
     })
 }

@@ -56,6 +56,12 @@ impl BaseSearch {
         let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
         let filtered = noise.0 / (FILTER_SAMPLES as f64).sqrt();
         let criterion = Newtons(plan.criterion.0.max(CRITERION_SIGMAS * filtered));
+        if plan.approach_speed > FindBase::SPEED_MAX || plan.pass_speed > FindBase::SPEED_MAX {
+            return Err(format!(
+                "a base is stiff; touch it at {} at most",
+                FindBase::SPEED_MAX
+            ));
+        }
         if criterion >= plan.pass_force {
             return Err(format!(
                 "noise of {noise:.3} would need a criterion of {criterion:.3}, no less than the {:.3} of the second touch; quieten the signal",

@@ -2,7 +2,7 @@
 
 use super::context::{Context, Progress};
 use super::input::{EndingKind, Record, Recovery};
-use super::state::{Activity, Then};
+use super::state::{Activity, Power, Then};
 use super::{step, stop};
 use crate::plans::OnFailure;
 use palpate_model::Nanos;
@@ -47,6 +47,12 @@ pub(super) fn on_reading(cx: &mut Context<'_>, then: Then, deadline: Nanos) {
     match then {
         Then::Begin(index) => step::begin(cx, index),
         Then::Pause(next) => cx.state.activity = Activity::Paused { next },
+        // Where the axis is already, or with the motor off, there is no way back to go.
+        Then::Return(index)
+            if cx.state.pulses == cx.state.step_from || cx.state.power != Power::Enabled =>
+        {
+            step::begin(cx, index);
+        }
         Then::Return(index) => match cx.move_to_pulses(cx.state.step_from, RETURN_SPEED) {
             Ok(()) if cx.state.in_flight.is_some() => {
                 cx.state.activity = Activity::Between {

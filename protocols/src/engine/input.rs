@@ -58,6 +58,8 @@ pub enum Operator {
     Resume,
     /// While paused: leave out what is left to measure and do the plan's last retract.
     Finish,
+    /// Nobody watches: a pause that cannot go on by itself ends the run.
+    Leave,
     /// The prompt is answered: what it asked for is done.
     Confirm,
     /// The prompt is answered: it will not be done.

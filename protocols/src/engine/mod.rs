@@ -31,7 +31,7 @@ mod weigh;
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
 pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, Tare};
-pub use step::step;
+pub use step::{PLAN_COMPLETE, step};
 
 /// Version of the engine's decisions. Raised whenever a recorded session could decide
 /// differently; replay compares decisions only where versions match.

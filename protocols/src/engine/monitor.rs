@@ -2,6 +2,7 @@
 
 use super::context::Context;
 use super::input::{EndingKind, Record};
+use super::pause::By;
 use super::state::Activity;
 use super::{pause, stop};
 use crate::plans::{Action, Source};
@@ -57,7 +58,7 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     });
     match action {
         Action::Note => {}
-        Action::Pause => pause::now(cx, message),
+        Action::Pause => pause::now(cx, By::Monitor, message),
         Action::Stop => stop::begin(cx, EndingKind::Stop, message),
         Action::Retract => {
             cx.state.leaves_after_stop = true;

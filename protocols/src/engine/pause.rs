@@ -43,8 +43,20 @@ fn kind(active: &Active, step: Option<&Step>) -> Kind {
     }
 }
 
+/// Who wants a pause.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum By {
+    Operator,
+    Monitor,
+}
+
 /// Pauses as soon as it is sound.
-pub(super) fn now(cx: &mut Context<'_>, reason: String) {
+pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
+    let is_paused =
+        matches!(cx.state.activity, Activity::Paused { .. }) || cx.state.pause.is_some();
+    // What a person asked for, only a person ends.
+    cx.state.is_paused_by_operator =
+        by == By::Operator || is_paused && cx.state.is_paused_by_operator;
     let step_index = cx.state.step_index;
     let kind = match &cx.state.activity {
         Activity::Step(active) => kind(active, cx.state.current_step()),
@@ -68,7 +80,7 @@ pub(super) fn now(cx: &mut Context<'_>, reason: String) {
                 no_resume: None,
             });
         }
-        Kind::Complete => after(cx, step_index),
+        Kind::Complete => await_end_of(cx, step_index),
         Kind::Repeat => halt_motion(cx, Ok(step_index), reason),
         Kind::Measure(why) => halt_motion(cx, Err(why), reason),
     }
@@ -81,10 +93,15 @@ pub(super) fn after(cx: &mut Context<'_>, step_index: usize) {
         cx.state.activity,
         Activity::Starting | Activity::Step(_) | Activity::Between { .. }
     );
-    if !is_ahead || !is_running {
-        let reason = "that place of the plan is not ahead".to_owned();
+    if !is_ahead || !is_running || cx.state.pause == Some(Pause::Extended) {
+        let reason = "that place of the plan is not ahead, or the run is paused".to_owned();
         return cx.record(Record::Refused { reason });
     }
+    cx.state.is_paused_by_operator = true;
+    await_end_of(cx, step_index);
+}
+
+fn await_end_of(cx: &mut Context<'_>, step_index: usize) {
     cx.state.pause = Some(Pause::After(step_index));
     cx.record(Record::PausePending { step_index });
 }
@@ -142,7 +159,7 @@ pub(super) fn resume(cx: &mut Context<'_>) {
 pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
     let can_resume = matches!(cx.state.activity, Activity::Paused { next: Ok(_), .. })
         || cx.state.pause == Some(Pause::Extended);
-    if can_resume {
+    if can_resume && !cx.state.is_paused_by_operator {
         resume(cx);
     }
 }
@@ -169,6 +186,8 @@ pub(super) fn finish(cx: &mut Context<'_>) {
     let last = (cx.state.step_index + 1..steps.len())
         .rev()
         .find(is_retract);
+    // Before contact there is nothing to leave.
+    let last = last.filter(|_| cx.state.contact.is_some());
     let next = last.unwrap_or(steps.len());
     step::begin(cx, next);
 }

@@ -6,6 +6,7 @@ use super::state::{Active, Activity, Pause};
 use super::{pause, step, stop};
 use crate::plans::{OnTimeout, Prompt, Step};
 use palpate_model::Nanos;
+use palpate_model::rig::HandAction;
 
 pub(super) fn begin(cx: &mut Context<'_>, prompt: &Prompt) -> Active {
     cx.record(Record::Prompted {
@@ -50,6 +51,10 @@ pub(super) fn answer(cx: &mut Context<'_>, answer: Answer) {
                 Some(Step::Prompt(prompt)) => prompt.hand,
                 _ => None,
             };
+            if matches!(hand, Some(HandAction::Mount { .. })) {
+                // What was known of the tissue was known of another specimen.
+                cx.state.contact = None;
+            }
             cx.effects.extend(hand.map(Effect::ByHand));
             // Who answers goes on.
             if cx.state.pause == Some(Pause::Extended) {

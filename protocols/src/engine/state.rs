@@ -209,6 +209,8 @@ pub struct State {
     pub(super) in_flight: Option<MoveInFlight>,
     pub(super) live: Option<LiveEstimate>,
     pub(super) pause: Option<Pause>,
+    /// Whether a person asked for the pause: only a person ends it then.
+    pub(super) is_paused_by_operator: bool,
     /// Where the step in progress began, and how often it was tried again.
     pub(super) step_from: i64,
     pub(super) retries: u32,
@@ -242,6 +244,7 @@ impl State {
             in_flight: None,
             live: None,
             pause: None,
+            is_paused_by_operator: false,
             step_from: 0,
             retries: 0,
             monitors: vec![Condition::default(); config.plan.monitors.len()],
@@ -345,7 +348,14 @@ impl State {
     /// Whether a plan runs that never energised the motor, such as a calibration: no command can move the axis.
     #[must_use]
     pub fn is_unpowered(&self) -> bool {
-        self.power == Power::Stopped && matches!(self.activity, Activity::Step(_))
+        self.power == Power::Stopped
+            && matches!(
+                self.activity,
+                Activity::Starting
+                    | Activity::Step(_)
+                    | Activity::Between { .. }
+                    | Activity::Paused { .. }
+            )
     }
 
     /// Whether the axis may be moving or about to move.
@@ -366,7 +376,8 @@ impl State {
     #[must_use]
     pub fn holding(&self) -> Option<&Outcome> {
         match &self.activity {
-            Activity::Holding { ending } => Some(ending),
+            // A monitor wanted the probe out: it leaves first.
+            Activity::Holding { ending } if !self.leaves_after_stop => Some(ending),
             _ => None,
         }
     }

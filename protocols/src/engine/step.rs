@@ -10,16 +10,17 @@ use super::input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record}
 use super::interlock::{self, Interlock, Trip};
 use super::load::Loading;
 use super::self_test::SelfTest;
-use super::state::{Active, Activity, Derived, Pause, Power, State};
+use super::state::{Active, Activity, Derived, Pause, PauseView, Power, State};
 use super::tare::Taring;
 use super::weigh::Weighing;
 use super::{between, monitor, pause, prompt, stop};
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{
-    Ack, AxisStatus, Fault, Oscillation, PathTracker, Phase, Reading, RigCommand,
-};
+use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Phase, Reading, RigCommand};
 use palpate_model::units::{Depth, Position, Seconds};
+
+/// Why a run ended that did everything its plan wanted.
+pub const PLAN_COMPLETE: &str = "the plan is complete";
 
 /// Longest time a controller may take to acknowledge a command.
 const ACK_MAX: Seconds = Seconds(1.0);
@@ -160,7 +161,7 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
         let reason = if cx.state.is_finished_early {
             "finished early by the operator"
         } else {
-            "the plan is complete"
+            PLAN_COMPLETE
         };
         return stop::end(
             cx,
@@ -223,7 +224,9 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             clearance_mm,
         } => {
             let target = position_of(cx, Depth(-clearance_mm))?;
-            cx.move_to(Position(target.0.max(0.0)), speed)?;
+            // A way out never leads further in.
+            let out = target.0.clamp(0.0, cx.state.derived.position.0.max(0.0));
+            cx.move_to(Position(out), speed)?;
             Active::Move
         }
         Step::Jog { distance_mm, speed } => {
@@ -242,13 +245,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             Active::Move
         }
         Step::Sine(ref sine) => {
-            let rig = &cx.state.config.rig;
-            let command = Oscillation {
-                amplitude_pulses: (sine.amplitude_mm / rig.mm_per_pulse).round() as i64,
-                period_ticks: (1.0 / (sine.frequency_hz * rig.tick().0)).round() as u32,
-                cycles: sine.cycles,
-                acceleration: rig.acceleration,
-            };
+            let command = sine.command(&cx.state.config.rig);
             cx.oscillate(command)?;
             Active::Move
         }
@@ -344,7 +341,19 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
     }
 }
 
+/// The run is paused and nobody is there who could decide.
+fn leave(cx: &mut Context<'_>) {
+    let reason = match cx.state.pause() {
+        PauseView::Paused { no_resume } => no_resume.unwrap_or("what paused the run does not pass"),
+        _ => return,
+    };
+    let reason = format!("paused, and nobody is there to decide: {reason}");
+    stop::begin(cx, EndingKind::Stop, reason);
+}
+
 fn on_trip(cx: &mut Context<'_>, trip: Trip) {
+    // Nothing moves by itself on a reading that was just distrusted.
+    cx.state.leaves_after_stop = false;
     // At rest after a stop there is nothing left to stop; the samples keep showing why.
     if cx.state.is_motion_possible() && !stop::is_braking(cx.state) {
         let Trip { interlock, reason } = trip;
@@ -389,7 +398,8 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         ),
         Operator::Retract => stop::retract(cx),
         Operator::Close => stop::close(cx),
-        Operator::Pause => pause::now(cx, "the operator asked for it".into()),
+        Operator::Pause => pause::now(cx, pause::By::Operator, "the operator asked for it".into()),
+        Operator::Leave => leave(cx),
         Operator::PauseAfter { step_index } => pause::after(cx, step_index),
         Operator::Resume => pause::resume(cx),
         Operator::Finish => pause::finish(cx),

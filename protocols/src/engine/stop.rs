@@ -140,7 +140,9 @@ pub(super) fn on_motor_enabled(cx: &mut Context<'_>) {
     };
     cx.state.power = Power::Enabled;
     let target = Depth(-RETRACT_CLEARANCE_MM).position_from(contact.position);
-    if let Err(reason) = cx.move_to(Position(target.0.max(0.0)), RETRACT_SPEED) {
+    // A way out never leads further in.
+    let out = target.0.clamp(0.0, cx.state.derived.position.0.max(0.0));
+    if let Err(reason) = cx.move_to(Position(out), RETRACT_SPEED) {
         begin(cx, EndingKind::Abort, reason);
     }
 }

@@ -1,7 +1,7 @@
 //! What a plan can ask for, one variant a step.
 
 use super::{HoldRate, HoldUntil};
-use palpate_model::rig::{HandAction, Phase};
+use palpate_model::rig::{HandAction, Oscillation, Phase, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 
@@ -109,13 +109,18 @@ pub struct FindBase {
     pub pass_force: Newtons,
 }
 
+impl FindBase {
+    /// Fastest touch of a stiff base. At 0.6 mm/s an axis is stopped within 12 micrometres of feeling something: 0.4 N
+    /// on a rig that gives way by 30 micrometres per newton.
+    pub const SPEED_MAX: MmPerS = MmPerS(0.6);
+}
+
 impl Default for FindBase {
-    /// At 0.6 mm/s an axis is stopped within 12 micrometres of feeling something: 0.4 N on a rig that gives way by
-    /// 30 micrometres per newton. The second touch is the slowest that a step of 0.03 mm/s allows, and ends at 0.4 N,
-    /// under the half newton that finding positions may exert.
+    /// The first touch as fast as [`FindBase::SPEED_MAX`]. The second is the slowest that a step of 0.03 mm/s allows, and
+    /// ends at 0.4 N, under the half newton that finding positions may exert.
     fn default() -> Self {
         Self {
-            approach_speed: MmPerS(0.6),
+            approach_speed: Self::SPEED_MAX,
             criterion: Newtons(0.05),
             retreat_mm: 0.3,
             pass_speed: MmPerS(0.03),
@@ -161,6 +166,19 @@ pub struct Sine {
     pub frequency_hz: f64,
     /// Whole cycles.
     pub cycles: u32,
+}
+
+impl Sine {
+    /// What a rig is told: whole pulses and whole ticks.
+    #[must_use]
+    pub fn command(&self, rig: &RigDescription) -> Oscillation {
+        Oscillation {
+            amplitude_pulses: (self.amplitude_mm / rig.mm_per_pulse).round() as i64,
+            period_ticks: (1.0 / (self.frequency_hz * rig.tick().0)).round() as u32,
+            cycles: self.cycles,
+            acceleration: rig.acceleration,
+        }
+    }
 }
 
 /// A question to a person.

@@ -6,7 +6,7 @@ mod tests;
 
 pub use expected::OutlinePoint;
 
-use crate::plans::{FindContact, HoldUntil, LoadTo, Plan, Press, Step};
+use crate::plans::{FindBase, FindContact, HoldUntil, LoadTo, Plan, Press, Step};
 use expected::Expected;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, Profile, RigDescription};
@@ -271,6 +271,12 @@ impl Walk<'_> {
                 self.check_sizes(&[search.retreat_mm, search.criterion.0, search.pass_force.0]);
                 self.check_speed(search.approach_speed);
                 self.check_speed(search.pass_speed);
+                if search.approach_speed.0.max(search.pass_speed.0) > FindBase::SPEED_MAX.0 {
+                    self.refusals.push(format!(
+                        "a base is stiff; touch it at {} at most",
+                        FindBase::SPEED_MAX
+                    ));
+                }
                 let approach = |share: f64| self.move_secs(share * travel, search.approach_speed);
                 let slow = self.move_secs(search.retreat_mm, search.pass_speed);
                 // Behind the specimen, as far as it is thick.
@@ -316,6 +322,9 @@ impl Walk<'_> {
                 if !self.refusals.is_empty() {
                     return Span(0.0, 0.0, true);
                 }
+                let command = sine.command(self.rig);
+                self.refusals
+                    .extend(self.rig.check_oscillation(&command).err());
                 self.expected.oscillate(phase, sine);
                 let secs = self.secs(self.ticks(cycles_secs) + MOVE_TICKS);
                 Span(secs, secs, true)
@@ -335,6 +344,11 @@ impl Walk<'_> {
             }
             Step::Jog { distance_mm, speed } => {
                 self.check_sizes(&[*distance_mm]);
+                if distance_mm.abs() > travel {
+                    self.refusals.push(format!(
+                        "a jog of {distance_mm} mm is longer than the travel of {travel:.1} mm"
+                    ));
+                }
                 self.check_speed(*speed);
                 let ticks = self.move_ticks(*distance_mm, *speed);
                 Span(self.secs(ticks), self.secs(ticks), true)

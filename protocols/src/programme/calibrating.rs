@@ -1,6 +1,6 @@
 //! From a session of weight steps to the calibration it measured.
 
-use crate::engine::{Effect, Record};
+use crate::engine::{Effect, PLAN_COMPLETE, Record};
 use palpate_model::calibration::{
     CALIBRATION_FORMAT, Calibration, CalibrationError, Direction, Series, SeriesStep,
 };
@@ -21,7 +21,9 @@ pub enum CalibratingError {
     )]
     NoReadings(String),
     /// It did not run to its end.
-    #[error("session {session} ended by {ending}; a calibration must be complete, so run it again")]
+    #[error(
+        "session {session} ended by {ending} before its plan did; a calibration must be complete, so run it again"
+    )]
     Incomplete {
         /// Which.
         session: String,
@@ -37,11 +39,10 @@ pub enum CalibratingError {
 pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, CalibratingError> {
     let manifest = &session.manifest;
     let id = manifest.session_id.clone();
-    let ending = session
-        .end
-        .as_ref()
-        .map_or("breaking off", |end| end.outcome.as_str());
-    if ending != "finish" {
+    let end = session.end.as_ref();
+    let ending = end.map_or("breaking off", |end| end.outcome.as_str());
+    let is_complete = end.is_some_and(|end| end.reason == PLAN_COMPLETE);
+    if ending != "finish" || !is_complete {
         return Err(CalibratingError::Incomplete {
             session: id,
             ending: ending.into(),

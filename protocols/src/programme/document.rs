@@ -137,6 +137,12 @@ impl Programme {
                 whole.language
             ));
         }
+        if !is_plain(&whole.name) {
+            problems.push(format!(
+                "a programme cannot be called '{}'; use letters, digits and hyphens, since its folder is called so",
+                whole.name
+            ));
+        }
         if whole.task.is_empty() {
             problems.push("a programme needs at least one [[task]]".into());
         }
@@ -215,8 +221,7 @@ fn read_task(
 ) -> Result<Task, Vec<String>> {
     let name = text.name.trim().to_owned();
     let mut problems = Vec::new();
-    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
-    if name.is_empty() || !name.chars().all(is_plain) {
+    if !is_plain(&name) {
         problems.push(format!(
             "a task cannot be called '{name}'; use letters, digits and hyphens, since its folder is called so"
         ));
@@ -281,6 +286,12 @@ fn read_task(
             Err(problems)
         }
     }
+}
+
+/// Whether a name can be that of a folder anywhere.
+fn is_plain(name: &str) -> bool {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    !name.is_empty() && name.chars().all(is_plain)
 }
 
 /// Values as a protocol's parameters are given: a text, or a number without a unit; a list with commas. Whether

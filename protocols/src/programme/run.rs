@@ -3,6 +3,7 @@
 use super::calibrating::{CalibratingError, calibration_of};
 use super::document::Programme;
 use super::progress::{Entry, Place, Progress, ProgressError};
+use crate::engine::{EndingKind, PLAN_COMPLETE};
 use crate::plans::Plan;
 use crate::preview::preview;
 use crate::runner::{
@@ -12,7 +13,9 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
-use palpate_sessions::{About, AboutError, ReadError, Session};
+use palpate_sessions::{
+    About, AboutError, HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session,
+};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
@@ -74,6 +77,9 @@ pub struct Done {
 /// A programme that is not.
 #[derive(Debug, Error)]
 pub enum RunError {
+    /// Another program uses the folder, or it is no folder for a programme.
+    #[error("{0}")]
+    Folder(String),
     /// The folder belongs to something else.
     #[error(transparent)]
     Progress(#[from] ProgressError),
@@ -125,6 +131,15 @@ pub fn run(
     laboratory: Laboratory<'_>,
     tell: &mut dyn FnMut(Event<'_>),
 ) -> Result<Done, RunError> {
+    let lock = laboratory.folder.join(LOCK_FILE);
+    let _lock = HolderLock::acquire(&lock).map_err(|err| RunError::Folder(err.to_string()))?;
+    if laboratory.folder.join(LOG_FILE).exists() {
+        let reason = format!(
+            "{} is a session; choose a new folder",
+            laboratory.folder.display()
+        );
+        return Err(RunError::Folder(reason));
+    }
     let (journal, entries) = Journal::open(laboratory.folder)?;
     let progress = Progress::of(&entries, programme, crc32)?;
     let was_continued = !progress.runs.is_empty();
@@ -170,9 +185,18 @@ struct Work<'a> {
 
 impl Work<'_> {
     /// One run, from its entry in the journal to the next.
-    fn one(&mut self, place: Place) -> Result<(), RunError> {
+    fn one(&mut self, mut place: Place) -> Result<(), RunError> {
         let programme = self.programme;
         let task = &programme.tasks[place.task];
+        // A folder that is there without its line in the journal is what a crash left of an attempt.
+        while self
+            .laboratory
+            .folder
+            .join(session_folder(&task.name, &place))
+            .exists()
+        {
+            place.attempt += 1;
+        }
         let refused = |reason: String| RunError::Refused {
             task: task.name.clone(),
             reason,
@@ -199,6 +223,14 @@ impl Work<'_> {
             answers: self.laboratory.answers,
         };
         let later = self.time_after(&place).map_err(refused)?;
+        self.journal.push(&Entry::Begun {
+            place: place.clone(),
+            session: session.clone(),
+            at: stamp(wall_now()),
+        })?;
+        self.progress
+            .runs
+            .push((place.clone(), session.clone(), None));
         let (reply, answer) = sync_channel(1);
         let asked = Request::Run(Box::new(request), reply);
         self.laboratory
@@ -208,18 +240,15 @@ impl Work<'_> {
         match answer.recv() {
             Ok(Ok(())) => {}
             Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
+                self.journal.push(&Entry::Ended {
+                    place: place.clone(),
+                    outcome: "refused".into(),
+                    reason: reason.clone(),
+                })?;
                 return Err(refused(reason));
             }
             Err(_) => return Err(RunError::NoRunner),
         }
-        self.journal.push(&Entry::Begun {
-            place: place.clone(),
-            session: session.clone(),
-            at: stamp(wall_now()),
-        })?;
-        self.progress
-            .runs
-            .push((place.clone(), session.clone(), None));
         let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some("finish");
         let done = self.progress.runs.iter().filter(finished).count() as u32;
         (self.tell)(Event::Begun {
@@ -280,6 +309,12 @@ impl Work<'_> {
                     return match &view.log_error {
                         // What is not on disk did not happen.
                         Some(err) => Ok(("abort".into(), err.clone())),
+                        // What was left out was not done.
+                        None if outcome.ending == EndingKind::Finish
+                            && outcome.reason != PLAN_COMPLETE =>
+                        {
+                            Ok((EndingKind::Stop.name().into(), outcome.reason.clone()))
+                        }
                         None => Ok((outcome.ending.name().into(), outcome.reason.clone())),
                     };
                 }

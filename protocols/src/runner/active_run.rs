@@ -3,7 +3,9 @@
 use super::clock::wall_now;
 use super::snapshot::{LogLine, PromptView, RunView};
 use super::start::{AfterStop, Answers};
-use crate::engine::{self, Config, Effect, EndingKind, Input, Operator, Outcome, Record, State};
+use crate::engine::{
+    self, Config, Effect, EndingKind, Input, Operator, Outcome, PauseView, Record, State,
+};
 use crate::fidelity::{FidelityMeter, first_verdict};
 use crate::plans::Step;
 use crate::preview::Preview;
@@ -25,6 +27,9 @@ pub(crate) const LIVE_FIT_EVERY: u64 = 500;
 /// Buckets of the live plots: two points a bucket, two buckets a pixel on a wide screen.
 const TRACE_BUCKETS: usize = 2048;
 
+/// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
+const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
+
 pub(super) struct ActiveRun {
     /// `None` only while `engine::step` has it.
     engine: Option<State>,
@@ -37,6 +42,7 @@ pub(super) struct ActiveRun {
     origin: Nanos,
     after_stop: AfterStop,
     answers: Answers,
+    paused_since: Option<Nanos>,
     now: Nanos,
     samples: u64,
     order: u64,
@@ -79,6 +85,7 @@ impl ActiveRun {
             origin,
             after_stop,
             answers,
+            paused_since: None,
             now: Nanos::ZERO,
             samples: 0,
             order: 0,
@@ -177,6 +184,10 @@ impl ActiveRun {
             let choice = Operator::Close;
             self.feed(now, Input::Operator { choice }, send);
         }
+        if self.after_stop == AfterStop::Close && self.is_left_alone(now) {
+            let choice = Operator::Leave;
+            self.feed(now, Input::Operator { choice }, send);
+        }
         let is_asked = self
             .engine
             .as_ref()
@@ -185,6 +196,17 @@ impl ActiveRun {
             let choice = Operator::Confirm;
             self.feed(now, Input::Operator { choice }, send);
         }
+    }
+
+    /// Whether the run is paused, nobody is there, and it cannot go on by itself or has not for too long.
+    fn is_left_alone(&mut self, now: Nanos) -> bool {
+        let pause = self.engine.as_ref().map(State::pause);
+        let Some(PauseView::Paused { no_resume }) = pause else {
+            self.paused_since = None;
+            return false;
+        };
+        let since = *self.paused_since.get_or_insert(now);
+        no_resume.is_some() || now.since(since).seconds() > PAUSE_ALONE_MAX
     }
 
     fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
