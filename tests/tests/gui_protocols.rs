@@ -70,7 +70,7 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
     let cycles: Vec<u32> = run.cycle_starts.iter().map(|(_, cycle)| *cycle).collect();
     assert_eq!(cycles, [1, 2]);
     flow.window.run_steps(2);
-    assert!(flow.says("Peak of each cycle") && flow.says("% of the first"));
+    assert!(flow.says("change from the first") && flow.says(" %"));
     let session = Session::open(&flow.sessions()[0]).unwrap();
     assert_eq!(session.manifest.plan["name"], "preconditioning");
     assert_eq!(session.manifest.specimen, "S-014");
