@@ -228,6 +228,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
 fn a_declined_prompt_stops_and_keeps_nothing() {
     let mut flow = Flow::open(TimeScale::Factor(30.0));
     choose(&mut flow, "Load-cell calibration");
+    assert!(flow.says("this protocol does not indent"));
     flow.type_into("operator", "Ada");
     flow.click("Start  F5");
     wait_for(&mut flow, "the question", |run| run.prompt.is_some());

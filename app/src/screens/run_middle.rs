@@ -183,6 +183,10 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
 pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     match checked {
+        Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
+            let words = "this protocol does not indent; there is no depth or force to draw";
+            ui.label(RichText::new(words).color(tokens.text_quiet));
+        }
         Some(checked) => course_ui(ui, &checked.outline),
         None => {
             let words = "nothing to draw until the protocol and its values are right";
