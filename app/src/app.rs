@@ -107,6 +107,7 @@ impl WorkbenchApp {
                 calibration: options.calibration,
                 curve,
                 limits: options.limits,
+                to_acknowledge: options.to_acknowledge,
             },
             form,
             library: palpate_sessions::folder::library_folder()

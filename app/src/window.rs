@@ -46,6 +46,8 @@ pub struct WindowOptions {
     pub calibration: Calibration,
     /// Interlock thresholds.
     pub limits: Limits,
+    /// What must be acknowledged before any run, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
     /// Pace of a simulated rig.
     pub scale: TimeScale,
     /// Folder for new sessions; the library if none.
@@ -61,6 +63,7 @@ impl WindowOptions {
             rig,
             calibration: palpate_drivers::sim::calibration(settings.profile),
             limits,
+            to_acknowledge: Vec::new(),
             scale,
             sessions: None,
         })

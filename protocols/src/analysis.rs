@@ -48,6 +48,17 @@ pub struct Wanted {
     pub is_rejected_included: bool,
 }
 
+impl Wanted {
+    /// Ramp and hold of a session that may have been rejected.
+    #[must_use]
+    pub fn whatever_it_is_worth() -> Self {
+        Self {
+            is_rejected_included: true,
+            ..Self::default()
+        }
+    }
+}
+
 impl From<Stretch> for Wanted {
     fn from(stretch: Stretch) -> Self {
         Self {

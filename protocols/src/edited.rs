@@ -113,3 +113,73 @@ fn correct(session: &mut Session, edits: &Edits) {
         ));
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sessions::edits::{Change, Edit};
+
+    fn edit(number: u32, position_mm: f64) -> Edit {
+        Edit {
+            at: std::time::UNIX_EPOCH.into(),
+            by: "Ada".into(),
+            reason: "by eye".into(),
+            change: Change::Contact {
+                number,
+                position_mm: Position(position_mm),
+                was_mm: Position(0.0),
+            },
+        }
+    }
+
+    #[test]
+    fn of_several_contacts_only_the_corrected_one_moves_its_depths() {
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let mut session = Session::open(&sessions.join("ramp-hold-lab")).unwrap();
+        let first = contacts(&session);
+        assert_eq!(first.len(), 1);
+        let known = |row: &palpate_sessions::record::Row| row.depth.is_some();
+        assert_eq!(
+            session.rows.iter().position(known),
+            Some(first[0].after_sample as usize)
+        );
+        // A second one, found later, as a protocol that searches again leaves it.
+        let second = (first[0].after_sample as usize + session.rows.len()) / 2;
+        let mut again = session
+            .entries
+            .iter()
+            .find(|entry| found_at(entry).is_some())
+            .unwrap()
+            .clone();
+        again.after_sample = second as u64;
+        session.entries.push(again);
+        let before = session.clone();
+        let edits = Edits {
+            all: vec![edit(2, 40.0), edit(2, first[0].position.0 + 0.5)],
+            is_torn: false,
+        };
+        correct(&mut session, &edits);
+        for (index, (old, new)) in before.rows.iter().zip(&session.rows).enumerate() {
+            let expected = if index < second { 0.0 } else { -0.5 };
+            let moved = new.depth.unwrap_or(0.0) - old.depth.unwrap_or(0.0);
+            assert!(
+                (moved - expected).abs() < 1e-12 || old.depth.is_none(),
+                "{index}: {moved}"
+            );
+        }
+        let found = contacts(&session);
+        assert_eq!(found[0], first[0]);
+        assert!((found[1].position.0 - first[0].position.0 - 0.5).abs() < 1e-12);
+        assert_eq!(session.notes.len(), before.notes.len() + 1);
+        // A contact that was never found cannot be moved.
+        let mut same = before.clone();
+        correct(
+            &mut same,
+            &Edits {
+                all: vec![edit(3, 1.0)],
+                is_torn: false,
+            },
+        );
+        assert!(same == before);
+    }
+}

@@ -7,6 +7,7 @@
 
 pub mod analysis;
 pub mod cycles;
+pub mod daily;
 pub mod edited;
 pub mod engine;
 pub mod fidelity;

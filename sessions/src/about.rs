@@ -76,7 +76,7 @@ pub const KEYS: &[Key] = &[
         "animal or material, organ, and who supplied it",
     ),
     Key {
-        name: "specimen.since_death_h",
+        name: "specimen.time_since_death_h",
         meaning: "hours from death to the test",
         kind: Kind::Number {
             unit: "h",
@@ -101,6 +101,10 @@ pub const KEYS: &[Key] = &[
     length("indenter.diameter_mm", "diameter of the probe"),
     text("indenter.tip", "shape of its tip: flat, spherical, conical"),
     text("indenter.material", "what the probe is made of"),
+    text(
+        "signal.filter",
+        "what filter there is between cell and converter",
+    ),
     text("series.id", "name of the series the session belongs to"),
     count("series.specimen", "number of the specimen in the series"),
     count("series.repeat", "which repeat on this specimen, from 1"),
@@ -307,7 +311,7 @@ mod tests {
             "specimen.source=pig stomach = fundus",
             "operator=Ada",
             "specimen.temperature_c=-4.5",
-            "specimen.since_death_h=0",
+            "specimen.time_since_death_h=0",
         ] {
             labels.tell_pair(pair).unwrap();
         }
@@ -316,7 +320,7 @@ mod tests {
         let lines = labels.about.lines();
         let expected = [
             ("specimen.source", "pig stomach = fundus"),
-            ("specimen.since_death_h", "0.0"),
+            ("specimen.time_since_death_h", "0.0"),
             ("specimen.temperature_c", "-4.5"),
             ("indenter.diameter_mm", "12.0"),
             ("series.repeat", "2"),
@@ -334,7 +338,7 @@ mod tests {
             ("specimen", "KEY=VALUE"),
             ("specimen.thickness_mm=0", "a number of mm above 0"),
             ("specimen.thickness_mm=NaN", "a number of mm above 0"),
-            ("specimen.since_death_h=-1", "a number of h from 0"),
+            ("specimen.time_since_death_h=-1", "a number of h from 0"),
             ("specimen.temperature_c=-300", "above -273.15"),
             ("series.repeat=0", "a whole number from 1"),
             ("series.repeat=1.5", "a whole number from 1"),

@@ -13,6 +13,7 @@
 pub mod about;
 pub mod calibrations;
 mod chain;
+pub mod checks;
 pub mod edits;
 pub mod export;
 pub mod folder;

@@ -156,7 +156,7 @@ impl Flow {
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();
         let options = FitOptions::default();
-        let fitted = fit_source(&session, None, Wanted::default(), &options);
+        let fitted = fit_source(&session, None, Wanted::whatever_it_is_worth(), &options);
         let result = match fitted.map(|fitted| fitted.with_systematic(&options)) {
             Ok(fitted) => fitted.result.map_err(|err| err.to_string()),
             Err(err) => Err(err.to_string()),

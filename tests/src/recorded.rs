@@ -26,6 +26,7 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
         out: Some(out.clone()),
         labels: Labels::default(),
         is_acknowledged: false,
+        to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
     };

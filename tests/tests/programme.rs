@@ -37,6 +37,7 @@ fn carry_out(text: &str, folder: &Path) -> Result<Done, RunError> {
         folder,
         answers: Answers::Confirm,
         indenter: String::new(),
+        gate: &|_| Ok(Vec::new()),
     };
     let mut begun = 0;
     let done = run(

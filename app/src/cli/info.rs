@@ -120,6 +120,7 @@ fn text(info: &Info<'_>) -> String {
             .iter()
             .map(|(key, value)| format!("           {key} {value}")),
     );
+    lines.extend(protocol_text(info.plan));
     lines.push(format!("rig        {}", info.rig));
     lines.extend(
         info.rig_settings
@@ -189,4 +190,19 @@ fn edit_text(edit: &Edit) -> String {
         ),
     };
     format!("edit       {at} {}: {what}: {}", edit.by, edit.reason)
+}
+
+/// The protocol by name and version with the values chosen, where the plan is one of ours.
+fn protocol_text(plan: &serde_json::Value) -> Option<String> {
+    let mut line = format!(
+        "protocol   {}, version {}",
+        plan["name"].as_str()?,
+        plan["version"].as_u64()?
+    );
+    if let Some(values) = plan["source"]["values"].as_object() {
+        for (name, value) in values {
+            line += &format!("\n           {name} {}", value.as_str().unwrap_or_default());
+        }
+    }
+    Some(line)
 }

@@ -2,6 +2,7 @@
 
 mod analyse;
 mod calibration;
+mod daily_check;
 mod export;
 mod extremes;
 mod fit;
@@ -41,10 +42,12 @@ enum Command {
     /// Open the window
     Window(rig::RigArgs),
     /// Run a protocol without a window
-    Run(run::RunArgs),
+    Run(Box<run::RunArgs>),
     /// List, check, show or preview protocols
     #[command(subcommand)]
     Protocol(protocol::ProtocolCommand),
+    /// Check zero, one known weight and the way home; the result counts for the day
+    DailyCheck(daily_check::DailyCheckArgs),
     /// Fit the force model to a session or a table
     Fit(fit::FitArgs),
     /// Tell what the cycles of a record show: loops, shift, decay, relaxation
@@ -147,6 +150,7 @@ pub fn main() -> ExitCode {
             ProtocolCommand::Preview(args) => with(args.json, |out| protocol::preview(&args, out)),
             ProtocolCommand::Words => with(false, protocol::words),
         },
+        Some(Command::DailyCheck(args)) => with(args.json, |out| daily_check::run(&args, out)),
         Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
         Some(Command::Analyse(args)) => with(args.json, |out| analyse::run(&args, out)),
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),

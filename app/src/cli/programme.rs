@@ -71,7 +71,8 @@ pub(super) fn run(
     let bench = super::rig::open(&rig_args)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let description = bench.rig.description().clone();
-    let answers = if bench.rig.is_virtual() {
+    let is_virtual = bench.rig.is_virtual();
+    let answers = if is_virtual {
         Answers::Confirm
     } else {
         Answers::Operator
@@ -92,6 +93,10 @@ pub(super) fn run(
         folder: &folder,
         answers,
         indenter: how.indenter.clone(),
+        gate: &|plan| {
+            let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
+            Ok(gate.to_acknowledge())
+        },
     };
     let done = watch(&programme, &checksum(&text), laboratory, output)?;
     drop(runner);

@@ -12,6 +12,7 @@ use palpate_drivers::sim::{
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
+use palpate_protocols::plans::RampHold;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::folder::{HolderLock, library_folder};
 
@@ -146,13 +147,15 @@ fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
 
 /// Opens the window.
 pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
+    let bench = open(args)?;
+    let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
     let OpenRig {
         rig,
         calibration,
         doubts,
         limits,
         _lock,
-    } = open(args)?;
+    } = bench;
     let output = Output::text();
     doubts.iter().for_each(|doubt| output.note(doubt));
     let scale = args.time_scale;
@@ -160,6 +163,7 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
         rig,
         calibration,
         limits,
+        to_acknowledge: gate.to_acknowledge(),
         scale,
         sessions: None,
     })

@@ -6,14 +6,17 @@ use super::programme;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use clap::{Args, Subcommand};
+use palpate_drivers::Rig;
 use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_protocols::daily::Gate;
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
+    TimeScale, wall_now,
 };
-use palpate_sessions::{About, Verdict};
+use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -23,7 +26,7 @@ use std::time::Duration;
 
 /// Arguments of `palpate run`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true, subcommand_negates_reqs = true)]
+#[command(args_conflicts_with_subcommands = true)]
 pub struct RunArgs {
     #[command(subcommand)]
     command: Option<RunCommand>,
@@ -53,7 +56,7 @@ pub enum RunCommand {
 #[derive(Debug, Args)]
 pub struct ProtocolArgs {
     /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
-    #[arg(value_name = "NAME|FILE", required = true)]
+    #[arg(value_name = "NAME|FILE")]
     protocol: Option<String>,
     #[command(flatten)]
     values: ValueArgs,
@@ -194,6 +197,7 @@ fn carry_out(
     labels: Labels,
     output: &Output,
 ) -> Result<(), Failure> {
+    let gate = gate(&plan, &bench)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let request = RunRequest {
         plan,
@@ -202,8 +206,13 @@ fn carry_out(
         out: how.out.clone(),
         labels,
         is_acknowledged: how.acknowledge,
+        to_acknowledge: gate.to_acknowledge(),
         after_stop: AfterStop::Close,
-        answers: Answers::Confirm,
+        answers: if bench.rig.is_virtual() {
+            Answers::Confirm
+        } else {
+            Answers::Operator
+        },
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(
@@ -228,12 +237,46 @@ fn carry_out(
         };
         return Err(Failure::usage(format!("{reason}{hint}")));
     }
+    match &gate {
+        Gate::Acknowledge(reason) if !how.acknowledge => {
+            return Err(Failure::usage(format!(
+                "{reason}; or add --acknowledge to run all the same, which is recorded"
+            )));
+        }
+        Gate::Note(note) => output.note(note),
+        _ => {}
+    }
     preview.notes.iter().for_each(|note| output.note(note));
+    let snapshot = execute(bench.rig, how.rig.time_scale, request, output)?;
+    let Some(view) = &snapshot.run else {
+        return Err(Failure::failed("the runner ended without a run"));
+    };
+    report(view, output)
+}
 
+/// What today's daily check of the rig says to a plan.
+pub(super) fn gate(plan: &Plan, bench: &OpenRig) -> Result<Gate, Failure> {
+    let name = &bench.rig.description().name;
+    gate_of(plan, name, bench.rig.is_virtual()).map_err(Failure::failed)
+}
+
+/// The same for a rig by its name.
+pub(super) fn gate_of(plan: &Plan, rig: &str, is_virtual: bool) -> Result<Gate, String> {
+    let library = library_folder().ok();
+    Gate::of(plan, library.as_deref(), rig, is_virtual, wall_now()).map_err(|err| err.to_string())
+}
+
+/// Runs a request and tells its progress; the snapshot is that of the ended run.
+pub(super) fn execute(
+    rig: Box<dyn Rig>,
+    scale: TimeScale,
+    request: RunRequest,
+    output: &Output,
+) -> Result<Arc<Snapshot>, Failure> {
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(bench.rig, how.rig.time_scale, Some(first), move || {
+    let runner = Runner::start(rig, scale, Some(first), move || {
         // A full channel already says what this would say.
         let _ = wake.try_send(());
     })
@@ -245,11 +288,7 @@ fn carry_out(
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
         Err(_) => return Err(Failure::failed("the runner ended before the run began")),
     }
-    let snapshot = watch(&runner, &woken, output)?;
-    let Some(view) = &snapshot.run else {
-        return Err(Failure::failed("the runner ended without a run"));
-    };
-    report(view, output)
+    watch(&runner, &woken, output)
 }
 
 /// Who and what, as told by the arguments.

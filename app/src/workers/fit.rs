@@ -181,10 +181,7 @@ fn has_ramp(run: &RunView) -> bool {
 fn exact(folder: &Path) -> Result<ExactFit, String> {
     let options = FitOptions::default();
     // Whoever looks at a run sees its fit, whatever the run is worth.
-    let wanted = Wanted {
-        is_rejected_included: true,
-        ..Wanted::default()
-    };
+    let wanted = Wanted::whatever_it_is_worth();
     let fitted = fit_source(folder, None, wanted, &options).map_err(|err| err.to_string())?;
     let fitted = fitted.with_systematic(&options);
     let report = fitted.result.map_err(|err| err.to_string())?;

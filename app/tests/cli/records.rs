@@ -266,3 +266,67 @@ fn a_rejected_session_is_left_out_and_counted() {
         );
     }
 }
+
+#[test]
+fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let first = short_run(at, "first", &[]);
+    succeeded(&first);
+    assert!(
+        stderr(&first).contains("had no daily check today"),
+        "{}",
+        stderr(&first)
+    );
+    let check = |more: &[&str]| {
+        let mut args = vec![
+            "daily-check",
+            "--time-scale",
+            "max",
+            "--operator",
+            "Ada",
+            "--json",
+        ];
+        args.extend(more);
+        palpate(at, &args)
+    };
+    let passed = check(&[]);
+    succeeded(&passed);
+    let passed = json(&passed);
+    assert_eq!(passed["is_passed"], true);
+    let parts: Vec<&str> = passed["parts"]
+        .as_array()
+        .unwrap()
+        .iter()
+        .filter_map(|part| part["what"].as_str())
+        .collect();
+    assert_eq!(parts, ["zero", "weight", "home"]);
+    let open = short_run(at, "open", &[]);
+    succeeded(&open);
+    assert!(!stderr(&open).contains("daily check"), "{}", stderr(&open));
+    // The curve of another cell: neither its zero nor its weight is right.
+    let failed = check(&["--profile", "ideal", "--calibration", "thesis"]);
+    assert_eq!(failed.status.code(), Some(1));
+    assert!(
+        stderr(&failed).contains("200 g reads"),
+        "{}",
+        stderr(&failed)
+    );
+    let refused = short_run(at, "refused", &[]);
+    assert_eq!(refused.status.code(), Some(2));
+    let why = stderr(&refused);
+    assert!(
+        why.contains("failed its daily check today") && why.contains("--acknowledge"),
+        "{why}"
+    );
+    assert!(!at.join("refused").exists());
+    succeeded(&short_run(at, "acknowledged", &["--acknowledge"]));
+    let info = json(&palpate(at, &["info", "acknowledged", "--json"]));
+    let told = info["acknowledgements"].to_string();
+    assert!(told.contains("failed its daily check today"), "{told}");
+    // A check that passes opens the rig again; all three are kept.
+    succeeded(&check(&[]));
+    succeeded(&short_run(at, "again", &[]));
+    let kept = fs::read_to_string(at.join("library/checks/sim.jsonl")).unwrap();
+    assert_eq!(kept.lines().count(), 3);
+}

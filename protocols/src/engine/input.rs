@@ -148,6 +148,19 @@ pub enum Record {
         /// Standard error in mm.
         std_error_mm: f64,
     },
+    /// The base behind the specimen was found; depths count from it now.
+    BaseFound {
+        /// Estimate, from home.
+        position: Position,
+        /// Standard error in mm.
+        std_error_mm: f64,
+        /// How far rig and base gave way per newton, in mm/N.
+        compliance_mm_per_n: f64,
+        /// From the tissue's surface to the base in mm, where the surface was found before.
+        thickness_mm: Option<f64>,
+        /// Its standard error in mm.
+        thickness_std_error_mm: Option<f64>,
+    },
     /// The live fit knows enough: the hold ends before its planned duration.
     HoldEndedEarly {
         /// The parameter waited for.
@@ -373,6 +386,21 @@ impl fmt::Display for Record {
                 std_error_mm,
             } => {
                 write!(f, "contact at {:.3} ± {std_error_mm:.3} mm", position.0)
+            }
+            Self::BaseFound {
+                position,
+                std_error_mm,
+                thickness_mm,
+                thickness_std_error_mm,
+                ..
+            } => {
+                write!(f, "base at {:.3} ± {std_error_mm:.3} mm", position.0)?;
+                match (thickness_mm, thickness_std_error_mm) {
+                    (Some(mm), Some(error)) => {
+                        write!(f, "; the specimen is {mm:.3} ± {error:.3} mm thick")
+                    }
+                    _ => Ok(()),
+                }
             }
             Self::HoldEndedEarly {
                 parameter,

@@ -4,6 +4,7 @@
 //! clock, holds no device and knows no disk, so a dry run, a replay and a real run are the same
 //! code fed from different places.
 
+mod base;
 mod between;
 mod contact;
 mod context;

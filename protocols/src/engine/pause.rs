@@ -26,7 +26,7 @@ fn kind(active: &Active, step: Option<&Step>) -> Kind {
             Kind::Wait
         }
         Active::SelfTest(_) | Active::Tare(_) | Active::Weigh(_) => Kind::Complete,
-        Active::Home(_) | Active::Contact(_) => Kind::Repeat,
+        Active::Home(_) | Active::Contact(_) | Active::Base(_) => Kind::Repeat,
         Active::Load(_) => Kind::Measure("an interrupted indentation is another experiment"),
         Active::Move => match step {
             Some(Step::Ramp { .. }) => {

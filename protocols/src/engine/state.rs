@@ -1,5 +1,6 @@
 //! The engine's state: a plain value, cloneable, comparable, printable.
 
+use super::base::BaseSearch;
 use super::contact::ContactSearch;
 use super::creep::Creeping;
 use super::hold::Holding;
@@ -117,6 +118,7 @@ pub(super) enum Active {
     Home(Homing),
     Tare(Taring),
     Contact(Box<ContactSearch>),
+    Base(Box<BaseSearch>),
     /// Ramp, unload, retract and jog: one move, done when the axis rests.
     Move,
     Hold(Holding),

@@ -1,5 +1,6 @@
 //! The one entry point: interlocks first, then the plan.
 
+use super::base::BaseSearch;
 use super::contact::ContactSearch;
 use super::context::{Context, Progress};
 use super::creep::Creeping;
@@ -105,6 +106,7 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
         Active::Home(homing) => homing.on_reading(cx, reading),
         Active::Tare(taring) => taring.on_reading(cx, reading),
         Active::Contact(search) => search.on_reading(cx, reading),
+        Active::Base(search) => search.on_reading(cx),
         Active::Move => match cx.at_rest() {
             Ok(true) => Progress::Done,
             Ok(false) => Progress::Continue,
@@ -254,7 +256,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
         Step::CheckHome { speed, touch_speed } => {
             Active::Home(Homing::begin_check(cx, speed, touch_speed)?)
         }
-        Step::FindBase(_) => return Err("the base cannot be found yet".into()),
+        Step::FindBase(plan) => Active::Base(Box::new(BaseSearch::begin(cx, plan)?)),
     })
 }
 

@@ -28,10 +28,10 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
     match reasons.len() {
         0 => (
             Verdict::Valid,
-            format!(
-                "finished, {} targets met, no sample missing",
-                fidelity.targets.len()
-            ),
+            match fidelity.targets.len() {
+                0 => "finished, no sample missing".into(),
+                count => format!("finished, {count} targets met, no sample missing"),
+            },
         ),
         count => {
             let mut text = reasons[..count.min(REASONS_MAX)].join("; ");

@@ -13,6 +13,7 @@ macro_rules! built_in {
 }
 
 built_in! {
+    "daily-check"
     "load-cell-calibration"
     "zeroing"
     "check-home"

@@ -30,6 +30,12 @@ pub(super) fn check(steps: &[Placed], problems: &mut Problems) {
             known.assume(missed);
         }
         known.pass(step);
+        if known.motor && matches!(step, Step::Weigh(_)) && warned.insert(placed.line) {
+            problems.push(Problem::warning(
+                placed.line,
+                "'weigh' with the motor on ends at the force limit of the rig; leave { do = \"self-test\" } out of a protocol that only weighs",
+            ));
+        }
         let checkpoint = placed.planned.checkpoint.as_ref();
         if let Some(checkpoint) =
             checkpoint.filter(|_| known.is_inside && warned.insert(placed.line))

@@ -66,7 +66,7 @@ fn usual_search() -> String {
     });
     format!(
         "Without keys: a first pass at {}, felt at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
-         recovery of {}, a standard error of {} mm at most. The same for `find-base`.\n\n",
+         recovery of {}, a standard error of {} mm at most.\n\n",
         search.approach_speed,
         search.criterion,
         search.retreat_mm,

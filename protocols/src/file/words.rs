@@ -3,8 +3,8 @@
 use super::args::Args;
 use super::quantity::Kind;
 use crate::plans::{
-    FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Prompt, Settle, Sine, Step,
-    Weigh,
+    FindBase, FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, OnTimeout, Press, Prompt,
+    Settle, Sine, Step, Weigh,
 };
 use palpate_model::rig::HandAction;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -81,34 +81,13 @@ pub(super) const COMMON: [Key; 3] = [
     ),
 ];
 
-const CONTACT_KEYS: [Key; 10] = [
+const CONTACT_KEYS: [Key; 9] = [
     key("speed", Kind::Speed, Need::Optional, "of the first pass"),
     key(
         "criterion",
         Kind::Force,
         Need::Optional,
-        "force at which the first pass has felt the tissue",
-    ),
-    key(
-        "press",
-        Kind::Flag,
-        Need::Optional,
-        "`false`: the first pass ends there instead of pressing on to learn how the tissue answers",
-    ),
-    key(
-        "press_force",
-        Kind::Force,
-        Need::Optional,
-        "force that ends the press",
-    ),
-    ranged(
-        Range::From0,
-        key(
-            "dwell",
-            Kind::Time,
-            Need::Optional,
-            "time at the end of each pass while the force relaxes",
-        ),
+        "force that ends the first pass",
     ),
     key(
         "retreat",
@@ -143,6 +122,57 @@ const CONTACT_KEYS: [Key; 10] = [
         Need::Optional,
         "widest accepted standard error of the position found",
     ),
+    ranged(
+        Range::From0,
+        key(
+            "press_force",
+            Kind::Force,
+            Need::Optional,
+            "force to which the first pass goes on to learn how the tissue answers; `0 N` ends it at the criterion",
+        ),
+    ),
+    ranged(
+        Range::From0,
+        key(
+            "press_dwell",
+            Kind::Time,
+            Need::Optional,
+            "time at the end of each pass while the force relaxes",
+        ),
+    ),
+];
+
+const BASE_KEYS: [Key; 5] = [
+    key(
+        "speed",
+        Kind::Speed,
+        Need::Usual("0.6 mm/s"),
+        "of the first touch",
+    ),
+    key(
+        "criterion",
+        Kind::Force,
+        Need::Usual("0.05 N"),
+        "force at which the first touch has felt the base",
+    ),
+    key(
+        "retreat",
+        Kind::Length,
+        Need::Usual("0.3 mm"),
+        "way back before the second touch",
+    ),
+    key(
+        "pass_speed",
+        Kind::Speed,
+        Need::Usual("0.03 mm/s"),
+        "of the second touch",
+    ),
+    key(
+        "pass_force",
+        Kind::Force,
+        Need::Usual("0.4 N"),
+        "force that ends the second touch",
+    ),
 ];
 
 const HOME_KEYS: [Key; 2] = [
@@ -159,7 +189,7 @@ const HOME_KEYS: [Key; 2] = [
 pub(super) const WORDS: [Word; 17] = [
     Word {
         name: "self-test",
-        about: "Check link, signal and stop, and switch the motor on. First in every protocol.",
+        about: "Check link, signal and stop, and switch the motor on. First in every protocol that moves.",
         keys: &[key(
             "for",
             Kind::Time,
@@ -207,8 +237,20 @@ pub(super) const WORDS: [Word; 17] = [
     Word {
         name: "find-base",
         about: "Find the base the specimen lay on, with the specimen taken away: its thickness.",
-        keys: &CONTACT_KEYS,
-        build: |args| Ok(Step::FindBase(find(args)?)),
+        keys: &BASE_KEYS,
+        build: |args| {
+            let mut search = FindBase::default();
+            for (name, field) in [
+                ("speed", &mut search.approach_speed.0),
+                ("criterion", &mut search.criterion.0),
+                ("retreat", &mut search.retreat_mm),
+                ("pass_speed", &mut search.pass_speed.0),
+                ("pass_force", &mut search.pass_force.0),
+            ] {
+                *field = args.maybe(name).unwrap_or(*field);
+            }
+            Ok(Step::FindBase(search))
+        },
     },
     Word {
         name: "ramp",
@@ -538,19 +580,13 @@ fn find(args: &Args) -> Result<FindContact, String> {
     ] {
         *field = args.maybe(name).unwrap_or(*field);
     }
-    let (force, dwell) = (args.maybe("press_force"), args.maybe("dwell"));
-    if args.is_no("press") {
-        if force.is_some() || dwell.is_some() {
-            return Err(
-                "without a press there is no 'press_force' or 'dwell'; take them out".into(),
-            );
-        }
-        search.press = None;
-    }
-    if let Some(press) = &mut search.press {
-        press.force.0 = force.unwrap_or(press.force.0);
-        press.dwell.0 = dwell.unwrap_or(press.dwell.0);
-    }
+    let usual = Press::default();
+    let force = args.maybe("press_force").unwrap_or(usual.force.0);
+    let dwell = args.maybe("press_dwell").unwrap_or(usual.dwell.0);
+    search.press = (force > 0.0).then_some(Press {
+        force: Newtons(force),
+        dwell: Seconds(dwell),
+    });
     Ok(search)
 }
 
@@ -605,6 +641,7 @@ fn prompt(args: &Args) -> Result<Step, String> {
     }))
 }
 
+/// A speed of a step.
 impl Args {
     fn speed(&self, key: &str) -> Result<MmPerS, String> {
         self.number(key).map(MmPerS)

@@ -16,7 +16,7 @@ pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::RampHold;
 pub use step::{
-    FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
+    FindBase, FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
 };
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].

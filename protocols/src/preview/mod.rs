@@ -266,7 +266,22 @@ impl Walk<'_> {
                 let far = self.move_secs(travel, *speed) + touch;
                 self.unknown(phase, near, far)
             }
-            Step::FindContact(search) | Step::FindBase(search) => {
+            Step::FindBase(search) => {
+                self.is_contact_known = true;
+                self.check_sizes(&[search.retreat_mm, search.criterion.0, search.pass_force.0]);
+                self.check_speed(search.approach_speed);
+                self.check_speed(search.pass_speed);
+                let approach = |share: f64| self.move_secs(share * travel, search.approach_speed);
+                let slow = self.move_secs(search.retreat_mm, search.pass_speed);
+                // Behind the specimen, as far as it is thick.
+                let (near, far) = (
+                    approach(2.0 * CONTACT_EXPECTED_SHARE) + slow,
+                    approach(1.0) + slow,
+                );
+                self.expected.place(0.0);
+                self.unknown(phase, near, far)
+            }
+            Step::FindContact(search) => {
                 self.is_contact_known = true;
                 let (near, far) = self.contact(search);
                 self.expected.place(0.0);

@@ -3,6 +3,7 @@
 use super::calibrating::{CalibratingError, calibration_of};
 use super::document::Programme;
 use super::progress::{Entry, Place, Progress, ProgressError};
+use crate::plans::Plan;
 use crate::preview::preview;
 use crate::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, StartError, wall_now,
@@ -38,6 +39,8 @@ pub struct Laboratory<'a> {
     pub answers: Answers,
     /// With which probe.
     pub indenter: String,
+    /// What must be acknowledged before a plan is run, such as a daily check that failed; or why that cannot be told.
+    pub gate: &'a dyn Fn(&Plan) -> Result<Vec<String>, String>,
 }
 
 /// What happens on the way.
@@ -179,6 +182,7 @@ impl Work<'_> {
         let plan = task
             .plan(place.repeat, remount)
             .ok_or_else(|| refused("its protocol cannot be written out".into()))?;
+        let to_acknowledge = (self.laboratory.gate)(&plan).map_err(refused)?;
         let session = session_folder(&task.name, &place);
         let folder = self.laboratory.folder.join(&session);
         let request = RunRequest {
@@ -190,6 +194,7 @@ impl Work<'_> {
                 .labels(&place, specimen)
                 .map_err(|err| refused(err.to_string()))?,
             is_acknowledged: programme.is_acknowledged,
+            to_acknowledge,
             after_stop: AfterStop::Close,
             answers: self.laboratory.answers,
         };

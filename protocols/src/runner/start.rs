@@ -50,6 +50,8 @@ pub struct RunRequest {
     pub labels: Labels,
     /// Whether the operator acknowledged what the preview asks to acknowledge.
     pub is_acknowledged: bool,
+    /// What beside the preview is to be acknowledged, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
     /// What follows a stop.
     pub after_stop: AfterStop,
     /// Who answers prompts.
@@ -91,6 +93,9 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         bench.is_homed,
     );
     preview.verdict(request.is_acknowledged).map_err(refused)?;
+    if let (Some(first), false) = (request.to_acknowledge.first(), request.is_acknowledged) {
+        return Err(refused(format!("{first}; acknowledge this to go on")));
+    }
     request
         .labels
         .check()
@@ -112,10 +117,20 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
     };
     let acknowledgements = if request.is_acknowledged {
-        preview.acknowledgements.clone()
+        let beside = request.to_acknowledge.iter();
+        preview
+            .acknowledgements
+            .iter()
+            .chain(beside)
+            .cloned()
+            .collect()
     } else {
         Vec::new()
     };
+    let mut signal = bench.rig.signal();
+    if let Some(filter) = request.labels.about.get("signal.filter") {
+        signal.filter = filter.as_str().unwrap_or_default().into();
+    }
     let manifest = Manifest {
         record_version: RECORD_VERSION,
         session_id: session_id.clone(),
@@ -126,7 +141,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         specimen: request.labels.specimen.clone(),
         indenter: request.labels.indenter.clone(),
         about: request.labels.about.clone(),
-        signal: Some(bench.rig.signal()),
+        signal: Some(signal),
         rig: bench.rig.as_ref().clone(),
         limits: request.limits,
         calibration: json("calibration", serde_json::to_value(&request.calibration))?,

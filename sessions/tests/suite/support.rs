@@ -100,8 +100,8 @@ pub fn rows(count: usize, seed: u64) -> Vec<Row> {
                 volts,
                 pulses: (i / 7) as i64 - 3,
                 status: 33,
-                force: (i > count / 4).then_some(volts * 3.59),
-                depth: (i > count / 3).then_some(i as f64 * 0.000_75),
+                force: (i > count / 5).then_some(volts * 3.59),
+                depth: (i > count / 4).then_some(i as f64 * 0.000_75),
                 phase,
                 cycle: (i > count / 2).into(),
             }

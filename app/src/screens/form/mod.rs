@@ -29,6 +29,8 @@ pub struct Bench {
     pub curve: Curve,
     /// Interlock thresholds.
     pub limits: Limits,
+    /// What must be acknowledged before any run, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
 }
 
 /// A protocol that was chosen, with what is typed for it.
@@ -158,11 +160,16 @@ impl ProtocolForm {
             self.checked = Some((key, Err(Vec::new())));
             return;
         };
-        let checked = protocol.write_out(values).map(|written| Checked {
-            preview: preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed),
-            outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
-            warnings: written.warnings,
-            plan: written.plan,
+        let checked = protocol.write_out(values).map(|written| {
+            let mut preview = preview(&written.plan, rig, &bench.limits, &bench.curve, is_homed);
+            let beside = bench.to_acknowledge.iter().cloned();
+            preview.acknowledgements.extend(beside);
+            Checked {
+                preview,
+                outline: outline(&written.plan, rig, &bench.limits, &bench.curve),
+                warnings: written.warnings,
+                plan: written.plan,
+            }
         });
         self.checked = Some((key, checked));
     }
@@ -261,6 +268,7 @@ impl ProtocolForm {
             out: self.session_folder(),
             labels: self.labels.clone(),
             is_acknowledged: self.is_acknowledged(),
+            to_acknowledge: bench.to_acknowledge.clone(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
         })

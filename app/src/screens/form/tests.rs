@@ -11,6 +11,7 @@ fn bench() -> (RigDescription, Bench) {
         curve: calibration.curve().unwrap(),
         calibration,
         limits: Limits::for_travel(rig.description().travel),
+        to_acknowledge: Vec::new(),
     };
     (rig.description().clone(), bench)
 }
@@ -38,6 +39,19 @@ fn form_with(pairs: &[(&str, &str)]) -> (ProtocolForm, Bench) {
     let mut form = ProtocolForm::default();
     type_into(&mut form, pairs);
     (form, bench().1)
+}
+
+#[test]
+fn a_failed_daily_check_asks_for_the_box_to_be_ticked() {
+    let (rig, mut bench) = bench();
+    bench.to_acknowledge = vec!["the daily check failed".into()];
+    let mut form = ProtocolForm::default();
+    form.refresh(&rig, &bench, false);
+    assert!(form.request(&bench).is_none());
+    form.acknowledge(true);
+    let request = form.request(&bench).unwrap();
+    assert!(request.is_acknowledged);
+    assert_eq!(request.to_acknowledge, bench.to_acknowledge);
 }
 
 #[test]

@@ -1,0 +1,149 @@
+//! `palpate daily-check`: the check that opens a rig for the day.
+
+use super::Failure;
+use super::output::Output;
+use super::rig::RigArgs;
+use clap::Args;
+use palpate_protocols::daily::{DAILY_CHECK, judge};
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::file::built_in;
+use palpate_protocols::plans::Plan;
+use palpate_protocols::runner::{AfterStop, Answers, Labels, RunRequest, wall_now};
+use palpate_sessions::checks::{CheckPart, DailyCheck, add_check};
+use palpate_sessions::{About, Session, library_folder};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+/// Arguments of `palpate daily-check`.
+#[derive(Debug, Args)]
+pub struct DailyCheckArgs {
+    /// The known weight in g
+    #[arg(long, value_name = "G", default_value = "200", value_parser = super::run::number)]
+    mass: f64,
+    #[command(flatten)]
+    rig: RigArgs,
+    /// Session folder, new or empty; without it a new one in the library (~/palpate or PALPATE_HOME)
+    #[arg(long)]
+    out: Option<PathBuf>,
+    /// Who makes the check
+    #[arg(long, default_value = "")]
+    operator: String,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct Checked<'a> {
+    command: &'static str,
+    rig: &'a str,
+    session: PathBuf,
+    calibration: &'a str,
+    is_passed: bool,
+    parts: &'a [CheckPart],
+}
+
+/// Runs the check, judges it and keeps the result.
+pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure> {
+    let library = library_folder().map_err(Failure::usage)?;
+    let plan = plan(args.mass)?;
+    let bench = super::rig::open(&args.rig)?;
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let rig = bench.rig.description().name.clone();
+    let calibration = bench.calibration.name.clone();
+    let request = RunRequest {
+        plan,
+        calibration: bench.calibration,
+        limits: bench.limits,
+        out: args.out.clone(),
+        labels: Labels {
+            operator: args.operator.clone(),
+            specimen: String::new(),
+            indenter: String::new(),
+            about: About::default(),
+        },
+        is_acknowledged: false,
+        to_acknowledge: Vec::new(),
+        after_stop: AfterStop::Close,
+        answers: if bench.rig.is_virtual() {
+            Answers::Confirm
+        } else {
+            Answers::Operator
+        },
+    };
+    let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
+    let Some(view) = &snapshot.run else {
+        return Err(Failure::failed("the runner ended without a run"));
+    };
+    let ended = view.outcome.as_ref();
+    let is_stopped = |ending| matches!(ending, EndingKind::Stop | EndingKind::Halt);
+    if let Some(outcome) = ended.filter(|outcome| is_stopped(outcome.ending)) {
+        return Err(Failure::failed(format!(
+            "the check was ended ({}), so nothing is recorded for today; make it again",
+            outcome.reason
+        )));
+    }
+    let session = Session::open(&view.folder).map_err(super::read_failure)?;
+    let parts = judge(&session).map_err(super::source_failure)?;
+    let check = DailyCheck {
+        at: wall_now().into(),
+        rig,
+        by: args.operator.clone(),
+        session_id: session.manifest.session_id.clone(),
+        calibration,
+        is_passed: parts.iter().all(|part| part.is_passed),
+        parts,
+    };
+    add_check(&library, &check).map_err(Failure::failed)?;
+    let checked = Checked {
+        command: "daily-check",
+        rig: &check.rig,
+        session: view.folder.clone(),
+        calibration: &check.calibration,
+        is_passed: check.is_passed,
+        parts: &check.parts,
+    };
+    output.result(&checked, || text(&checked));
+    match check.is_passed {
+        true => Ok(()),
+        false => Err(Failure::failed(format!(
+            "rig {} failed its daily check: {}",
+            check.rig,
+            check.failures()
+        ))),
+    }
+}
+
+fn plan(mass_g: f64) -> Result<Plan, Failure> {
+    let values = BTreeMap::from([("mass".to_owned(), format!("{mass_g} g"))]);
+    let plan = built_in(DAILY_CHECK).map(|protocol| protocol.and_then(|one| one.plan(&values)));
+    match plan {
+        Some(Ok(plan)) => Ok(plan),
+        Some(Err(problems)) => {
+            let first = problems.first().map(ToString::to_string);
+            Err(Failure::usage(first.unwrap_or_default()))
+        }
+        None => Err(Failure::failed("this palpate has no daily check built in")),
+    }
+}
+
+fn text(checked: &Checked<'_>) -> String {
+    let word = |is_passed| if is_passed { "pass" } else { "FAIL" };
+    let mut lines = vec![format!(
+        "{}: {} in {}",
+        checked.rig,
+        word(checked.is_passed),
+        checked.session.display()
+    )];
+    let part = |part: &CheckPart| {
+        format!(
+            "{:<7} {}: {}",
+            part.what,
+            word(part.is_passed),
+            part.sentence
+        )
+    };
+    lines.extend(checked.parts.iter().map(part));
+    lines.join("\n")
+}

@@ -1,0 +1,223 @@
+//! Protocol files on the command line.
+
+use super::{json, palpate, stderr, stdout, succeeded};
+use serde_json::Value;
+use std::path::Path;
+
+/// A protocol short enough for a test, with something to set and something to ask.
+const MINE: &str = r#"palpate = 1
+name = "mine"
+version = 3
+title = "Two short presses"
+about = "For a test."
+source = "none"
+ask = ["operator", "specimen.storage"]
+
+[parameters]
+depth = { default = "4 mm", max = "10 mm", about = "depth" }
+
+[procedure]
+steps = [
+  { do = "self-test" },
+  { do = "home" },
+  { do = "tare" },
+  { do = "find-contact", recovery = "1 s" },
+  { repeat = 2, as = "press", cycle = true, checkpoint = "after press {press}", steps = [
+      { do = "ramp", speed = "3 mm/s", depth = "$depth" },
+      { do = "unload", speed = "3 mm/s" },
+  ] },
+  { do = "prompt", message = "Look at the specimen", timeout = "1 min" },
+  { do = "retract" },
+]
+"#;
+
+fn with_mine() -> tempfile::TempDir {
+    let folder = tempfile::tempdir().expect("a folder");
+    std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file that can be written");
+    folder
+}
+
+fn run_mine(at: &Path, more: &[&str]) -> std::process::Output {
+    let mut args = vec![
+        "run",
+        "mine.toml",
+        "--time-scale",
+        "max",
+        "--out",
+        "s",
+        "--json",
+    ];
+    args.extend(more);
+    palpate(at, &args)
+}
+
+#[test]
+fn a_file_runs_and_its_session_says_which_it_was() {
+    let folder = with_mine();
+    let at = folder.path();
+    let told = [
+        "--set",
+        "depth=6mm",
+        "--operator",
+        "Ada",
+        "--about",
+        "specimen.storage=saline",
+    ];
+    let run = run_mine(at, &told);
+    succeeded(&run);
+    let run = json(&run);
+    assert_eq!(
+        (run["plan"].as_str(), run["ending"].as_str()),
+        (Some("mine"), Some("finish"))
+    );
+    let replay = palpate(at, &["replay", "s", "--json"]);
+    succeeded(&replay);
+    let session = palpate_sessions::log::Session::open(&at.join("s")).unwrap();
+    let plan = &session.manifest.plan;
+    assert_eq!(plan["version"], 3);
+    assert_eq!(plan["source"]["values"]["depth"], "6mm");
+    let stored = session.manifest.about.get("specimen.storage");
+    assert_eq!(stored, Some(&"saline".into()));
+    assert_eq!(session.manifest.operator, "Ada");
+}
+
+#[test]
+fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
+    let folder = with_mine();
+    let at = folder.path();
+    for (more, words) in [
+        (
+            &["--operator", "Ada"][..],
+            "specimen.storage (how and how long it was stored)",
+        ),
+        (
+            &["--about", "operater=Ada"],
+            "choose from operator, specimen",
+        ),
+        (
+            &["--set", "depth=12 mm"],
+            "parameter 'depth': 12 mm is too large; give 10 mm or less",
+        ),
+        (&["--set", "depth"], "write it like depth=20mm"),
+    ] {
+        let run = run_mine(at, more);
+        assert_eq!(run.status.code(), Some(2), "{}", stderr(&run));
+        assert!(stderr(&run).contains(words), "{}", stderr(&run));
+        assert!(!at.join("s").exists());
+    }
+    for (name, words) in [
+        ("preconditionin", "did you mean 'preconditioning'?"),
+        ("nothing-like-it", "'palpate protocol list'"),
+    ] {
+        let run = palpate(at, &["run", name]);
+        assert_eq!(run.status.code(), Some(2));
+        assert!(stderr(&run).contains(words), "{}", stderr(&run));
+    }
+}
+
+#[test]
+fn check_tells_every_mistake_with_its_line() {
+    let folder = with_mine();
+    let at = folder.path();
+    let spoilt = MINE
+        .replace("\"ramp\"", "\"rmap\"")
+        .replace("\"3 mm/s\" },", "\"3 mm\" },");
+    std::fs::write(at.join("spoilt.toml"), spoilt).unwrap();
+    let deep = MINE
+        .replace("max = \"10 mm\"", "max = \"900 mm\"")
+        .replace("\"4 mm\"", "\"400 mm\"");
+    std::fs::write(at.join("deep.toml"), deep).unwrap();
+
+    let sound = palpate(at, &["protocol", "check", "mine.toml", "creep"]);
+    succeeded(&sound);
+    assert!(
+        stdout(&sound).contains("mine.toml: sound"),
+        "{}",
+        stdout(&sound)
+    );
+
+    let check = palpate(
+        at,
+        &["protocol", "check", "mine.toml", "spoilt.toml", "deep.toml"],
+    );
+    assert_eq!(check.status.code(), Some(2));
+    let text = stdout(&check);
+    for words in [
+        "spoilt.toml, line 19: there is no step 'rmap'; did you mean 'ramp'?",
+        "spoilt.toml, line 20: 'speed' of 'unload': \"3 mm\" is a length",
+        "deep.toml, line 19: a depth of 400 mm is beyond the travel of rig sim",
+    ] {
+        assert!(text.contains(words), "{text}");
+    }
+    let object = palpate(at, &["protocol", "check", "spoilt.toml", "--json"]);
+    let first: Value = serde_json::from_str(stdout(&object).lines().next().unwrap()).unwrap();
+    assert_eq!(first["files"][0]["problems"][0]["line"], 19);
+    assert_eq!(first["files"][0]["problems"][0]["severity"], "error");
+}
+
+#[test]
+fn a_built_in_protocol_is_shown_copied_and_previewed() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let show = palpate(at, &["protocol", "show", "preconditioning"]);
+    std::fs::write(at.join("copy.toml"), stdout(&show)).unwrap();
+    let preview = palpate(
+        at,
+        &[
+            "protocol",
+            "preview",
+            "copy.toml",
+            "--set",
+            "cycles=3",
+            "--plot",
+            "plan.svg",
+            "--json",
+        ],
+    );
+    succeeded(&preview);
+    let preview = json(&preview);
+    assert_eq!(preview["checkpoints"][2]["name"], "after cycle 3");
+    let steps = preview["steps"].as_array().unwrap();
+    let rests = steps.iter().filter(|step| step["phase"] == "rest");
+    assert!(
+        rests
+            .clone()
+            .all(|step| step["expected"] == 180.0 && step["is_exact"] == true)
+    );
+    assert_eq!(rests.count(), 3);
+    let picture = std::fs::read_to_string(at.join("plan.svg")).unwrap();
+    assert_eq!(
+        picture.matches("stroke-width=\"1.6\"").count(),
+        2,
+        "depth and force"
+    );
+    let again = palpate(
+        at,
+        &["protocol", "preview", "copy.toml", "--plot", "plan.svg"],
+    );
+    assert_eq!(again.status.code(), Some(2), "never over another file");
+
+    let list = json(&palpate(at, &["protocol", "list", "--json"]));
+    let names = list["protocols"].as_array().unwrap();
+    assert!(names.iter().any(|one| one["name"] == "relaxation-series"));
+    let steps = palpate(at, &["protocol", "show", "sine", "--steps"]);
+    assert!(
+        stdout(&steps).contains("find-contact"),
+        "{}",
+        stdout(&steps)
+    );
+}
+
+#[test]
+fn the_pages_of_the_guide_are_those_of_the_protocols() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    let check = std::process::Command::new("python3")
+        .arg(root.join("scripts/protocol-pages"))
+        .arg("--check")
+        .env("PALPATE", env!("CARGO_BIN_EXE_palpate"))
+        .output();
+    match check {
+        Ok(output) => assert!(output.status.success(), "{}", stderr(&output)),
+        Err(err) => println!("skipped: there is no python3 here ({err})"),
+    }
+}

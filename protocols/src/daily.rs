@@ -1,0 +1,297 @@
+//! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
+//! tissue unless somebody takes the responsibility.
+
+use crate::analysis::{SourceError, calibration_of, decisions};
+use crate::engine::{Effect, EndingKind, Record};
+use crate::plans::{Plan, Step};
+use palpate_model::calibration::{Calibration, KnownWeight};
+use palpate_model::units::Volts;
+use palpate_sessions::checks::{CheckFileError, CheckPart, DailyCheck, last_of_day, read_checks};
+use palpate_sessions::log::Session;
+use std::path::Path;
+use std::time::SystemTime;
+
+/// Name of the built-in protocol.
+pub const DAILY_CHECK: &str = "daily-check";
+/// The empty cell may read so much of the greatest calibrated force: the 1 % that ASTM E4 allows a force.
+const ZERO_SHARE: f64 = 0.01;
+/// Two homings may differ by so many pulses: the switch closes between two of them.
+const HOME_PULSES: i64 = 1;
+
+/// A part and what was found.
+fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
+    let (is_passed, sentence) = found.unwrap_or_else(|missing| (false, missing));
+    CheckPart {
+        what: what.into(),
+        is_passed,
+        sentence,
+    }
+}
+
+/// Judges a session of the daily check. What was not done has not passed.
+pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
+    let calibration = calibration_of(session)?;
+    let decisions = decisions(session)?;
+    let records: Vec<&Record> = decisions
+        .iter()
+        .filter_map(|(_, effect)| match effect {
+            Effect::Record(record) => Some(record),
+            _ => None,
+        })
+        .collect();
+    let mut parts = vec![
+        part("zero", zero(&calibration, &records)),
+        part("weight", weight(&calibration, &records)),
+        part("home", home(&records)),
+    ];
+    let finished = EndingKind::Finish.name();
+    match &session.end {
+        Some(end) if end.outcome == finished => {}
+        Some(end) => parts.push(part(
+            "run",
+            Err(format!("the check did not finish: {}", end.reason)),
+        )),
+        None => parts.push(part(
+            "run",
+            Err("the check was interrupted; make it again".into()),
+        )),
+    }
+    Ok(parts)
+}
+
+/// Mass in g and signal of every reading, in order.
+fn readings<'a>(records: &'a [&Record]) -> impl Iterator<Item = (f64, Volts)> + 'a {
+    records.iter().filter_map(|record| match record {
+        Record::Weighed { mass_g, volts, .. } => Some((*mass_g, *volts)),
+        _ => None,
+    })
+}
+
+fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+    let (_, volts) = readings(records)
+        .find(|(mass_g, _)| *mass_g == 0.0)
+        .ok_or("the empty cell was not read; make the check again")?;
+    let curve = calibration.curve().map_err(|err| err.to_string())?;
+    let force = curve.newtons_from_volts(volts);
+    let (_, heaviest) = curve.force_range();
+    let limit = ZERO_SHARE * heaviest.0;
+    let is_passed = force.0.abs() <= limit;
+    let advice = match is_passed {
+        true => "",
+        false => "; look what touches the probe, then take a new calibration",
+    };
+    Ok((
+        is_passed,
+        format!(
+            "the empty cell reads {volts:.4}, which is {:+.3} N and {} the limit of {limit:.3} N{advice}",
+            force.0,
+            if is_passed { "within" } else { "beyond" }
+        ),
+    ))
+}
+
+fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+    let mut tare = None;
+    let known = readings(records).find(|(mass_g, volts)| {
+        if *mass_g == 0.0 {
+            tare = Some(*volts);
+        }
+        *mass_g > 0.0
+    });
+    let (Some((mass_g, volts)), Some(tare)) = (known, tare) else {
+        return Err("no known weight was read; make the check again".into());
+    };
+    let result = calibration
+        .check(&KnownWeight {
+            mass_g,
+            tolerance_g: None,
+            volts,
+            tare,
+            limit_percent: None,
+        })
+        .map_err(|err| err.to_string())?;
+    let doubts: Vec<String> = result
+        .doubts
+        .iter()
+        .map(|doubt| format!("; {doubt}"))
+        .collect();
+    Ok((result.is_passed, result.sentence + &doubts.concat()))
+}
+
+fn home(records: &[&Record]) -> Result<(bool, String), String> {
+    let missed = records.iter().find_map(|record| match record {
+        Record::HomeChecked { missed_pulses } => Some(*missed_pulses),
+        _ => None,
+    });
+    let missed = missed.ok_or("the home switch was not touched twice; make the check again")?;
+    let is_passed = missed.abs() <= HOME_PULSES;
+    let advice = match is_passed {
+        true => "",
+        false => "; check the switch, its cable and whether the slider moves freely",
+    };
+    Ok((
+        is_passed,
+        format!("two homings differ by {missed} pulses, at most {HOME_PULSES} is allowed{advice}"),
+    ))
+}
+
+/// What the daily check says to a run.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Gate {
+    /// Nothing.
+    Open,
+    /// Something worth knowing.
+    Note(String),
+    /// Somebody must take the responsibility; it is recorded.
+    Acknowledge(String),
+}
+
+impl Gate {
+    /// What to tell before the run of a plan on a rig. Plans that touch no tissue, such as a calibration or
+    /// the check itself, are always open. Without a library nothing was ever checked.
+    pub fn of(
+        plan: &Plan,
+        library: Option<&Path>,
+        rig: &str,
+        is_virtual: bool,
+        now: SystemTime,
+    ) -> Result<Self, CheckFileError> {
+        let is_touching = |step: &Step| matches!(step, Step::FindContact(_));
+        if !plan.steps.iter().any(|planned| is_touching(&planned.step)) {
+            return Ok(Self::Open);
+        }
+        let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;
+        Ok(match last_of_day(&checks, now.into()) {
+            Some(check) if check.is_passed => Self::Open,
+            Some(check) => Self::Acknowledge(failed(check)),
+            None if is_virtual => Self::Note(format!("{}; '{HOW}' makes one", none_today(rig))),
+            None => Self::Acknowledge(format!("{}; make one with '{HOW}' first", none_today(rig))),
+        })
+    }
+
+    /// What has to be acknowledged.
+    #[must_use]
+    pub fn to_acknowledge(&self) -> Vec<String> {
+        match self {
+            Self::Acknowledge(sentence) => vec![sentence.clone()],
+            Self::Open | Self::Note(_) => Vec::new(),
+        }
+    }
+}
+
+const HOW: &str = "palpate daily-check";
+
+fn none_today(rig: &str) -> String {
+    format!("rig {rig} had no daily check today")
+}
+
+fn failed(check: &DailyCheck) -> String {
+    format!(
+        "rig {} failed its daily check today ({}); mend it and repeat '{HOW}'",
+        check.rig,
+        check.failures()
+    )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::plans::RampHold;
+    use palpate_sessions::checks::add_check;
+
+    fn weighed(mass_g: f64, volts: f64) -> Record {
+        Record::Weighed {
+            mass_g,
+            is_loading: true,
+            repeat: 1,
+            volts: Volts(volts),
+            noise: Volts(0.001),
+            slope_v_per_s: 0.0,
+            samples: 1000,
+            waited: palpate_model::units::Seconds(1.0),
+        }
+    }
+
+    #[test]
+    fn each_part_passes_up_to_its_limit_and_no_further() {
+        let calibration = Calibration::thesis();
+        let curve = calibration.curve().unwrap();
+        let volts = |newtons: f64| {
+            curve
+                .volts_from_newtons(palpate_model::units::Newtons(newtons))
+                .0
+        };
+        let heaviest = curve.force_range().1.0;
+        // 0 g lies at the first point, 200 g between 140 g and 240 g.
+        let weight_n = 0.2 * 9.80665;
+        for (zero_n, error, missed, expected) in [
+            (0.0, 0.0, 0, [true, true, true]),
+            (0.0099 * heaviest, 0.0, 1, [true, true, true]),
+            (0.0101 * heaviest, 0.0, -1, [false, true, true]),
+            (-0.0101 * heaviest, 0.0, 2, [false, true, false]),
+            (0.0, 0.0098, 0, [true, true, true]),
+            (0.0, -0.0102, -2, [true, false, false]),
+        ] {
+            let zero_volts = volts(zero_n);
+            let shift = zero_volts - volts(0.0);
+            let records = [
+                weighed(0.0, zero_volts),
+                weighed(200.0, volts(weight_n * (1.0 + error)) + shift),
+                Record::HomeChecked {
+                    missed_pulses: missed,
+                },
+            ];
+            let records: Vec<&Record> = records.iter().collect();
+            let parts = [
+                zero(&calibration, &records).unwrap(),
+                weight(&calibration, &records).unwrap(),
+                home(&records).unwrap(),
+            ];
+            assert_eq!(
+                parts.clone().map(|(passed, _)| passed),
+                expected,
+                "{parts:?}"
+            );
+        }
+        assert!(zero(&calibration, &[]).is_err());
+        assert!(weight(&calibration, &[&weighed(200.0, 1.7)]).is_err());
+        assert!(home(&[]).is_err());
+    }
+
+    #[test]
+    fn a_failed_check_closes_the_gate_until_one_passes() {
+        let library = tempfile::tempdir().unwrap();
+        let at = Some(library.path());
+        let now = crate::runner::wall_now();
+        let plan = RampHold::default().plan();
+        let gate = |is_virtual| Gate::of(&plan, at, "bench", is_virtual, now).unwrap();
+        assert!(matches!(gate(true), Gate::Note(_)));
+        assert!(matches!(gate(false), Gate::Acknowledge(_)));
+        let mut check = DailyCheck {
+            at: now.into(),
+            rig: "bench".into(),
+            by: "Ada".into(),
+            session_id: "id".into(),
+            calibration: "cell".into(),
+            is_passed: false,
+            parts: vec![part("home", Ok((false, "two homings differ".into())))],
+        };
+        add_check(library.path(), &check).unwrap();
+        let Gate::Acknowledge(why) = gate(true) else {
+            panic!("a failed check is to be acknowledged");
+        };
+        assert!(
+            why.contains("two homings differ") && why.contains("palpate daily-check"),
+            "{why}"
+        );
+        // The remedy itself is never refused.
+        let calibration = Plan::of("load-cell-calibration", 1, Vec::new());
+        assert_eq!(
+            Gate::of(&calibration, at, "bench", false, now).unwrap(),
+            Gate::Open
+        );
+        check.is_passed = true;
+        add_check(library.path(), &check).unwrap();
+        assert_eq!(gate(false), Gate::Open);
+    }
+}

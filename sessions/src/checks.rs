@@ -1,0 +1,177 @@
+//! The daily checks of every rig: one line each in `checks/RIG.jsonl` of the library, never changed.
+
+use crate::chain::{self, ChainError};
+use chrono::{DateTime, Local, Utc};
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// One thing that was checked.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct CheckPart {
+    /// `run`, `zero`, `weight` or `home`.
+    pub what: String,
+    /// Whether it is as it should be.
+    pub is_passed: bool,
+    /// What was found, for the operator.
+    pub sentence: String,
+}
+
+/// A daily check of a rig.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct DailyCheck {
+    /// When it was made.
+    pub at: DateTime<Utc>,
+    /// The rig's name.
+    pub rig: String,
+    /// Who made it.
+    pub by: String,
+    /// The session that shows it.
+    pub session_id: String,
+    /// Name of the calibration that was checked.
+    pub calibration: String,
+    /// Whether every part passed.
+    pub is_passed: bool,
+    /// What was checked.
+    pub parts: Vec<CheckPart>,
+}
+
+impl DailyCheck {
+    /// What failed, in one sentence; empty if nothing did.
+    #[must_use]
+    pub fn failures(&self) -> String {
+        let failed = self.parts.iter().filter(|part| !part.is_passed);
+        let sentences: Vec<&str> = failed.map(|part| part.sentence.as_str()).collect();
+        sentences.join("; ")
+    }
+}
+
+/// Daily checks could not be read or kept.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CheckFileError {
+    /// The file is not as it was written, or the disk refuses.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// A later version wrote it.
+    #[error("line {line} of {} is a check that this palpate does not know ({detail}); update palpate", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// Which line, from 1.
+        line: usize,
+        /// The parser's words.
+        detail: String,
+    },
+}
+
+/// The file of a rig: its name, with what a file name cannot hold replaced and told apart by a checksum.
+fn file_of(library: &Path, rig: &str) -> PathBuf {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    let mut name: String = rig
+        .chars()
+        .map(|c| if is_plain(c) { c } else { '-' })
+        .collect();
+    if name != rig {
+        name += &format!("-{:08x}", crc32fast::hash(rig.as_bytes()));
+    }
+    library.join("checks").join(format!("{name}.jsonl"))
+}
+
+/// Every check of a rig, oldest first; a rig that was never checked has none.
+pub fn read_checks(library: &Path, rig: &str) -> Result<Vec<DailyCheck>, CheckFileError> {
+    let path = file_of(library, rig);
+    let chain = chain::read(&path, rig)?;
+    let check = |(index, body)| {
+        serde_json::from_value(body).map_err(|err| CheckFileError::Unknown {
+            path: path.clone(),
+            line: index + 1,
+            detail: err.to_string(),
+        })
+    };
+    chain.bodies.into_iter().enumerate().map(check).collect()
+}
+
+/// Keeps a check.
+pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), CheckFileError> {
+    let path = file_of(library, &check.rig);
+    let body = serde_json::to_value(check).map_err(|err| ChainError::Io {
+        what: "added to",
+        path: path.clone(),
+        source: err.into(),
+    })?;
+    Ok(chain::append(&path, &check.rig, body)?)
+}
+
+/// The last check of the day of `now`, by this computer's calendar.
+#[must_use]
+pub fn last_of_day(checks: &[DailyCheck], now: DateTime<Utc>) -> Option<&DailyCheck> {
+    let day = |at: DateTime<Utc>| at.with_timezone(&Local).date_naive();
+    checks.iter().rev().find(|check| day(check.at) == day(now))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chrono::{Duration, TimeZone};
+
+    fn check(rig: &str, at: DateTime<Utc>, is_passed: bool) -> DailyCheck {
+        DailyCheck {
+            at,
+            rig: rig.into(),
+            by: "Ada".into(),
+            session_id: "id".into(),
+            calibration: "cell".into(),
+            is_passed,
+            parts: vec![CheckPart {
+                what: "zero".into(),
+                is_passed,
+                sentence: "the empty cell reads 0.3 N".into(),
+            }],
+        }
+    }
+
+    #[test]
+    fn the_last_of_the_day_counts_and_rigs_are_kept_apart() {
+        let library = tempfile::tempdir().unwrap();
+        let at = library.path();
+        // Noon of the computer's own day, so that no time zone turns it into another one.
+        let noon = Local
+            .with_ymd_and_hms(2026, 3, 5, 12, 0, 0)
+            .unwrap()
+            .to_utc();
+        let hour = Duration::hours(1);
+        for one in [
+            check("sim:bench 2", noon - hour * 24, false),
+            check("sim:bench 2", noon - hour, true),
+            check("sim:bench 2", noon, false),
+            check("sim:bench-2", noon, true),
+            check("../sim", noon, true),
+        ] {
+            add_check(at, &one).unwrap();
+        }
+        let own = read_checks(at, "sim:bench 2").unwrap();
+        assert_eq!(own.len(), 3);
+        let last = last_of_day(&own, noon + hour).unwrap();
+        assert_eq!((last.at, last.is_passed), (noon, false));
+        assert!(last.failures().contains("0.3 N"));
+        assert!(last_of_day(&own, noon + hour * 24).is_none());
+        assert!(
+            last_of_day(&read_checks(at, "sim:bench-2").unwrap(), noon)
+                .unwrap()
+                .is_passed
+        );
+        assert_eq!(read_checks(at, "never").unwrap(), []);
+        // A name never leads out of the folder.
+        assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 3);
+        let file = file_of(at, "sim:bench 2");
+        let text = std::fs::read_to_string(&file).unwrap();
+        std::fs::write(
+            &file,
+            text.replacen("\"is_passed\":false", "\"is_passed\":true", 1),
+        )
+        .unwrap();
+        let refusal = read_checks(at, "sim:bench 2").unwrap_err().to_string();
+        assert!(refusal.starts_with("line 1 of"), "{refusal}");
+    }
+}
