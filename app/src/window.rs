@@ -281,8 +281,12 @@ impl WorkbenchApp {
         views_ui(ui, self.middle, commands);
         match self.middle {
             Middle::Choose => {
-                let is_dialog_open = self.dialog.is_open();
-                self.chooser.ui(ui, &self.form, is_dialog_open, commands);
+                let facts = ProtocolFacts {
+                    is_busy: self.is_busy(),
+                    library: &self.library,
+                    is_dialog_open: self.dialog.is_open(),
+                };
+                self.chooser.ui(ui, &self.form, &facts, commands);
             }
             Middle::Course => expected_ui(ui, self.form.checked()),
             Middle::Measured => self.plots_ui(ui),

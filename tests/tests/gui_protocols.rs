@@ -70,7 +70,7 @@ fn preconditioning_is_paused_after_a_cycle_and_resumed() {
     let cycles: Vec<u32> = run.cycle_starts.iter().map(|(_, cycle)| *cycle).collect();
     assert_eq!(cycles, [1, 2]);
     flow.window.run_steps(2);
-    assert!(flow.says("Peak of each cycle") && flow.says("% of the first"));
+    assert!(flow.says("change from the first") && flow.says(" %"));
     let session = Session::open(&flow.sessions()[0]).unwrap();
     assert_eq!(session.manifest.plan["name"], "preconditioning");
     assert_eq!(session.manifest.specimen, "S-014");
@@ -228,6 +228,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
 fn a_declined_prompt_stops_and_keeps_nothing() {
     let mut flow = Flow::open(TimeScale::Factor(30.0));
     choose(&mut flow, "Load-cell calibration");
+    assert!(flow.says("this protocol does not indent"));
     flow.type_into("operator", "Ada");
     flow.click("Start  F5");
     wait_for(&mut flow, "the question", |run| run.prompt.is_some());

@@ -104,7 +104,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             };
             let input = ui.add(input).labelled_by(label.id).on_hover_text(&hint);
             if !is_wide {
-                ui.label(RichText::new(field.unit).color(tokens.text_quiet));
+                ui.label(RichText::new(field.unit_beside()).color(tokens.text_quiet));
             }
             input.has_focus()
         })

@@ -99,7 +99,7 @@ fn cycles_ui(ui: &mut Ui, loops: &[CycleLoop]) {
     let Some(first) = loops.first().and_then(|one| one.peak) else {
         return;
     };
-    section_ui(ui, "Peak of each cycle");
+    section_ui(ui, "Peak of each cycle, change from the first");
     let left_out = loops.len().saturating_sub(CYCLES_SHOWN);
     if left_out > 0 {
         let tokens = Tokens::of(ui.visuals().dark_mode);
@@ -110,10 +110,7 @@ fn cycles_ui(ui: &mut Ui, loops: &[CycleLoop]) {
         if let Some(peak) = one.peak {
             let change = match one.cycle {
                 1 => String::new(),
-                _ => format!(
-                    ", {:+.1} % of the first",
-                    100.0 * (peak.force / first.force - 1.0)
-                ),
+                _ => format!(", {:+.1} %", 100.0 * (peak.force / first.force - 1.0)),
             };
             let words = format!("{:.3} N at {:.2} mm{change}", peak.force, peak.depth);
             fact_ui(ui, &format!("cycle {}", one.cycle), words);

@@ -1,6 +1,7 @@
 //! The middle of the run screen: which protocol, what it is expected to do, or what was measured.
 
 use super::form::{Checked, ProtocolForm};
+use super::protocol_panel::ProtocolFacts;
 use crate::command::{Command, Commands};
 use crate::plots::course::course_ui;
 use crate::theme::Tokens;
@@ -102,14 +103,20 @@ impl Chooser {
         &mut self,
         ui: &mut Ui,
         form: &ProtocolForm,
-        is_dialog_open: bool,
+        facts: &ProtocolFacts<'_>,
         commands: &mut Commands,
     ) {
+        if facts.is_busy {
+            ui.label("A run is in progress; another protocol can be chosen when it has ended.");
+        }
         ScrollArea::vertical()
             .id_salt("protocols")
             .auto_shrink(false)
             .show(ui, |ui| {
-                self.file_ui(ui, is_dialog_open, commands);
+                if facts.is_busy {
+                    ui.disable();
+                }
+                self.file_ui(ui, facts.is_dialog_open, commands);
                 if let (Some(file), false) = (&form.file, form.problems().is_empty()) {
                     mistakes_ui(ui, file, form);
                 }
@@ -176,6 +183,10 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
 pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     match checked {
+        Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
+            let words = "this protocol does not indent; there is no depth or force to draw";
+            ui.label(RichText::new(words).color(tokens.text_quiet));
+        }
         Some(checked) => course_ui(ui, &checked.outline),
         None => {
             let words = "nothing to draw until the protocol and its values are right";

@@ -66,6 +66,27 @@ pub enum Operator {
     Decline,
 }
 
+impl fmt::Display for Operator {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Start => "start",
+            Self::Stop => "stop",
+            Self::Abort => "abort",
+            Self::Halt => "halt",
+            Self::Retract => "retract",
+            Self::Close => "close",
+            Self::Pause => "pause",
+            Self::PauseAfter { step_index } => {
+                return write!(f, "pause after step {}", step_index + 1);
+            }
+            Self::Resume => "resume",
+            Self::Finish => "finish early",
+            Self::Confirm => "done",
+            Self::Decline => "not done",
+        })
+    }
+}
+
 /// Everything the engine can do.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "effect", rename_all = "snake_case")]

@@ -273,7 +273,7 @@ impl ActiveRun {
     fn note_input(&mut self, now: Nanos, input: &Input) {
         match input {
             Input::Operator { choice } => {
-                let text = format!("operator: {choice:?}").to_lowercase();
+                let text = format!("operator: {choice}");
                 self.note(LogLine {
                     at: now,
                     text,

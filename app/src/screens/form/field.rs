@@ -79,6 +79,17 @@ impl ParamField {
         }
     }
 
+    /// The unit to show beside the field: none where the text has one of its own.
+    #[must_use]
+    pub fn unit_beside(&self) -> &'static str {
+        let text = self.text.trim();
+        if text.is_empty() || text.parse::<f64>().is_ok() {
+            self.unit
+        } else {
+            ""
+        }
+    }
+
     /// What it is, its range and where the usual value comes from, a line each.
     #[must_use]
     pub fn hint(&self) -> String {
@@ -166,6 +177,12 @@ mod tests {
         assert_eq!((rest.text.as_str(), rest.unit), ("3", "min"));
         assert_eq!(read(&rest, " 2 ").unwrap(), "2 min");
         assert_eq!(read(&rest, "5 s").unwrap(), "5 s");
+        assert_eq!(rest.unit_beside(), "min");
+        let own = ParamField {
+            text: "5 s".into(),
+            ..rest.clone()
+        };
+        assert_eq!(own.unit_beside(), "");
         let masses = of("load-cell-calibration", "masses");
         assert_eq!(read(&masses, "500, 0.6 kg").unwrap(), "500 g, 0.6 kg");
         let unload = of("ramp-hold", "unload");
