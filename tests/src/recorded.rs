@@ -3,7 +3,7 @@
 use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
-use palpate_protocols::plans::RampHold;
+use palpate_protocols::plans::{Plan, RampHold};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, Runner, TimeScale,
 };
@@ -17,10 +17,19 @@ use std::time::Duration;
 /// If the run is not started or says nothing for a minute.
 #[must_use]
 pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
+    of_plan(rig, calibration, params.plan())
+}
+
+/// The same for any plan.
+///
+/// # Panics
+/// If the run is not started or says nothing for a minute.
+#[must_use]
+pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
     let request = RunRequest {
-        plan: params.plan(),
+        plan,
         calibration,
         limits: Limits::for_travel(rig.description().travel),
         out: Some(out.clone()),

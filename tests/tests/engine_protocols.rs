@@ -7,8 +7,8 @@ use palpate_model::rig::{HandAction, Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record};
 use palpate_protocols::plans::{
-    FindBase, FindContact, HoldForce, HoldRate, LoadTo, OnTimeout, Plan, PlannedStep, Prompt, Sine,
-    Step,
+    Action, FindBase, FindContact, HoldForce, HoldRate, LoadTo, Monitor, OnTimeout, Plan,
+    PlannedStep, Prompt, Side, Sine, Source, Step,
 };
 use palpate_protocols::preview::preview;
 use palpate_tests::lab::Lab;
@@ -419,4 +419,67 @@ fn the_base_tells_how_thick_the_specimen_is() {
         // A touch ends at 0.4 N; stopping on a whole pulse adds up to half of one.
         assert!(most.fold(0.0, f64::max) < 0.75);
     }
+}
+
+/// A plan that loads, with a monitor of the force.
+fn watched(action: Action, threshold: f64) -> Plan {
+    let ramp = Step::Ramp {
+        speed: MmPerS(1.5),
+        depth: Depth(20.0),
+    };
+    let rest = Step::Rest {
+        duration: Seconds(30.0),
+    };
+    let mut plan = plan(vec![rest, ramp]);
+    plan.monitors = vec![Monitor {
+        source: Source::Force,
+        side: Side::Above,
+        threshold,
+        resume: 0.5 * threshold,
+        settle: Seconds(0.5),
+        action,
+        message: "the force is high".into(),
+    }];
+    plan
+}
+
+#[test]
+fn a_monitor_takes_the_probe_out_also_where_nobody_watches() {
+    let rig = rig(SimProfile::Ideal);
+    let calibration = rig.calibration();
+    let session =
+        palpate_tests::recorded::of_plan(Box::new(rig), calibration, watched(Action::Retract, 1.0));
+    let end = session.end.as_ref().unwrap();
+    assert_eq!(end.outcome, "stop", "{}", end.reason);
+    let last = session.rows.last().unwrap();
+    assert!(last.depth.unwrap() < -5.0, "{:?}", last.depth);
+}
+
+#[test]
+fn a_pause_that_cannot_go_on_ends_where_nobody_watches() {
+    let rig = rig(SimProfile::Ideal);
+    let calibration = rig.calibration();
+    let session =
+        palpate_tests::recorded::of_plan(Box::new(rig), calibration, watched(Action::Pause, 1.0));
+    let end = session.end.as_ref().unwrap();
+    assert_eq!(end.outcome, "stop", "{}", end.reason);
+    assert!(end.reason.contains("nobody is there"), "{}", end.reason);
+}
+
+#[test]
+fn what_a_person_paused_only_a_person_resumes() {
+    // The hand that loads the cell stands for whoever touches the probe.
+    let mut lab = lab(SimProfile::Ideal, watched(Action::Pause, 1.0));
+    lab.operator(Operator::Start);
+    let is_resting = |state: &palpate_protocols::engine::State| state.step_progress().0 == 4;
+    assert!(lab.run_until(Seconds(1e3), is_resting));
+    lab.operator(Operator::PauseAfter { step_index: 4 });
+    assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Paused));
+    for mass_g in [150.0, 0.0] {
+        lab.rig.by_hand(HandAction::LoadCell { mass_g });
+        lab.run_until(Seconds(3.0), |_| false);
+    }
+    assert_ne!(lab.state().phase(), Phase::Ramp);
+    let moved = lab.state().derived().depth.unwrap();
+    assert!(moved.0 < 0.1, "{moved}");
 }

@@ -108,6 +108,21 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
 }
 
 #[test]
+fn a_crash_before_the_journal_knew_of_a_run_loses_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::create_dir_all(folder.path().join("jog/02")).unwrap();
+    std::fs::write(folder.path().join("jog/02/000.mcap"), "broken").unwrap();
+    let done = carry_out(JOGS, folder.path()).unwrap();
+    let second = done.progress.runs.iter().find(|run| run.0.repeat == 2);
+    assert_eq!(second.unwrap().0.attempt, 2);
+    // Two programmes in one folder would spoil each other.
+    let held = palpate_sessions::HolderLock::acquire(&folder.path().join("lock")).unwrap();
+    let refusal = carry_out(JOGS, folder.path()).unwrap_err().to_string();
+    assert!(refusal.contains("in use by"), "{refusal}");
+    drop(held);
+}
+
+#[test]
 fn another_or_a_changed_programme_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     carry_out(JOGS, folder.path()).unwrap();

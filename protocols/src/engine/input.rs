@@ -69,6 +69,7 @@ pub enum Operator {
 impl fmt::Display for Operator {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
+            Self::Leave => "nobody is there",
             Self::Start => "start",
             Self::Stop => "stop",
             Self::Abort => "abort",

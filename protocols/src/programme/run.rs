@@ -13,9 +13,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
-use palpate_sessions::{
-    About, AboutError, HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session,
-};
+use palpate_sessions::{About, AboutError, HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
