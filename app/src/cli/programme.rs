@@ -2,9 +2,11 @@
 
 use super::Failure;
 use super::output::Output;
-use super::rig::RigArgs;
+use super::rig::{OpenRig, RigArgs};
 use super::run::HowArgs;
 use crate::report::programme::Page;
+use crate::report::text::in_columns;
+use palpate_protocols::preview::preview;
 use palpate_protocols::programme::{
     Done, Event, Laboratory, Programme, RunError, run as carry_out,
 };
@@ -57,8 +59,10 @@ pub(super) fn run(
     }
     programme.is_acknowledged |= how.acknowledge;
     let rig_args = with_settings(&how.rig, &programme.simulated)?;
+    let bench = super::rig::open(&rig_args)?;
+    let planned = foreseen(file, &programme, &bench)?;
     if how.preview {
-        output.text_only(|| contents(&programme));
+        output.result(&planned, || contents(&programme, &planned));
         return Ok(());
     }
     let folder = match &how.out {
@@ -68,7 +72,6 @@ pub(super) fn run(
             new_programme_folder(&library, &programme.name, wall_now().into())
         }
     };
-    let bench = super::rig::open(&rig_args)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
     let description = bench.rig.description().clone();
     let is_virtual = bench.rig.is_virtual();
@@ -227,14 +230,99 @@ fn with_settings(args: &RigArgs, simulated: &BTreeMap<String, String>) -> Result
     Ok(args)
 }
 
-fn contents(programme: &Programme) -> String {
-    let mut lines = vec![programme.title.clone()];
-    lines.extend(programme.tasks.iter().map(|task| {
-        format!(
-            "{:<20} {:>3} x {}",
-            task.name, task.repeats, task.protocol.title
-        )
-    }));
-    lines.push(format!("{} sessions", programme.session_count()));
-    lines.join("\n")
+/// What a programme will do, session by session, as far as it can be known.
+#[derive(Serialize)]
+struct Foreseen {
+    command: &'static str,
+    programme: String,
+    sessions: u32,
+    expected_s: f64,
+    tasks: Vec<ForeseenTask>,
+}
+
+/// One task of it.
+#[derive(Serialize)]
+struct ForeseenTask {
+    task: String,
+    repeats: u32,
+    expected_s: f64,
+    longest_s: f64,
+    force_band_n: [f64; 2],
+}
+
+/// Previews every task before anything moves; the first that cannot run refuses with its line.
+fn foreseen(file: &Path, programme: &Programme, bench: &OpenRig) -> Result<Foreseen, Failure> {
+    let curve = bench.calibration.curve().map_err(Failure::usage)?;
+    let rig = bench.rig.description();
+    let mut tasks = Vec::new();
+    for task in &programme.tasks {
+        let at = format!(
+            "{}: line {}: task '{}'",
+            file.display(),
+            task.line,
+            task.name
+        );
+        let mut total = ForeseenTask {
+            task: task.name.clone(),
+            repeats: task.repeats,
+            expected_s: 0.0,
+            longest_s: 0.0,
+            force_band_n: [0.0; 2],
+        };
+        for repeat in 1..=task.repeats {
+            let Some(plan) = task.plan(repeat, None) else {
+                return Err(Failure::usage(format!(
+                    "{at}: its protocol cannot be written out"
+                )));
+            };
+            let preview = preview(&plan, rig, &bench.limits, &curve, false);
+            if let Err(reason) = preview.verdict(programme.is_acknowledged) {
+                let hint = if preview.refusals.is_empty() {
+                    "; write acknowledge = true into the file, or add --acknowledge"
+                } else {
+                    ""
+                };
+                return Err(Failure::usage(format!("{at}: {reason}{hint}")));
+            }
+            total.expected_s += preview.expected.0;
+            total.longest_s += preview.longest.0;
+            total.force_band_n = preview.force_band.map(|force| force.0);
+        }
+        tasks.push(total);
+    }
+    Ok(Foreseen {
+        command: "run",
+        programme: programme.name.clone(),
+        sessions: programme.session_count(),
+        expected_s: tasks.iter().map(|task| task.expected_s).sum(),
+        tasks,
+    })
+}
+
+fn contents(programme: &Programme, foreseen: &Foreseen) -> String {
+    let mut lines = vec![
+        ["task", "times", "min", "at most", "peak N", "protocol"]
+            .map(str::to_owned)
+            .to_vec(),
+    ];
+    for (task, ahead) in programme.tasks.iter().zip(&foreseen.tasks) {
+        lines.push(vec![
+            task.name.clone(),
+            task.repeats.to_string(),
+            format!("{:.1}", ahead.expected_s / 60.0),
+            format!("{:.1}", ahead.longest_s / 60.0),
+            format!(
+                "{:.1} to {:.1}",
+                ahead.force_band_n[0], ahead.force_band_n[1]
+            ),
+            task.protocol.title.clone(),
+        ]);
+    }
+    format!(
+        "{}\n{}\n{} sessions, about {:.0} min of session time",
+        programme.title,
+        in_columns(&lines),
+        foreseen.sessions,
+        foreseen.expected_s / 60.0
+    )
 }

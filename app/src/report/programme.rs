@@ -10,8 +10,9 @@ use palpate_model::fit::{FitOptions, FitReport, fit};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::analysis::{self, Stretch};
 use palpate_protocols::cycles::of_session;
+use palpate_protocols::edited;
 use palpate_protocols::programme::{Programme, Progress, Task, calibration_of};
-use palpate_sessions::Session;
+use palpate_sessions::{Session, Verdict};
 use serde::Serialize;
 use std::path::Path;
 
@@ -28,6 +29,8 @@ pub struct RunLine {
     pub session: String,
     /// How it ended; none if it broke off.
     pub ending: Option<String>,
+    /// What it is worth, with the reason where it is not valid; none if nobody said.
+    pub verdict: Option<String>,
     /// Session time in s.
     pub duration_s: f64,
     /// Highest force in N, where force was known.
@@ -120,7 +123,15 @@ impl Page {
             };
             for (place, session, ending) in progress.runs.iter().filter(|run| run.0.task == index) {
                 let name = session.display().to_string();
-                let opened = Session::open(&folder.join(session));
+                let opened = edited::open(&folder.join(session));
+                let verdict = opened.as_ref().ok().and_then(|one| one.edits.verdict());
+                let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
+                let is_rejected = rejection.is_some();
+                let verdict = verdict.map(|(verdict, edit)| match verdict {
+                    Verdict::Valid => verdict.to_string(),
+                    _ => format!("{verdict}: {}", edit.reason),
+                });
+                let opened = opened.map(|one| one.session);
                 let forces = opened.iter().flat_map(|session| &session.rows);
                 let peak = forces.filter_map(|row| row.force).reduce(f64::max);
                 let end = opened.as_ref().ok().and_then(|session| session.rows.last());
@@ -130,10 +141,13 @@ impl Page {
                     attempt: place.attempt,
                     session: name.clone(),
                     ending: ending.clone(),
+                    verdict,
                     duration_s: end.map_or(0.0, |row| row.host.seconds().0),
                     force_peak_n: peak,
                 });
                 match opened {
+                    // It stays in the count and tells nothing.
+                    Ok(_) if is_rejected => part.line(&format!("{name}: rejected, left out")),
                     Ok(session) if ending.as_deref() == Some("finish") => {
                         part.read(task, &name, &session, &mut bodies);
                     }
@@ -149,7 +163,9 @@ impl Page {
     /// The table of runs as text.
     #[must_use]
     pub fn table(&self) -> String {
-        let head = ["task", "repeat", "ended by", "s", "peak N", "session"];
+        let head = [
+            "task", "repeat", "ended by", "s", "peak N", "session", "verdict",
+        ];
         let mut lines = vec![head.map(str::to_owned).to_vec()];
         lines.extend(self.runs.iter().map(|run| {
             let attempt = match run.attempt {
@@ -164,6 +180,7 @@ impl Page {
                 run.force_peak_n
                     .map_or("-".into(), |peak| format!("{peak:.3}")),
                 run.session.clone(),
+                run.verdict.clone().unwrap_or_default(),
             ]
         }));
         in_columns(&lines)

@@ -6,6 +6,7 @@ mod disk;
 mod extremes;
 mod fit;
 mod plan;
+mod programme;
 mod protocol;
 mod records;
 mod select;

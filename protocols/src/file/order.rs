@@ -111,10 +111,12 @@ impl Known {
     fn pass(&mut self, step: &Step) {
         match step {
             Step::SelfTest { .. } => self.motor = true,
-            Step::Home { .. } | Step::CheckHome { .. } => {
+            // An axis that is homed already stays where it is.
+            Step::Home { .. } => {
+                self.is_inside &= self.home;
                 self.home = true;
-                self.is_inside = false;
             }
+            Step::CheckHome { .. } => self.is_inside = false,
             Step::Tare { .. } => self.tare = true,
             Step::FindContact(_) | Step::FindBase(_) => self.contact = true,
             Step::Ramp { .. } | Step::LoadTo(_) | Step::HoldForce(_) | Step::Sine(_) => {
@@ -126,7 +128,9 @@ impl Known {
                 Some(HandAction::Mount { .. } | HandAction::Unmount) => self.contact = false,
                 Some(HandAction::LoadCell { .. }) | None => {}
             },
-            Step::Hold { .. } | Step::Rest { .. } | Step::Weigh(_) | Step::Jog { .. } => {}
+            // From the surface a jog towards the tissue goes in.
+            Step::Jog { distance_mm, .. } => self.is_inside |= self.contact && *distance_mm > 0.0,
+            Step::Hold { .. } | Step::Rest { .. } | Step::Weigh(_) => {}
         }
     }
 }

@@ -8,7 +8,9 @@ use chrono::{DateTime, SecondsFormat, Utc};
 use clap::Args;
 use palpate_model::calibration::{Calibration, CurveKind};
 use palpate_model::units::Volts;
+use palpate_protocols::programme::calibration_of;
 use palpate_protocols::runner::wall_now;
+use palpate_sessions::Session;
 use palpate_sessions::calibrations;
 use palpate_sessions::import::read_weights;
 use palpate_sessions::library_folder;
@@ -17,8 +19,9 @@ use std::path::PathBuf;
 /// Arguments of `palpate calibration import`.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    /// A table with columns mass_g,volts[,direction,repeat,noise_v,samples,waited_s], or a document (.json)
-    #[arg(value_name = "FILE")]
+    /// A session of the protocol load-cell-calibration, a table with columns
+    /// mass_g,volts[,direction,repeat,noise_v,samples,waited_s], or a document (.json)
+    #[arg(value_name = "SESSION|FILE")]
     file: PathBuf,
     /// What people call it; a table has no name of its own
     #[arg(long)]
@@ -137,7 +140,11 @@ fn now() -> String {
 /// The document that the arguments ask for.
 fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
     let is_document = args.file.extension().is_some_and(|ending| ending == "json");
-    let mut new = if is_document {
+    let mut new = if args.file.is_dir() {
+        let session = Session::open(&args.file).map_err(Failure::usage)?;
+        calibration_of(&session, args.name.as_deref().unwrap_or("load cell"))
+            .map_err(Failure::usage)?
+    } else if is_document {
         calibrations::read_calibration(&args.file).map_err(failure)?
     } else {
         let table = read_weights(&args.file).map_err(Failure::usage)?;
