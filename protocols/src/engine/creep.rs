@@ -1,6 +1,7 @@
 //! Constant force: the probe follows the tissue in small steps while the force is kept.
 
 use super::context::{Context, Progress};
+use super::state::Pause;
 use crate::plans::HoldForce;
 use palpate_model::rig::Reading;
 use palpate_model::signal::MovingMean;
@@ -74,7 +75,8 @@ impl Creeping {
             self.quiet_until = reading.tick + FILTER_SAMPLES as u64;
             return Ok(Progress::Continue);
         }
-        if reading.tick >= self.until_tick {
+        // A hold that is paused goes on, and goes on being controlled.
+        if reading.tick >= self.until_tick && cx.state.pause != Some(Pause::Extended) {
             return Ok(Progress::Done);
         }
         if reading.tick < self.quiet_until {
