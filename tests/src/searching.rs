@@ -10,7 +10,7 @@ use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_protocols::engine::{
     Config, Contact, Effect, Input, Operator, Outcome, Record, State, step,
 };
-use palpate_protocols::plans::{FindContact, Plan, Step};
+use palpate_protocols::plans::{FindContact, Plan};
 use std::sync::Arc;
 
 /// Depths below which a second of pass is not counted as pass: the axis still brakes or dwells.
@@ -61,19 +61,7 @@ pub fn search_on(
     plan: FindContact,
     mut happens: impl FnMut(&mut SimRig, &State),
 ) -> Searched {
-    let steps = vec![
-        Step::SelfTest {
-            duration: Seconds(0.5),
-        },
-        Step::Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.3),
-        },
-        Step::Tare {
-            duration: Seconds(4.0),
-        },
-        Step::FindContact(plan),
-    ];
+    let steps = crate::lab::set_up(Seconds(4.0), plan);
     let config = Config {
         rig: rig.description().clone(),
         limits: Limits::for_travel(rig.description().travel),

@@ -10,7 +10,7 @@ use palpate_model::viscoelastic::KelvinState;
 use palpate_protocols::cycles::CycleSource;
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::plans::{FindContact, Plan, PlannedStep, Sine, Step};
-use palpate_tests::lab::Lab;
+use palpate_tests::lab::{Lab, retract, set_up};
 
 fn rig(percent: u8) -> SimRig {
     SimRig::new(SimSettings {
@@ -22,26 +22,9 @@ fn rig(percent: u8) -> SimRig {
 }
 
 fn plan(steps: impl IntoIterator<Item = PlannedStep>) -> Plan {
-    let set_up = vec![
-        Step::SelfTest {
-            duration: Seconds(0.5),
-        },
-        Step::Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.3),
-        },
-        Step::Tare {
-            duration: Seconds(1.0),
-        },
-        Step::FindContact(FindContact::default()),
-    ];
-    let retract = Step::Retract {
-        speed: MmPerS(6.0),
-        clearance_mm: 10.0,
-    };
-    let mut plan = Plan::of("test", 1, set_up);
+    let mut plan = Plan::of("test", 1, set_up(Seconds(1.0), FindContact::default()));
     plan.steps.extend(steps);
-    plan.steps.push(retract.into());
+    plan.steps.push(retract().into());
     plan
 }
 

@@ -7,11 +7,11 @@ use palpate_model::rig::{HandAction, Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record};
 use palpate_protocols::plans::{
-    Action, FindBase, FindContact, HoldForce, HoldRate, LoadTo, Monitor, OnTimeout, Plan,
-    PlannedStep, Prompt, Side, Sine, Source, Step,
+    Action, FindBase, FindContact, HoldForce, HoldRate, LoadTo, Monitor, OnFailure, OnTimeout,
+    Plan, PlannedStep, Prompt, Settle, Side, Sine, Source, Step, Weigh,
 };
 use palpate_protocols::preview::preview;
-use palpate_tests::lab::Lab;
+use palpate_tests::lab::{Lab, retract, set_up};
 
 fn rig(profile: SimProfile) -> SimRig {
     SimRig::new(SimSettings {
@@ -21,32 +21,12 @@ fn rig(profile: SimProfile) -> SimRig {
     })
 }
 
-fn set_up() -> Vec<Step> {
-    vec![
-        Step::SelfTest {
-            duration: Seconds(0.5),
-        },
-        Step::Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.3),
-        },
-        Step::Tare {
-            duration: Seconds(1.0),
-        },
-        Step::FindContact(FindContact::default()),
-    ]
-}
-
-fn retract() -> Step {
-    Step::Retract {
-        speed: MmPerS(6.0),
-        clearance_mm: 10.0,
-    }
-}
-
 /// A set-up, steps, and a retract.
 fn plan(steps: Vec<Step>) -> Plan {
-    let all = set_up().into_iter().chain(steps).chain([retract()]);
+    let all = set_up(Seconds(1.0), FindContact::default())
+        .into_iter()
+        .chain(steps)
+        .chain([retract()]);
     Plan::of("test", 1, all.collect())
 }
 
@@ -482,4 +462,90 @@ fn what_a_person_paused_only_a_person_resumes() {
     assert_ne!(lab.state().phase(), Phase::Ramp);
     let moved = lab.state().derived().depth.unwrap();
     assert!(moved.0 < 0.1, "{moved}");
+}
+
+#[test]
+fn a_search_for_contact_goes_on_from_any_moment_of_it() {
+    let plan = plan(Vec::new());
+    let undisturbed = finished(lab(SimProfile::Ideal, plan.clone()));
+    let contact = |lab: &Lab<SimRig>| lab.state().contact().unwrap();
+    let (first, last) = undisturbed.ticks_of(3).unwrap();
+    for part in 0..12 {
+        let mut lab = lab(SimProfile::Ideal, plan.clone());
+        lab.operator(Operator::Start);
+        let wanted = first + (last - first) * (2 * part + 1) / 24;
+        let mut phase = Phase::Idle;
+        while lab
+            .seen
+            .last()
+            .is_none_or(|seen| seen.reading.tick < wanted)
+        {
+            lab.advance();
+            phase = lab.state().phase();
+        }
+        lab.operator(Operator::Pause);
+        lab.run_until(Seconds(3.0), |_| false);
+        lab.operator(Operator::Resume);
+        assert!(lab.run_until(Seconds(1e3), |_| false));
+        let outcome = lab.outcome.clone();
+        let outcome =
+            outcome.unwrap_or_else(|| panic!("{part}, {phase}: {:?}", lab.state().holding()));
+        assert_eq!(
+            outcome.ending,
+            EndingKind::Finish,
+            "{part}: {}",
+            outcome.reason
+        );
+        let apart = contact(&lab)
+            .position
+            .distance_from(contact(&undisturbed).position);
+        // Two searches of one surface, each known to its own standard error.
+        let error = contact(&lab)
+            .std_error_mm
+            .hypot(contact(&undisturbed).std_error_mm);
+        assert!(apart.abs() < 4.0 * error, "{part}: {apart} {error}");
+    }
+}
+
+#[test]
+fn a_calibration_can_be_paused_with_a_weight_beyond_every_limit_on_the_cell() {
+    let weigh = |mass_g| {
+        Step::Weigh(Weigh {
+            mass_g,
+            is_loading: true,
+            repeat: 1,
+            settle: Settle {
+                window: Seconds(1.0),
+                timeout: Seconds(20.0),
+            },
+        })
+    };
+    let load = Step::Prompt(Prompt {
+        message: "Load the cell".into(),
+        timeout: Seconds(60.0),
+        on_timeout: OnTimeout::Stop,
+        hand: Some(HandAction::LoadCell { mass_g: 1040.0 }),
+    });
+    let plan = Plan::of("weights", 1, vec![load, weigh(1040.0), weigh(1040.0)]);
+    let mut lab = lab(SimProfile::Lab, plan);
+    lab.operator(Operator::Start);
+    assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Weigh));
+    lab.operator(Operator::Pause);
+    assert!(lab.run_until(Seconds(60.0), |state| state.phase() == Phase::Paused));
+    lab.run_until(Seconds(5.0), |_| false);
+    lab.operator(Operator::Resume);
+    assert!(lab.run_until(Seconds(60.0), |_| false));
+    assert_eq!(lab.outcome.unwrap().ending, EndingKind::Finish);
+}
+
+#[test]
+fn a_measurement_is_not_tried_again() {
+    let mut plan = cycles(1, 1.0);
+    plan.steps[4].on_failure = OnFailure::Retry(1);
+    let rig = rig(SimProfile::Ideal);
+    let curve = rig.calibration().curve().unwrap();
+    let limits = Limits::for_travel(rig.description().travel);
+    let refusals = preview(&plan, rig.description(), &limits, &curve, false).refusals;
+    assert_eq!(refusals.len(), 1, "{refusals:?}");
+    assert!(refusals[0].starts_with("step 5, ramp:"), "{refusals:?}");
 }

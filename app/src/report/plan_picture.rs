@@ -28,7 +28,7 @@ pub fn of_plan(name: &str, points: &[OutlinePoint]) -> String {
     title(
         &mut svg,
         name,
-        "expected for the pig stomach of the source thesis; others differ by tens of percent",
+        "expected for the pig stomach of the source thesis, others differ by tens of percent; on a base for a rig that gives 30 µm/N",
     );
     let span = [0.0, end / unit];
     let look: Look = look();

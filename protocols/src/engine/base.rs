@@ -3,6 +3,7 @@
 //!
 //! A stiff surface gives no time: both touches are slow, and the rig's own compliance is all that softens them.
 
+use super::contact::{NOT_TARED, above_noise};
 use super::context::{Context, Progress};
 use super::input::Record;
 use super::state::Contact;
@@ -13,9 +14,6 @@ use palpate_model::units::{Newtons, Position};
 
 /// Samples averaged before a force is compared: late by 5 ms only, a few micrometres at these speeds.
 const FILTER_SAMPLES: usize = 10;
-
-/// The criterion is at least this many standard deviations of the filtered signal.
-const CRITERION_SIGMAS: f64 = 6.0;
 
 /// How far past the first touch the second may go, in mm.
 const PASS_OVERRUN_MM: f64 = 0.5;
@@ -49,13 +47,8 @@ pub(crate) struct BaseSearch {
 
 impl BaseSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindBase) -> Result<Self, String> {
-        let tare = cx
-            .state
-            .tare
-            .ok_or("tare the load cell before searching for the base")?;
-        let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
-        let filtered = noise.0 / (FILTER_SAMPLES as f64).sqrt();
-        let criterion = Newtons(plan.criterion.0.max(CRITERION_SIGMAS * filtered));
+        let tare = cx.state.tare.ok_or(NOT_TARED)?;
+        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, FILTER_SAMPLES);
         if plan.approach_speed > FindBase::SPEED_MAX || plan.pass_speed > FindBase::SPEED_MAX {
             return Err(format!(
                 "a base is stiff; touch it at {} at most",

@@ -39,8 +39,10 @@ const CRITERION_SIGMAS: f64 = 6.0;
 /// A criterion above this would press visibly before it triggers.
 const CRITERION_MAX: Newtons = Newtons(0.2);
 
-/// A drift counts as far as it is beyond so many of its standard errors.
-const DRIFT_SIGMAS: f64 = 3.0;
+/// A drift counts as far as it is beyond so many of its standard errors. At three, one steady but noisy cell in a
+/// thousand was refused; at five it is less than one in a million, and the fit of the contact allows for the drift
+/// that is left.
+const DRIFT_SIGMAS: f64 = 5.0;
 
 /// Contact finding never exerts more than this.
 const FORCE_MAX: Newtons = Newtons(0.5);
@@ -56,6 +58,9 @@ const CLEARANCE_MM: f64 = 1.0;
 
 /// Share of the travel kept free behind the furthest approach, in mm.
 const TRAVEL_MARGIN_MM: f64 = 1.0;
+
+/// A search feels with the load cell.
+pub(super) const NOT_TARED: &str = "tare the load cell before searching with it";
 
 #[derive(Clone, Debug, PartialEq)]
 enum Stage {
@@ -106,13 +111,8 @@ struct Bin {
 
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
-        let tare = cx
-            .state
-            .tare
-            .ok_or("tare the load cell before searching for contact")?;
-        let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
-        let filtered = noise.0 / (FILTER_SAMPLES as f64).sqrt();
-        let criterion = Newtons(plan.criterion.0.max(CRITERION_SIGMAS * filtered));
+        let tare = cx.state.tare.ok_or(NOT_TARED)?;
+        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, FILTER_SAMPLES);
         if criterion > CRITERION_MAX {
             return Err(format!(
                 "noise of {noise:.3} would need a contact criterion of {criterion:.3}, above {CRITERION_MAX}; quieten the signal"
@@ -424,6 +424,18 @@ impl ContactSearch {
             std_error_mm: found.std_error_mm,
         })
     }
+}
+
+/// The force that a mean of so many samples reaches only by touching something, and the noise of one sample.
+pub(super) fn above_noise(
+    cx: &Context<'_>,
+    tare: &Tare,
+    wanted: Newtons,
+    samples: usize,
+) -> (Newtons, Newtons) {
+    let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
+    let filtered = noise.0 / (samples as f64).sqrt();
+    (Newtons(wanted.0.max(CRITERION_SIGMAS * filtered)), noise)
 }
 
 /// Refuses a drift that surely moves the force by half of the criterion within the time an approach may take.

@@ -138,7 +138,11 @@ pub(super) fn resume(cx: &mut Context<'_>) {
         (Activity::Paused { next: Ok(next), .. }, _) => {
             let next = *next;
             cx.record(Record::Resumed);
-            step::begin(cx, next);
+            if next == cx.state.step_index && begins_from_its_place(cx.state.current_step()) {
+                between::come_to_rest(cx, Then::Return(next));
+            } else {
+                step::begin(cx, next);
+            }
         }
         (Activity::Paused { next: Err(why), .. }, _) => {
             let reason = format!("{why}; finish early or stop");
@@ -153,6 +157,15 @@ pub(super) fn resume(cx: &mut Context<'_>) {
             cx.record(Record::Refused { reason });
         }
     }
+}
+
+/// Whether a step that is begun again must begin where it did: a search would feel the tissue at once, a jog would
+/// go too far. The others lead to a place, from wherever.
+fn begins_from_its_place(step: Option<&Step>) -> bool {
+    matches!(
+        step,
+        Some(Step::FindContact(_) | Step::FindBase(_) | Step::Jog { .. })
+    )
 }
 
 /// What paused the run is past: it goes on where that is sound, else the operator decides.
@@ -183,9 +196,8 @@ pub(super) fn finish(cx: &mut Context<'_>) {
     cx.record(Record::FinishedEarly);
     let steps = &cx.state.config.plan.steps;
     let is_retract = |index: &usize| matches!(steps[*index].step, Step::Retract { .. });
-    let last = (cx.state.step_index + 1..steps.len())
-        .rev()
-        .find(is_retract);
+    // The retract that was paused on its way is the last one too.
+    let last = (cx.state.step_index..steps.len()).rev().find(is_retract);
     // Before contact there is nothing to leave.
     let last = last.filter(|_| cx.state.contact.is_some());
     let next = last.unwrap_or(steps.len());

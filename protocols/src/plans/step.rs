@@ -319,6 +319,19 @@ impl Step {
         }
     }
 
+    /// Whether the step is the measurement itself, which indents or leaves tissue while it is recorded.
+    #[must_use]
+    pub fn is_measuring(&self) -> bool {
+        matches!(
+            self,
+            Self::Ramp { .. }
+                | Self::LoadTo(_)
+                | Self::HoldForce(_)
+                | Self::Sine(_)
+                | Self::Unload { .. }
+        )
+    }
+
     /// Whether the step moves the probe by a known position, which needs a homed axis.
     #[must_use]
     pub fn needs_homed_axis(&self) -> bool {

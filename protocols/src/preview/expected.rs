@@ -9,6 +9,10 @@ use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 /// organ differ in level by tens of percent; the band must not be narrower than that.
 const STIFFNESS_BAND: [f64; 2] = [0.7, 1.35];
 
+/// How far a rig gives way on a base that does not, in mm/N: a slide and a load cell of the thesis's size, to an order
+/// of magnitude. Only the picture of a plan and its duration use it.
+const RIG_COMPLIANCE: f64 = 0.03;
+
 /// Points of one move: the exact step has no error of its own, so this is for the picture and for how well
 /// the depth at a force is known.
 const MOVE_POINTS: u32 = 48;
@@ -35,6 +39,8 @@ pub struct OutlinePoint {
 /// The expected specimen on its way through the plan.
 pub(super) struct Expected {
     state: KelvinState,
+    /// The probe stands before a stiff base instead of tissue.
+    is_base: bool,
     depth: f64,
     t: f64,
     force: f64,
@@ -49,6 +55,7 @@ impl Expected {
     pub fn new(has_outline: bool) -> Self {
         Self {
             state: KelvinState::at_rest(),
+            is_base: false,
             depth: 0.0,
             t: 0.0,
             force: 0.0,
@@ -66,15 +73,25 @@ impl Expected {
     /// The probe is placed on relaxed tissue.
     pub fn place(&mut self, depth: f64) {
         self.state = KelvinState::at_rest();
+        self.is_base = false;
         (self.depth, self.force) = (depth, 0.0);
+    }
+
+    /// The probe is placed on a base.
+    pub fn place_on_base(&mut self) {
+        self.place(0.0);
+        self.is_base = true;
     }
 
     /// One straight piece of the way.
     fn advance(&mut self, phase: Phase, depth: f64, secs: f64) {
-        let force = self
-            .state
-            .step(&ModifiedKelvin::THESIS, Depth(depth), Seconds(secs));
-        self.force = force.0.max(0.0);
+        let force = if self.is_base {
+            depth / RIG_COMPLIANCE
+        } else {
+            let body = &ModifiedKelvin::THESIS;
+            self.state.step(body, Depth(depth), Seconds(secs)).0
+        };
+        self.force = force.max(0.0);
         self.depth = depth;
         self.t += secs;
         if self.has_outline {

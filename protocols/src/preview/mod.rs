@@ -6,7 +6,9 @@ mod tests;
 
 pub use expected::OutlinePoint;
 
-use crate::plans::{FindBase, FindContact, HoldUntil, LoadTo, Plan, Press, Step};
+use crate::plans::{
+    FindBase, FindContact, HoldUntil, LoadTo, OnFailure, Plan, PlannedStep, Press, Step,
+};
 use expected::Expected;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, Profile, RigDescription};
@@ -124,7 +126,7 @@ fn walk(
         .steps
         .iter()
         .enumerate()
-        .map(|(index, planned)| walk.step(index, &planned.step))
+        .map(|(index, planned)| walk.step(index, planned))
         .collect();
     for monitor in &plan.monitors {
         walk.refusals.extend(monitor.check().err());
@@ -183,10 +185,17 @@ struct Walk<'a> {
 struct Span(f64, f64, bool);
 
 impl Walk<'_> {
-    fn step(&mut self, index: usize, step: &Step) -> StepPreview {
+    fn step(&mut self, index: usize, planned: &PlannedStep) -> StepPreview {
+        let step = &planned.step;
         let phase = step.phase();
         let refused_before = self.refusals.len();
         let Span(expected, longest, is_exact) = self.span(phase, step);
+        if matches!(planned.on_failure, OnFailure::Retry(_)) && step.is_measuring() {
+            self.refusals.push(
+                "a measurement cannot be tried again, for tissue that was indented is another specimen; let it abort or skip"
+                    .into(),
+            );
+        }
         let refusals = self.refusals[refused_before..].to_vec();
         for refusal in &mut self.refusals[refused_before..] {
             *refusal = format!("step {}, {phase}: {refusal}", index + 1);
@@ -284,7 +293,7 @@ impl Walk<'_> {
                     approach(2.0 * CONTACT_EXPECTED_SHARE) + slow,
                     approach(1.0) + slow,
                 );
-                self.expected.place(0.0);
+                self.expected.place_on_base();
                 self.unknown(phase, near, far)
             }
             Step::FindContact(search) => {
