@@ -40,8 +40,8 @@ pub use folder::{
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use log::{
-    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
+    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Outline, Pace, ReadError,
     SegmentSource, Session, SessionWriter, Sink,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
-pub use record::{EndRecord, Entry, EntryKind, Row};
+pub use record::{Block, EndRecord, Entry, EntryKind, Row};
