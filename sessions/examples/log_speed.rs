@@ -7,7 +7,7 @@ use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
     About, EndRecord, Manifest, Pace, RECORD_VERSION, Row, Session, SessionFolder, SessionWriter,
-    new_session_id,
+    Summary, new_session_id,
 };
 use std::time::Instant;
 
@@ -113,6 +113,20 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     }
     println!("{:.2} bytes a sample", bytes as f64 / samples as f64);
     for _ in 0..3 {
+        let summary = timed("summary", samples, || Summary::read(&path))?;
+        assert_eq!(summary.samples, samples);
+        let mut sum = 0.0;
+        let outline = timed("scan of all channels", samples, || {
+            Session::scan(&path, &mut |block| {
+                sum += block.force().iter().sum::<f64>();
+            })
+        })?;
+        assert_eq!(outline.samples, samples);
+        std::hint::black_box(sum);
+
+        if std::env::var_os("PALPATE_SCAN_ONLY").is_some() {
+            continue;
+        }
         let session = timed("read", samples, || Session::open(&path))?;
         assert_eq!(session.rows.len() as u64, samples);
     }

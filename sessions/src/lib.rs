@@ -22,6 +22,7 @@ pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;
+mod packed;
 pub mod record;
 mod schema;
 pub mod text;
@@ -41,7 +42,7 @@ pub use folder::{
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use log::{
     BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Outline, Pace, ReadError,
-    SegmentSource, Session, SessionWriter, Sink,
+    SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use record::{Block, EndRecord, Entry, EntryKind, Row};

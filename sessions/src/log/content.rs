@@ -80,6 +80,14 @@ impl<'v> Content<'v> {
         self.has_raw = false;
     }
 
+    /// Goes on at any later chunk of the same segment: what lies between is not missed.
+    pub fn begin_anywhere(&mut self) {
+        self.sequences = [None; Channel::ALL.len()];
+        self.first_sample = None;
+        self.samples = 0;
+        self.has_raw = false;
+    }
+
     /// Reads the file's header: `profile` tells whose file it is.
     pub fn take_header(&mut self, body: &[u8]) {
         if Fields(body).text() != Some(PROFILE) {

@@ -156,7 +156,7 @@ impl Session {
 }
 
 /// The files to read.
-fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.exists() {
         return Err(ReadError::Missing { path: path.into() });
     }
@@ -442,7 +442,16 @@ impl<'v> Reader<'v> {
     }
 }
 
-const NOT_BEGUN: &str = "the recording was interrupted before it began, or its beginning is lost";
+pub(crate) const NOT_BEGUN: &str =
+    "the recording was interrupted before it began, or its beginning is lost";
+
+pub(crate) fn damaged(path: &Path, offset: u64, reason: &str) -> ReadError {
+    ReadError::Damaged {
+        path: path.into(),
+        offset,
+        reason: reason.into(),
+    }
+}
 
 fn name_of(path: &Path) -> String {
     path.file_name()
@@ -451,7 +460,11 @@ fn name_of(path: &Path) -> String {
         .into_owned()
 }
 
-fn check_beginning(path: &Path, source: &Source, is_ours: bool) -> Result<(), ReadError> {
+pub(crate) fn check_beginning(
+    path: &Path,
+    source: &Source,
+    is_ours: bool,
+) -> Result<(), ReadError> {
     let reason = if source.length() == 0 {
         "it is empty: nothing was ever recorded"
     } else if !is_ours {
@@ -465,7 +478,7 @@ fn check_beginning(path: &Path, source: &Source, is_ours: bool) -> Result<(), Re
     })
 }
 
-fn refused(path: &Path, refusal: Refusal) -> ReadError {
+pub(crate) fn refused(path: &Path, refusal: Refusal) -> ReadError {
     match refusal {
         Refusal::Foreign => ReadError::NotASession {
             path: path.into(),

@@ -65,21 +65,32 @@ impl Source {
         offset: u64,
         bytes: &mut Vec<u8>,
     ) -> io::Result<Result<FrameHead, NoFrame>> {
-        self.fill(bytes, offset, FRAME_HEADER_BYTES)?;
-        let mut fields = Fields(bytes);
+        let head = match self.head_at(offset)? {
+            Ok(head) => head,
+            Err(reason) => return Ok(Err(reason)),
+        };
+        self.fill(bytes, offset, (head.next - offset) as usize)?;
+        Ok(Ok(head))
+    }
+
+    /// Reads only the header of the frame at `offset`.
+    pub fn head_at(&self, offset: u64) -> io::Result<Result<FrameHead, NoFrame>> {
+        let mut header = [0; FRAME_HEADER_BYTES];
+        let body = offset.saturating_add(FRAME_HEADER_BYTES as u64);
+        if body > self.length {
+            return Ok(Err(NoFrame::PastEnd));
+        }
+        self.file.read_exact_at(&mut header, offset)?;
+        let mut fields = Fields(&header);
         let (Some(opcode), Some(length)) = (fields.u8(), fields.u64()) else {
             return Ok(Err(NoFrame::PastEnd));
         };
-        let body = offset + FRAME_HEADER_BYTES as u64;
         if length > self.length - body {
             return Ok(Err(NoFrame::PastEnd));
         }
         if length > FRAME_BYTES_MAX as u64 {
             return Ok(Err(NoFrame::TooLong));
         }
-        bytes.resize(FRAME_HEADER_BYTES + length as usize, 0);
-        self.file
-            .read_exact_at(&mut bytes[FRAME_HEADER_BYTES..], body)?;
         Ok(Ok(FrameHead {
             opcode,
             next: body + length,
@@ -118,6 +129,14 @@ impl Source {
         let mut footer = Vec::new();
         self.fill(&mut footer, self.length - FOOTER_BYTES as u64, FOOTER_BYTES)?;
         Ok(footer.ends_with(mcap::MAGIC) && footer[0] == op::FOOTER)
+    }
+
+    /// Where a finished file's index begins; its end if it has none.
+    pub fn summary_start(&self) -> io::Result<u64> {
+        let mut footer = Vec::new();
+        self.fill(&mut footer, self.length - FOOTER_BYTES as u64, FOOTER_BYTES)?;
+        let start = Fields(&footer[FRAME_HEADER_BYTES..]).u64();
+        Ok(start.filter(|&start| start > 0).unwrap_or(self.length))
     }
 
     /// The checksum stored at the end of the file and the one of the bytes from `start` to it.
