@@ -16,6 +16,7 @@ pub mod families;
 pub mod fit;
 pub mod integrators;
 mod linalg;
+pub mod quantity;
 pub mod random;
 pub mod reference;
 pub mod rig;

@@ -12,6 +12,7 @@
 
 pub mod about;
 pub mod calibrations;
+pub mod catalog;
 mod chain;
 pub mod checks;
 pub mod edits;
@@ -32,6 +33,7 @@ pub use about::{About, AboutError, Labels};
 pub use calibrations::{
     Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
 };
+pub use catalog::{Catalog, CatalogError};
 pub use chain::ChainError;
 pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
 pub use export::{ExportError, export_csv, export_parquet};

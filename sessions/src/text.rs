@@ -1,7 +1,8 @@
 //! Small text files beside a session.
 
+use sha2::{Digest, Sha256};
 use std::fs::{self, File};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
 use std::path::Path;
 
 /// The text of a file, or one sentence that names it.
@@ -24,6 +25,29 @@ pub fn write(path: &Path, text: &str) -> Result<(), String> {
         .map_err(|err| format!("cannot write {} ({err})", path.display()))
 }
 
+/// SHA-256 of some bytes (FIPS 180-4) as 64 hexadecimal digits.
+#[must_use]
+pub fn sha256(bytes: &[u8]) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
+/// SHA-256 of a file, as [`sha256`]; it is read in pieces.
+pub fn sha256_of_file(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let mut hasher = Sha256::new();
+    let mut piece = [0; 1 << 16];
+    loop {
+        match file.read(&mut piece)? {
+            0 => return Ok(hex(&hasher.finalize())),
+            count => hasher.update(&piece[..count]),
+        }
+    }
+}
+
+fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
 /// CRC-32 of a text as eight hexadecimal digits (ISO-HDLC, as in zip files).
 #[must_use]
 pub fn checksum(text: &str) -> String {
@@ -36,5 +60,21 @@ pub fn read_if_present(path: &Path) -> io::Result<Option<String>> {
         Ok(text) => Ok(Some(text)),
         Err(err) if err.kind() == io::ErrorKind::NotFound => Ok(None),
         Err(err) => Err(err),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sha_256_is_that_of_the_standard() {
+        // The example of one block in FIPS 180-4's examples.
+        let expected = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!(sha256(b"abc"), expected);
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("abc");
+        fs::write(&path, "abc").unwrap();
+        assert_eq!(sha256_of_file(&path).unwrap(), expected);
     }
 }

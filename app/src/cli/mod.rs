@@ -2,9 +2,11 @@
 
 mod analyse;
 mod calibration;
+mod catalog;
 mod daily_check;
 mod export;
 mod extremes;
+mod find;
 mod fit;
 mod info;
 mod last_fit;
@@ -68,6 +70,11 @@ enum Command {
     Calibration(calibration::CalibrationCommand),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
+    /// Find sessions of the library
+    Find(Box<find::FindArgs>),
+    /// Make the catalog of the library anew, or check it
+    #[command(subcommand)]
+    Catalog(catalog::CatalogCommand),
     /// Tell what a session contains
     Info(info::InfoArgs),
     /// Tell what happened in a run: targets and what was done, missing samples, use of time
@@ -164,6 +171,10 @@ pub fn main() -> ExitCode {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
+        Some(Command::Find(args)) => with(args.json, |out| find::run(&args, out)),
+        Some(Command::Catalog(command)) => {
+            with(command.is_json(), |out| catalog::run(&command, out))
+        }
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),

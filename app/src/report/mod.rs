@@ -3,6 +3,7 @@
 
 pub mod calibration;
 pub mod calibration_plot;
+pub mod catalog;
 pub mod cycles;
 pub mod extremes;
 pub mod family;

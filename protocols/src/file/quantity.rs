@@ -2,14 +2,8 @@
 
 use super::problem::suggestion;
 use super::tree::{Node, Value};
+use palpate_model::quantity::{base_unit, in_base_unit, split, units_like};
 use serde::Serialize;
-
-/// A unit: its symbol, and `times / over` of the unit its kind is kept in. Both are whole numbers, so that decimal
-/// values stay what they say.
-type Unit = (&'static str, f64, f64);
-
-/// A kind with its name and units; numbers are kept in the first.
-type KindEntry = (Kind, &'static str, &'static [Unit]);
 
 /// What kind of value a key or a parameter takes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
@@ -39,77 +33,33 @@ pub enum Kind {
     Text,
 }
 
-const UNITS: [KindEntry; 8] = [
-    (
-        Kind::Speed,
-        "a speed",
-        &[
-            ("mm/s", 1.0, 1.0),
-            ("mm/min", 1.0, 60.0),
-            ("um/s", 1.0, 1e3),
-            ("µm/s", 1.0, 1e3),
-        ],
-    ),
-    (
-        Kind::Length,
-        "a length",
-        &[
-            ("mm", 1.0, 1.0),
-            ("cm", 10.0, 1.0),
-            ("um", 1.0, 1e3),
-            ("µm", 1.0, 1e3),
-        ],
-    ),
-    (Kind::Force, "a force", &[("N", 1.0, 1.0), ("mN", 1.0, 1e3)]),
-    (
-        Kind::Time,
-        "a time",
-        &[
-            ("s", 1.0, 1.0),
-            ("ms", 1.0, 1e3),
-            ("min", 60.0, 1.0),
-            ("h", 3600.0, 1.0),
-        ],
-    ),
-    (Kind::Mass, "a mass", &[("g", 1.0, 1.0), ("kg", 1e3, 1.0)]),
-    (
-        Kind::Frequency,
-        "a frequency",
-        &[("Hz", 1.0, 1.0), ("mHz", 1.0, 1e3)],
-    ),
-    (
-        Kind::ForceRate,
-        "a force over time",
-        &[
-            ("N/s", 1.0, 1.0),
-            ("N/min", 1.0, 60.0),
-            ("mN/s", 1.0, 1e3),
-            ("mN/min", 1.0, 6e4),
-        ],
-    ),
-    (
-        Kind::Voltage,
-        "a voltage",
-        &[("V", 1.0, 1.0), ("mV", 1.0, 1e3)],
-    ),
+/// Kinds that have units: name with its article, and the unit numbers are kept in.
+const QUANTITIES: [(Kind, &str, &str); 8] = [
+    (Kind::Speed, "a speed", "mm/s"),
+    (Kind::Length, "a length", "mm"),
+    (Kind::Force, "a force", "N"),
+    (Kind::Time, "a time", "s"),
+    (Kind::Mass, "a mass", "g"),
+    (Kind::Frequency, "a frequency", "Hz"),
+    (Kind::ForceRate, "a force over time", "N/s"),
+    (Kind::Voltage, "a voltage", "V"),
 ];
 
 impl Kind {
-    fn entry(self) -> Option<&'static KindEntry> {
-        UNITS.iter().find(|(kind, ..)| *kind == self)
+    fn entry(self) -> Option<&'static (Kind, &'static str, &'static str)> {
+        QUANTITIES.iter().find(|(kind, ..)| *kind == self)
     }
 
     /// The unit numbers of this kind are kept in; empty for a count and for words.
     #[must_use]
     pub fn unit(self) -> &'static str {
-        self.entry().map_or("", |(_, _, units)| units[0].0)
+        self.entry().map_or("", |(_, _, unit)| unit)
     }
 
     /// Every unit of this kind.
     #[must_use]
     pub fn units(self) -> Vec<&'static str> {
-        let units = self.entry().map_or(&[][..], |(_, _, units)| units);
-        units.iter().map(|(unit, ..)| *unit).collect()
+        units_like(self.unit())
     }
 
     /// Its name with an article.
@@ -144,8 +94,8 @@ impl Kind {
     /// The kind that a unit belongs to.
     #[must_use]
     pub fn of_unit(unit: &str) -> Option<Self> {
-        let has = |units: &[Unit]| units.iter().any(|(known, ..)| *known == unit);
-        let found = UNITS.iter().find(|(_, _, units)| has(units));
+        let base = base_unit(unit)?;
+        let found = QUANTITIES.iter().find(|(_, _, own)| *own == base);
         found.map(|(kind, ..)| *kind)
     }
 }
@@ -203,7 +153,9 @@ impl Given {
             _ => match split(trimmed) {
                 Some((number, "")) if is_whole(number) => What::Number(Kind::Count, number),
                 Some((number, unit)) => match Kind::of_unit(unit) {
-                    Some(kind) => What::Number(kind, scaled(kind, number, unit)),
+                    Some(kind) => {
+                        What::Number(kind, in_base_unit(number, unit).unwrap_or(f64::NAN))
+                    }
                     None => What::Text,
                 },
                 None => What::Text,
@@ -296,36 +248,6 @@ impl Given {
 fn is_whole(number: f64) -> bool {
     // Beyond 2^53 not every whole number has a double of its own; nothing is counted that far.
     number.fract() == 0.0 && number.abs() < 9e15
-}
-
-fn scaled(kind: Kind, number: f64, unit: &str) -> f64 {
-    let units = kind.entry().map_or(&[][..], |(_, _, units)| units);
-    let found = units.iter().find(|(known, ..)| *known == unit);
-    found.map_or(f64::NAN, |(_, times, over)| number * times / over)
-}
-
-/// The number a text begins with, and what follows it.
-fn split(text: &str) -> Option<(f64, &str)> {
-    let bytes = text.as_bytes();
-    let digits_from = |start: usize| {
-        let rest = bytes.iter().skip(start);
-        start
-            + rest
-                .take_while(|byte| byte.is_ascii_digit() || **byte == b'.')
-                .count()
-    };
-    let sign = usize::from(matches!(bytes.first(), Some(b'+' | b'-')));
-    let mut end = digits_from(sign);
-    // An exponent only if digits follow: "2 eggs" are no power.
-    if matches!(bytes.get(end), Some(b'e' | b'E')) {
-        let sign = usize::from(matches!(bytes.get(end + 1), Some(b'+' | b'-')));
-        let exponent = digits_from(end + 1 + sign);
-        if exponent > end + 1 + sign {
-            end = exponent;
-        }
-    }
-    let number: f64 = text.get(..end)?.parse().ok()?;
-    number.is_finite().then(|| (number, text[end..].trim()))
 }
 
 #[cfg(test)]

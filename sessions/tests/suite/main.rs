@@ -1,6 +1,8 @@
 //! Sessions through the crate's public door: written, damaged, read back, exported.
 
 #[cfg(test)]
+mod catalog;
+#[cfg(test)]
 mod damage;
 #[cfg(test)]
 mod exports;
@@ -14,4 +16,5 @@ mod round_trip;
 mod segments;
 #[cfg(test)]
 mod support;
+#[cfg(test)]
 mod written_again;

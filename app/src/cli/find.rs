@@ -1,0 +1,163 @@
+//! `palpate find`: sessions of the library by what is known of them.
+
+use super::Failure;
+use super::catalog::with_updated;
+use super::output::Output;
+use crate::report::catalog as report;
+use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
+use clap::{Args, ValueEnum};
+use palpate_sessions::catalog::{Condition, Entry, Order, Query, VerdictIs};
+use palpate_sessions::library_folder;
+use serde::Serialize;
+use std::num::NonZeroUsize;
+use std::path::PathBuf;
+
+/// Arguments of `palpate find`.
+#[derive(Debug, Args)]
+pub struct FindArgs {
+    /// Words, each of which begins some word of the session
+    #[arg(value_name = "WORD")]
+    words: Vec<String>,
+    /// The specimen, exactly
+    #[arg(long, value_name = "NAME")]
+    specimen: Option<String>,
+    /// The operator, exactly
+    #[arg(long, value_name = "NAME")]
+    operator: Option<String>,
+    /// The protocol's name, exactly
+    #[arg(long, value_name = "NAME")]
+    protocol: Option<String>,
+    /// Started on this day or later, UTC, or at a time such as 2026-03-05T14:00:00Z
+    #[arg(long, value_name = "DAY", value_parser = beginning)]
+    since: Option<DateTime<Utc>>,
+    /// Started on this day or before, UTC, or before a time
+    #[arg(long, value_name = "DAY", value_parser = ending)]
+    until: Option<DateTime<Utc>>,
+    /// A condition on a value of the protocol or on what was told, as in depth>=2mm,
+    /// ramp.speed=3 or specimen.thickness_mm<12; may be repeated
+    #[arg(long = "where", value_name = "CONDITION")]
+    conditions: Vec<Condition>,
+    /// valid, suspect, rejected or none
+    #[arg(long)]
+    verdict: Option<VerdictIs>,
+    /// What the sessions are sorted by
+    #[arg(long, value_enum, default_value = "started")]
+    sort: Sort,
+    /// The other way round
+    #[arg(long)]
+    reverse: bool,
+    /// Sessions on a page
+    #[arg(long, value_name = "N", default_value = "20")]
+    limit: NonZeroUsize,
+    /// Which page, from 1
+    #[arg(long, value_name = "N", default_value = "1")]
+    page: NonZeroUsize,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Sort {
+    /// Latest first
+    Started,
+    /// By specimen
+    Specimen,
+    /// By operator
+    Operator,
+    /// By protocol
+    Protocol,
+    /// Longest first
+    Duration,
+}
+
+impl From<Sort> for Order {
+    fn from(sort: Sort) -> Self {
+        match sort {
+            Sort::Started => Self::Started,
+            Sort::Specimen => Self::Specimen,
+            Sort::Operator => Self::Operator,
+            Sort::Protocol => Self::Protocol,
+            Sort::Duration => Self::Duration,
+        }
+    }
+}
+
+/// A day, or a time.
+fn moment(text: &str) -> Result<(DateTime<Utc>, bool), String> {
+    let day = text.parse::<NaiveDate>();
+    let day = day.map(|day| (day.and_time(NaiveTime::MIN).and_utc(), true));
+    let time = DateTime::parse_from_rfc3339(text).map(|time| (time.to_utc(), false));
+    day.or(time)
+        .map_err(|_| "write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z".to_owned())
+}
+
+fn beginning(text: &str) -> Result<DateTime<Utc>, String> {
+    moment(text).map(|(at, _)| at)
+}
+
+/// The first moment that does not count any more.
+fn ending(text: &str) -> Result<DateTime<Utc>, String> {
+    let (at, is_day) = moment(text)?;
+    let next = at.checked_add_days(Days::new(u64::from(is_day)));
+    next.ok_or_else(|| "no day can be that late".to_owned())
+}
+
+#[derive(Serialize)]
+struct FindReport<'a> {
+    command: &'static str,
+    library: &'a PathBuf,
+    count: usize,
+    page: usize,
+    pages: usize,
+    sessions: &'a [Entry],
+}
+
+pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
+    let library = library_folder().map_err(Failure::usage)?;
+    let (limit, page) = (args.limit.get(), args.page.get());
+    let query = Query {
+        words: args.words.join(" "),
+        specimen: args.specimen.clone(),
+        operator: args.operator.clone(),
+        protocol: args.protocol.clone(),
+        since: args.since,
+        before: args.until,
+        conditions: args.conditions.clone(),
+        verdict: args.verdict,
+        order: args.sort.into(),
+        is_reversed: args.reverse,
+        skip: limit.saturating_mul(page - 1),
+        limit: Some(limit),
+    };
+    let found = with_updated(&library, output, |catalog| catalog.find(&query))?;
+    let object = FindReport {
+        command: "find",
+        library: &library,
+        count: found.count,
+        page,
+        pages: found.count.div_ceil(limit),
+        sessions: &found.entries,
+    };
+    output.result(&object, || report::list(&found, page, object.pages));
+    Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_day_counts_whole_and_a_time_to_the_second() {
+        let text = |at: Result<DateTime<Utc>, String>| at.map(|at| at.to_rfc3339());
+        let day = |text: &str| Ok(format!("{text}T00:00:00+00:00"));
+        assert_eq!(text(beginning("2026-03-05")), day("2026-03-05"));
+        assert_eq!(text(ending("2026-02-28")), day("2026-03-01"));
+        let time = "2026-03-05T14:15:00+01:00";
+        assert_eq!(text(ending(time)), Ok("2026-03-05T13:15:00+00:00".into()));
+        for none in ["yesterday", "2026-02-30", "", "5.3.2026"] {
+            assert!(beginning(none).is_err(), "{none}");
+        }
+        assert!(ending("+262142-12-31").is_err());
+    }
+}

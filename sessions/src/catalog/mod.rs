@@ -1,0 +1,265 @@
+//! The catalog: what a library's sessions say of themselves, in one SQLite file that can be searched.
+//!
+//! The file holds nothing of its own. It is made from the sessions, brought up to date from those that
+//! changed, and may be deleted at any time. A file of another version is replaced; one that is damaged, or
+//! another program's, is set aside and made anew.
+//!
+//! Start reading at [`Entry`] for what is known of a session, then [`Catalog::update`] and
+//! [`Catalog::find`].
+
+mod condition;
+mod entry;
+mod schema;
+mod search;
+mod update;
+mod walk;
+
+pub use condition::{Condition, ConditionError};
+pub use entry::{Entry, Named, Origin, Source};
+pub use search::{Found, Order, Query, VerdictIs};
+pub use update::{Changes, Doubt};
+
+use rusqlite::{Connection, ErrorCode};
+use std::fs;
+use std::io;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+use thiserror::Error;
+
+/// Name of the catalog in a library.
+pub const CATALOG_FILE: &str = "catalog.sqlite";
+/// Held for the moment in which a catalog is opened or replaced.
+const GATE_FILE: &str = "catalog.lock";
+/// Longest wait for another process that writes: it writes in pieces of a fraction of a second.
+const PATIENCE: Duration = Duration::from_secs(10);
+
+/// The catalog could not be made or read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CatalogError {
+    /// The disk refused.
+    #[error("the catalog cannot be {what} ({source}), {}; check the permissions of its folder", path.display())]
+    Io {
+        /// `opened` or `replaced`.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// Another process writes and does not end.
+    #[error("the catalog is in use by another process, {}; try again when that has ended", path.display())]
+    Busy {
+        /// The file.
+        path: PathBuf,
+    },
+    /// SQLite refused.
+    #[error("the catalog cannot be used ({source}), {}; delete the file, it is made anew from the sessions", path.display())]
+    Sql {
+        /// The file.
+        path: PathBuf,
+        /// What SQLite said.
+        source: rusqlite::Error,
+    },
+}
+
+impl CatalogError {
+    fn of(path: &Path, source: rusqlite::Error) -> Self {
+        let path = path.to_owned();
+        match source.sqlite_error_code() {
+            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::Busy { path },
+            _ => Self::Sql { path, source },
+        }
+    }
+
+    /// Whether the file's content is at fault, so that a new one helps.
+    fn is_damage(&self) -> bool {
+        let Self::Sql { source, .. } = self else {
+            return false;
+        };
+        match source.sqlite_error_code() {
+            Some(code) => matches!(
+                code,
+                // A table that ought to be there and is not is `Unknown`.
+                ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase | ErrorCode::Unknown
+            ),
+            // Something else in a column than was written there.
+            None => true,
+        }
+    }
+}
+
+/// An open catalog.
+#[derive(Debug)]
+pub struct Catalog {
+    db: Connection,
+    library: PathBuf,
+    /// What happened to the file that was there, in sentences.
+    pub remarks: Vec<String>,
+}
+
+impl Catalog {
+    /// Opens the catalog of a library, and makes it if there is none.
+    pub fn open(library: &Path) -> Result<Self, CatalogError> {
+        let _gate = gate(library)?;
+        Self::open_behind_gate(library, Vec::new())
+    }
+
+    /// Does some work with the catalog of a library. If its file proves to be damaged, it is set aside and
+    /// the work done again with a new one.
+    pub fn with<T>(
+        library: &Path,
+        mut work: impl FnMut(&mut Self) -> Result<T, CatalogError>,
+    ) -> Result<T, CatalogError> {
+        let done = Self::open(library).and_then(|mut catalog| work(&mut catalog));
+        match done {
+            Err(err) if err.is_damage() => {
+                let mut catalog = Self::replace(library, &err.to_string())?;
+                work(&mut catalog)
+            }
+            done => done,
+        }
+    }
+
+    fn replace(library: &Path, reason: &str) -> Result<Self, CatalogError> {
+        let _gate = gate(library)?;
+        let remark = set_aside(&library.join(CATALOG_FILE), reason)?;
+        Self::open_behind_gate(library, vec![remark])
+    }
+
+    fn open_behind_gate(library: &Path, mut remarks: Vec<String>) -> Result<Self, CatalogError> {
+        let path = library.join(CATALOG_FILE);
+        let db = match open_file(&path) {
+            Ok(Opened::Ours(db)) => db,
+            Ok(Opened::OtherVersion) => {
+                remove(&path)?;
+                open_new(&path)?
+            }
+            Ok(Opened::Foreign) => {
+                remarks.push(set_aside(&path, "it is another program's")?);
+                open_new(&path)?
+            }
+            Err(err) if err.is_damage() => {
+                remarks.push(set_aside(&path, "it is damaged")?);
+                open_new(&path)?
+            }
+            Err(err) => return Err(err),
+        };
+        Ok(Self {
+            db,
+            library: library.to_owned(),
+            remarks,
+        })
+    }
+
+    /// The catalog's file.
+    #[must_use]
+    pub fn path(&self) -> PathBuf {
+        self.library.join(CATALOG_FILE)
+    }
+
+    fn failed(&self) -> impl Fn(rusqlite::Error) -> CatalogError + use<> {
+        let path = self.path();
+        move |source| CatalogError::of(&path, source)
+    }
+}
+
+enum Opened {
+    Ours(Connection),
+    OtherVersion,
+    Foreign,
+}
+
+fn open_file(path: &Path) -> Result<Opened, CatalogError> {
+    let failed = |source| CatalogError::of(path, source);
+    let mut db = Connection::open(path).map_err(failed)?;
+    db.busy_timeout(PATIENCE).map_err(failed)?;
+    let number = |name: &str| -> Result<i64, CatalogError> {
+        db.pragma_query_value(None, name, |row| row.get(0))
+            .map_err(failed)
+    };
+    let tables: i64 = db
+        .query_row("SELECT count(*) FROM sqlite_schema", [], |row| row.get(0))
+        .map_err(failed)?;
+    match (number("application_id")?, number("user_version")?) {
+        (schema::APPLICATION, schema::VERSION) => {}
+        (schema::APPLICATION, _) => return Ok(Opened::OtherVersion),
+        (0, 0) if tables == 0 => schema::create(&mut db).map_err(failed)?,
+        _ => return Ok(Opened::Foreign),
+    }
+    schema::prepare(&db).map_err(failed)?;
+    Ok(Opened::Ours(db))
+}
+
+fn open_new(path: &Path) -> Result<Connection, CatalogError> {
+    match open_file(path)? {
+        Opened::Ours(db) => Ok(db),
+        // Nobody else can have made one: the gate is ours.
+        Opened::OtherVersion | Opened::Foreign => Err(CatalogError::Busy { path: path.into() }),
+    }
+}
+
+/// One process at a time opens or replaces the file. The system lets go when the process dies.
+fn gate(library: &Path) -> Result<fs::File, CatalogError> {
+    let path = library.join(GATE_FILE);
+    let mut options = fs::OpenOptions::new();
+    let options = options.write(true).create(true).truncate(false);
+    fs::create_dir_all(library)
+        .and_then(|()| options.open(&path))
+        .and_then(|file| file.lock().map(|()| file))
+        .map_err(|source| CatalogError::Io {
+            what: "opened",
+            path,
+            source,
+        })
+}
+
+/// A catalog and the two files that SQLite keeps beside it.
+fn parts(path: &Path) -> [PathBuf; 3] {
+    ["", "-wal", "-shm"].map(|ending| {
+        let mut name = path.as_os_str().to_owned();
+        name.push(ending);
+        name.into()
+    })
+}
+
+fn remove(path: &Path) -> Result<(), CatalogError> {
+    for part in parts(path) {
+        match fs::remove_file(&part) {
+            Err(err) if err.kind() != io::ErrorKind::NotFound => {
+                return Err(CatalogError::Io {
+                    what: "replaced",
+                    path: part,
+                    source: err,
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+/// Gives a file that is no catalog another name, and says so.
+fn set_aside(path: &Path, reason: &str) -> Result<String, CatalogError> {
+    let aside = (1..)
+        .map(|number| path.with_file_name(format!("{CATALOG_FILE}.aside-{number}")))
+        .find(|aside| !aside.exists())
+        .unwrap_or_default();
+    for (part, to) in parts(path).iter().zip(parts(&aside)) {
+        match fs::rename(part, &to) {
+            Err(err) if err.kind() != io::ErrorKind::NotFound => {
+                return Err(CatalogError::Io {
+                    what: "replaced",
+                    path: part.clone(),
+                    source: err,
+                });
+            }
+            _ => {}
+        }
+    }
+    Ok(format!(
+        "{} was no usable catalog ({reason}); it was set aside as {} and a new one made",
+        path.display(),
+        aside.display()
+    ))
+}

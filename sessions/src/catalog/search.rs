@@ -1,0 +1,183 @@
+//! What is looked for, and what is found.
+
+use super::condition::Condition;
+use super::entry::Entry;
+use super::update::entry_of;
+use super::{Catalog, CatalogError};
+use crate::edits::Verdict;
+use chrono::{DateTime, Utc};
+use rusqlite::params_from_iter;
+use rusqlite::types::Value as Sql;
+use std::str::FromStr;
+
+/// Which sessions are looked for: those that meet all of it.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Query {
+    /// Every word of it must begin a word of the session.
+    pub words: String,
+    /// The specimen, exactly.
+    pub specimen: Option<String>,
+    /// The operator, exactly.
+    pub operator: Option<String>,
+    /// The protocol's name, exactly.
+    pub protocol: Option<String>,
+    /// Started then or later.
+    pub since: Option<DateTime<Utc>>,
+    /// Started before then.
+    pub before: Option<DateTime<Utc>>,
+    /// Conditions on named values.
+    pub conditions: Vec<Condition>,
+    /// What they are worth.
+    pub verdict: Option<VerdictIs>,
+    /// In which order they come.
+    pub order: Order,
+    /// The other way round.
+    pub is_reversed: bool,
+    /// So many of the first are left out.
+    pub skip: usize,
+    /// So many are told at most; `None` for all.
+    pub limit: Option<usize>,
+}
+
+/// A verdict, or that there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum VerdictIs {
+    /// That one.
+    Given(Verdict),
+    /// None was given.
+    None,
+}
+
+impl FromStr for VerdictIs {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        match text {
+            "none" => Ok(Self::None),
+            text => text
+                .parse()
+                .map(Self::Given)
+                .map_err(|err: String| format!("{err}, or none")),
+        }
+    }
+}
+
+/// What sessions are sorted by; of equals, by folder.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Order {
+    /// The start, latest first.
+    #[default]
+    Started,
+    /// The specimen.
+    Specimen,
+    /// The operator.
+    Operator,
+    /// The protocol.
+    Protocol,
+    /// The duration, longest first.
+    Duration,
+}
+
+impl Order {
+    fn sql(self, is_reversed: bool) -> &'static str {
+        match (self, is_reversed) {
+            (Self::Started, false) => "started_ms DESC, folder",
+            (Self::Started, true) => "started_ms, folder DESC",
+            (Self::Specimen, false) => "specimen, folder",
+            (Self::Specimen, true) => "specimen DESC, folder DESC",
+            (Self::Operator, false) => "operator, folder",
+            (Self::Operator, true) => "operator DESC, folder DESC",
+            (Self::Protocol, false) => "protocol, folder",
+            (Self::Protocol, true) => "protocol DESC, folder DESC",
+            (Self::Duration, false) => "duration_s DESC, folder",
+            (Self::Duration, true) => "duration_s, folder DESC",
+        }
+    }
+}
+
+/// What was found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Found {
+    /// Sessions that meet the query.
+    pub count: usize,
+    /// Those of the page that was asked for.
+    pub entries: Vec<Entry>,
+}
+
+/// The words of a text. Anything but letters and digits parts them, so nothing in it is a sign to SQLite.
+pub(super) fn words(text: &str) -> impl Iterator<Item = &str> {
+    text.split(|letter: char| !letter.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+}
+
+impl Query {
+    fn sql(&self) -> (String, Vec<Sql>) {
+        let (mut parts, mut values) = (vec!["TRUE".to_owned()], Vec::new());
+        for (column, wanted) in [
+            ("specimen", &self.specimen),
+            ("operator", &self.operator),
+            ("protocol", &self.protocol),
+        ] {
+            if let Some(wanted) = wanted {
+                parts.push(format!("{column} = ?"));
+                values.push(wanted.clone().into());
+            }
+        }
+        for (sign, wanted) in [(">=", self.since), ("<", self.before)] {
+            if let Some(wanted) = wanted {
+                // What cannot be read has no start.
+                parts.push(format!("started_ms {sign} ? AND started_ms <> 0"));
+                values.push(wanted.timestamp_millis().into());
+            }
+        }
+        if let Some(verdict) = self.verdict {
+            let word = match verdict {
+                VerdictIs::Given(verdict) => verdict.word(),
+                VerdictIs::None => "",
+            };
+            parts.push("verdict = ?".to_owned());
+            values.push(word.to_owned().into());
+        }
+        for condition in &self.conditions {
+            parts.push(condition.sql(&mut values));
+        }
+        let quoted: Vec<String> = words(&self.words)
+            .map(|word| format!("\"{word}\"*"))
+            .collect();
+        if !quoted.is_empty() {
+            let sql = "id IN (SELECT rowid FROM words WHERE words MATCH ?)";
+            parts.push(sql.to_owned());
+            values.push(quoted.join(" ").into());
+        }
+        (parts.join(" AND "), values)
+    }
+}
+
+impl Catalog {
+    /// Finds sessions. What the catalog does not know yet is not found: see [`Catalog::update`].
+    pub fn find(&self, query: &Query) -> Result<Found, CatalogError> {
+        let find = || -> rusqlite::Result<Found> {
+            let (meets, mut values) = query.sql();
+            let sql = format!("SELECT count(*) FROM session WHERE {meets}");
+            let mut count = self.db.prepare_cached(&sql)?;
+            let count: i64 = count.query_row(params_from_iter(&values), |row| row.get(0))?;
+            let order = query.order.sql(query.is_reversed);
+            let sql = format!(
+                "SELECT entry FROM session WHERE {meets} ORDER BY {order} LIMIT ? OFFSET ?"
+            );
+            // SQLite takes a limit below zero for none.
+            let limit = query.limit.and_then(|limit| i64::try_from(limit).ok());
+            values.push(limit.unwrap_or(-1).into());
+            values.push(i64::try_from(query.skip).unwrap_or(i64::MAX).into());
+            let mut statement = self.db.prepare_cached(&sql)?;
+            let rows = statement.query_map(params_from_iter(&values), |row| {
+                entry_of(&row.get::<_, String>(0)?)
+            })?;
+            Ok(Found {
+                count: count.unsigned_abs() as usize,
+                entries: rows.collect::<rusqlite::Result<_>>()?,
+            })
+        };
+        find().map_err(self.failed())
+    }
+}

@@ -1,0 +1,567 @@
+//! The catalog against the sessions themselves: every search against a plain scan, every update against a
+//! catalog made anew.
+
+use crate::support::{MemorySink, Random, end, manifest, rows};
+use chrono::{Duration, TimeZone, Utc};
+use palpate_sessions::catalog::{CATALOG_FILE, Catalog, Condition, Entry, Order, Query, VerdictIs};
+use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
+use palpate_sessions::{LOG_FILE, Labels, LogWriter, Manifest};
+use std::fs;
+use std::path::Path;
+
+const SPECIMENS: [&str; 5] = ["liver 3", "µ-gel 3 %", "it's \"quoted\"", "a*b -c", ""];
+const OPERATORS: [&str; 3] = ["Ada", "Grace Hopper", "O'Brien; DROP TABLE session"];
+const PROTOCOLS: [&str; 2] = ["ramp-hold", "preconditioning"];
+
+fn plan(random: &mut Random) -> serde_json::Value {
+    let depth = random.below(6);
+    let name = PROTOCOLS[random.below(2)];
+    let steps = serde_json::json!([
+        {"step": "ramp", "depth": depth, "speed": 3.0},
+        {"step": "hold", "duration": 2.5, "until": {"parameter": "tau_eps"}},
+    ]);
+    match name {
+        "ramp-hold" => serde_json::json!({"name": name, "version": 1, "steps": steps}),
+        name => serde_json::json!({
+            "name": name, "version": 2, "title": "Ten cycles", "steps": steps,
+            "source": {"values": {"depth": format!("{depth} mm"), "rest": "3 min", "until": "none"}},
+        }),
+    }
+}
+
+fn random_manifest(random: &mut Random) -> Manifest {
+    let started_at = Utc.with_ymd_and_hms(2026, 3, 1, 12, 0, 0).unwrap()
+        + Duration::hours(random.below(240) as i64);
+    let mut labels = Labels::default();
+    let thickness = format!("specimen.thickness_mm={}", 1 + random.below(9));
+    labels.tell_pair(&thickness).unwrap();
+    labels.tell_pair("series.id=pilot 7").unwrap();
+    Manifest {
+        session_id: format!("20260301T120000Z-{:08x}", random.next() as u32),
+        started_at,
+        specimen: SPECIMENS[random.below(SPECIMENS.len())].into(),
+        operator: OPERATORS[random.below(OPERATORS.len())].into(),
+        about: labels.about,
+        plan: plan(random),
+        ..manifest()
+    }
+}
+
+fn write_session(folder: &Path, manifest: &Manifest, count: usize, is_ended: bool) {
+    let sink = MemorySink::default();
+    let mut log = LogWriter::begin(sink.clone(), "memory", manifest).unwrap();
+    let rows = rows(count, 1);
+    for batch in rows.chunks(100) {
+        log.append(batch, &[]).unwrap();
+    }
+    if is_ended {
+        log.finish(end(rows[count - 1].host)).unwrap();
+    }
+    fs::create_dir_all(folder).unwrap();
+    fs::write(folder.join(LOG_FILE), sink.bytes()).unwrap();
+}
+
+fn edit(reason: &str, change: Change) -> Edit {
+    Edit {
+        at: Utc.with_ymd_and_hms(2026, 4, 1, 9, 0, 0).unwrap(),
+        by: "Grace".into(),
+        reason: reason.into(),
+        change,
+    }
+}
+
+fn judge(folder: &Path, id: &str, verdict: Verdict, reason: &str) {
+    add_edit(folder, id, &edit(reason, Change::Verdict { verdict })).unwrap();
+}
+
+/// A library of random sessions, some without an end, some judged, one damaged.
+fn library(count: usize, seed: u64) -> tempfile::TempDir {
+    let library = tempfile::tempdir().unwrap();
+    let mut random = Random(seed);
+    for number in 0..count {
+        let manifest = random_manifest(&mut random);
+        let place = ["sessions", "programmes/day one"][random.below(2)];
+        let folder = library.path().join(place).join(format!("s{number:03}"));
+        let samples = 150 + 100 * random.below(4);
+        write_session(&folder, &manifest, samples, random.below(5) > 0);
+        let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+        if let Some(verdict) = verdicts.get(random.below(4)) {
+            let reason = ["hair on the probe", "Überlast (naïve)"][random.below(2)];
+            judge(&folder, &manifest.session_id, *verdict, reason);
+        }
+    }
+    let damaged = library.path().join("sessions/damaged");
+    fs::create_dir_all(&damaged).unwrap();
+    fs::write(damaged.join(LOG_FILE), b"no log at all").unwrap();
+    library
+}
+
+fn updated(library: &Path) -> Catalog {
+    let mut catalog = Catalog::open(library).unwrap();
+    catalog.update(&mut |_, _| {}).unwrap();
+    catalog
+}
+
+/// The words of a text as the index parts them, capitals and the accents used here taken off.
+fn plain_words(text: &str) -> Vec<String> {
+    let lower = text.to_lowercase().replace('ü', "u").replace('ï', "i");
+    lower
+        .split(|letter: char| !letter.is_alphanumeric())
+        .filter(|word| !word.is_empty())
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Everything of an entry that is words.
+fn words_of(entry: &Entry) -> Vec<String> {
+    let named = entry.named.iter().filter(|one| one.number.is_none());
+    let mut text = [
+        &entry.folder,
+        &entry.session_id,
+        &entry.operator,
+        &entry.specimen,
+        &entry.indenter,
+        &entry.protocol,
+        &entry.protocol_title,
+        &entry.rig,
+        &entry.reason,
+        &entry.verdict_reason,
+    ]
+    .map(String::as_str)
+    .join(" ");
+    for one in named.map(|one| &one.text).chain(&entry.words) {
+        text = format!("{text} {one}");
+    }
+    text += entry.trouble.as_deref().unwrap_or_default();
+    plain_words(&text)
+}
+
+/// The plain scan.
+fn is_meant(query: &Query, entry: &Entry) -> bool {
+    let is = |wanted: &Option<String>, own: &String| wanted.as_ref().is_none_or(|one| one == own);
+    let start = chrono::DateTime::parse_from_rfc3339(&entry.started_at).ok();
+    let words = words_of(entry);
+    let has_word = |wanted: &String| words.iter().any(|word| word.starts_with(wanted.as_str()));
+    is(&query.specimen, &entry.specimen)
+        && is(&query.operator, &entry.operator)
+        && is(&query.protocol, &entry.protocol)
+        && query
+            .since
+            .is_none_or(|since| start.is_some_and(|at| at >= since))
+        && query
+            .before
+            .is_none_or(|before| start.is_some_and(|at| at < before))
+        && query.conditions.iter().all(|one| one.is_met(entry))
+        && query.verdict.is_none_or(|wanted| match wanted {
+            VerdictIs::Given(verdict) => entry.verdict == Some(verdict),
+            VerdictIs::None => entry.verdict.is_none(),
+        })
+        && plain_words(&query.words).iter().all(has_word)
+}
+
+fn random_query(random: &mut Random) -> Query {
+    let mut query = Query::default();
+    let day = |random: &mut Random| {
+        Utc.with_ymd_and_hms(2026, 3, 1 + random.below(12) as u32, 0, 0, 0)
+            .unwrap()
+    };
+    let conditions = [
+        "depth>=3",
+        "depth_mm<3",
+        "plan.depth=2mm",
+        "ramp.depth<=1",
+        "rest=180",
+        "rest_min=3",
+        "specimen.thickness_mm>4",
+        "about.specimen.thickness_mm!=5",
+        "series.id=pilot 7",
+        "hold.until.parameter=tau_eps",
+        "until!=none",
+        "depth=3 s",
+        "nothing=0",
+    ];
+    let words = [
+        "ada",
+        "GEL",
+        "quoted it",
+        "a*b -c",
+        "drop table",
+        "hair",
+        "uberlast",
+        "naive",
+        "ten cyc",
+        "\"",
+        "-",
+        "*",
+        "NEAR(",
+        "liver 3",
+        "pilot",
+        "programmes day",
+        "s00",
+        "damaged",
+        "nobody",
+    ];
+    for _ in 0..1 + random.below(2) {
+        match random.below(7) {
+            0 => query.specimen = Some(SPECIMENS[random.below(SPECIMENS.len())].into()),
+            1 => query.operator = Some(OPERATORS[random.below(OPERATORS.len())].into()),
+            2 => query.protocol = Some(PROTOCOLS[random.below(2)].into()),
+            3 => query.since = Some(day(random)),
+            4 => query.before = Some(day(random)),
+            5 => {
+                let text = conditions[random.below(conditions.len())];
+                query.conditions.push(text.parse::<Condition>().unwrap());
+            }
+            _ => query.words = words[random.below(words.len())].into(),
+        }
+    }
+    let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+    query.verdict = match random.below(8) {
+        0 => Some(VerdictIs::None),
+        1 => Some(VerdictIs::Given(verdicts[random.below(3)])),
+        _ => None,
+    };
+    query
+}
+
+#[test]
+fn every_search_finds_what_a_plain_scan_finds() {
+    let library = library(60, 5);
+    let catalog = updated(library.path());
+    let entries = catalog.all().unwrap();
+    assert_eq!(entries.len(), 61);
+    let mut random = Random(6);
+    let mut hits = 0;
+    for _ in 0..600 {
+        let query = random_query(&mut random);
+        let found = catalog.find(&query).unwrap();
+        let mut got: Vec<&str> = found
+            .entries
+            .iter()
+            .map(|one| one.folder.as_str())
+            .collect();
+        got.sort_unstable();
+        let meant = entries.iter().filter(|entry| is_meant(&query, entry));
+        let meant: Vec<&str> = meant.map(|entry| entry.folder.as_str()).collect();
+        assert_eq!(got, meant, "{query:?}");
+        assert_eq!(found.count, meant.len());
+        hits += usize::from(!got.is_empty() && got.len() < entries.len());
+    }
+    // A search that finds nothing or everything would prove little.
+    assert!(hits > 200, "{hits}");
+}
+
+#[test]
+fn pages_and_orders_make_up_the_whole() {
+    let library = library(30, 9);
+    let catalog = updated(library.path());
+    let key = |order: Order, entry: &Entry| match order {
+        Order::Started => entry.started_at.clone(),
+        Order::Specimen => entry.specimen.clone(),
+        Order::Operator => entry.operator.clone(),
+        Order::Protocol => entry.protocol.clone(),
+        Order::Duration => format!("{:020.9}", entry.duration_s),
+    };
+    for order in [
+        Order::Started,
+        Order::Specimen,
+        Order::Operator,
+        Order::Protocol,
+        Order::Duration,
+    ] {
+        let mut pages = Vec::new();
+        for page in 0..5 {
+            let query = Query {
+                order,
+                skip: 7 * page,
+                limit: Some(7),
+                ..Query::default()
+            };
+            let found = catalog.find(&query).unwrap();
+            assert_eq!(found.count, 31);
+            pages.extend(found.entries);
+        }
+        assert_eq!(pages.len(), 31);
+        let is_falling = matches!(order, Order::Started | Order::Duration);
+        for pair in pages.windows(2) {
+            let keys = (key(order, &pair[0]), key(order, &pair[1]));
+            let is_sorted = if is_falling {
+                keys.0 >= keys.1
+            } else {
+                keys.0 <= keys.1
+            };
+            assert!(is_sorted, "{order:?}: {keys:?}");
+        }
+        let query = Query {
+            order,
+            is_reversed: true,
+            ..Query::default()
+        };
+        pages.reverse();
+        assert_eq!(catalog.find(&query).unwrap().entries, pages);
+    }
+}
+
+#[test]
+fn an_updated_catalog_is_one_made_anew() {
+    let library = library(8, 11);
+    let at = library.path();
+    let mut random = Random(12);
+    let mut catalog = updated(at);
+    let mut read = 0;
+    for step in 0..40 {
+        let entries = catalog.all().unwrap();
+        let one = &entries[random.below(entries.len())];
+        let folder = at.join(&one.folder);
+        match random.below(6) {
+            0 | 1 => {
+                let new = random_manifest(&mut random);
+                write_session(&at.join(format!("new/{step}")), &new, 200, step % 3 > 0);
+            }
+            2 => fs::remove_dir_all(&folder).unwrap(),
+            3 => {
+                let to = at.join(format!("moved/{step}"));
+                fs::create_dir_all(to.parent().unwrap()).unwrap();
+                fs::rename(&folder, to).unwrap();
+            }
+            4 if one.trouble.is_none() => {
+                judge(
+                    &folder,
+                    &one.session_id,
+                    Verdict::Suspect,
+                    "looked at again",
+                );
+            }
+            // Cut off somewhere: an interrupted session, or no session any more.
+            _ => {
+                let bytes = fs::read(folder.join(LOG_FILE)).unwrap();
+                let keep = random.below(bytes.len().max(1));
+                fs::write(folder.join(LOG_FILE), &bytes[..keep]).unwrap();
+            }
+        }
+        let changes = catalog.update(&mut |_, _| {}).unwrap();
+        read += changes.read;
+        assert!(changes.read <= 1 && changes.removed <= 1, "{changes:?}");
+        assert_eq!(catalog.check(&mut |_, _| {}).unwrap(), [], "step {step}");
+    }
+    assert!(read > 20, "{read}");
+    let grown = catalog.all().unwrap();
+    let words = Query {
+        words: "ada".into(),
+        ..Query::default()
+    };
+    let found = catalog.find(&words).unwrap();
+    drop(catalog);
+    // Deleted, nothing is lost.
+    for name in [
+        CATALOG_FILE.to_owned(),
+        format!("{CATALOG_FILE}-wal"),
+        format!("{CATALOG_FILE}-shm"),
+    ] {
+        let _ = fs::remove_file(at.join(name));
+    }
+    let anew = updated(at);
+    assert_eq!(anew.all().unwrap(), grown);
+    assert_eq!(anew.find(&words).unwrap(), found);
+    assert!(anew.remarks.is_empty());
+}
+
+#[test]
+fn a_changed_log_is_noticed_and_only_that_is_read() {
+    let library = library(5, 21);
+    let at = library.path();
+    let mut catalog = updated(at);
+    assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 0);
+    let folder = at.join("growing");
+    let manifest = manifest();
+    write_session(&folder, &manifest, 200, false);
+    assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 1);
+    let of = |catalog: &Catalog| {
+        let all = catalog.all().unwrap();
+        all.into_iter().find(|one| one.folder == "growing").unwrap()
+    };
+    assert_eq!((of(&catalog).samples, of(&catalog).ending), (200, None));
+    write_session(&folder, &manifest, 400, true);
+    let doubts = catalog.check(&mut |_, _| {}).unwrap();
+    assert_eq!(doubts.len(), 1);
+    assert!(doubts[0].sentence.contains("has changed"), "{doubts:?}");
+    assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 1);
+    assert_eq!(
+        (of(&catalog).samples, of(&catalog).ending),
+        (400, Some("finish".into()))
+    );
+    // As long as before, and other: its time tells.
+    let other = Manifest {
+        specimen: "µ-gel 4 %".into(),
+        ..manifest
+    };
+    write_session(&folder, &other, 400, true);
+    assert_eq!(catalog.update(&mut |_, _| {}).unwrap().read, 1);
+    assert_eq!(of(&catalog).specimen, "µ-gel 4 %");
+}
+
+#[test]
+fn several_at_a_time_end_with_the_same_catalog() {
+    let library = library(40, 31);
+    let at = library.path();
+    std::thread::scope(|scope| {
+        for number in 0..4 {
+            scope.spawn(move || {
+                let mut catalog = Catalog::open(at).unwrap();
+                if number == 3 {
+                    catalog.rebuild(&mut |_, _| {}).unwrap();
+                } else {
+                    catalog.update(&mut |_, _| {}).unwrap();
+                }
+                catalog.find(&Query::default()).unwrap();
+            });
+        }
+    });
+    // A rebuild may have taken out what another had just written; the next update has it again.
+    let catalog = updated(at);
+    assert_eq!(catalog.all().unwrap().len(), 41);
+    assert_eq!(catalog.check(&mut |_, _| {}).unwrap(), []);
+    let query = Query {
+        words: "hair".into(),
+        ..Query::default()
+    };
+    let found = catalog.find(&query).unwrap();
+    let meant = catalog
+        .all()
+        .unwrap()
+        .iter()
+        .filter(|one| is_meant(&query, one))
+        .count();
+    assert_eq!(found.count, meant);
+}
+
+#[test]
+fn what_is_typed_is_never_taken_for_syntax() {
+    let library = library(10, 41);
+    let catalog = updated(library.path());
+    let mut texts: Vec<String> = [
+        "\"",
+        "'",
+        "*",
+        "-",
+        "--",
+        "a AND",
+        "OR",
+        "NOT x",
+        "NEAR(a b, 2)",
+        "text:ada",
+        "^ada",
+        "{a b}: c",
+        "a + b",
+        "(",
+        ")",
+        "\0",
+        "ada\0",
+        "%",
+        "_",
+        ";DROP TABLE words",
+        "\u{feff}",
+        "🙂",
+        "e\u{301}",
+        "\u{e000}",
+        "١٢",
+        "\\",
+        "\n\t",
+    ]
+    .map(String::from)
+    .to_vec();
+    // Every kind of letter there is, a stretch of the code table at a time.
+    for start in (0..0x3000u32).step_by(64) {
+        texts.push((start..start + 64).filter_map(char::from_u32).collect());
+    }
+    for text in texts {
+        for query in [
+            Query {
+                words: text.clone(),
+                ..Query::default()
+            },
+            Query {
+                specimen: Some(text.clone()),
+                ..Query::default()
+            },
+            Query {
+                operator: Some(text.clone()),
+                ..Query::default()
+            },
+        ] {
+            let found = catalog.find(&query);
+            assert!(found.is_ok(), "{text:?}: {found:?}");
+        }
+    }
+}
+
+#[test]
+fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
+    let library = library(6, 51);
+    let at = library.path();
+    let file = at.join(CATALOG_FILE);
+    let expected = updated(at).all().unwrap();
+    let whole = fs::read(&file).unwrap();
+    // Another program's.
+    fs::write(&file, "thesis, last chapter").unwrap();
+    let catalog = updated(at);
+    assert_eq!(catalog.all().unwrap(), expected);
+    assert!(
+        catalog.remarks[0].contains("it was set aside as"),
+        "{:?}",
+        catalog.remarks
+    );
+    let aside = at.join(format!("{CATALOG_FILE}.aside-1"));
+    assert_eq!(fs::read_to_string(aside).unwrap(), "thesis, last chapter");
+    drop(catalog);
+    // Torn and overwritten in every place: either it is still whole, or it is set aside.
+    let mut random = Random(52);
+    let mut set_aside = 0;
+    for _ in 0..60 {
+        let mut bytes = whole.clone();
+        let from = random.below(bytes.len());
+        let until = (from + 1 + random.below(5000)).min(bytes.len());
+        bytes[from..until]
+            .iter_mut()
+            .for_each(|byte| *byte = random_byte(&mut random));
+        if random.below(3) == 0 {
+            bytes.truncate(from);
+        }
+        for ending in ["-wal", "-shm"] {
+            let _ = fs::remove_file(at.join(format!("{CATALOG_FILE}{ending}")));
+        }
+        fs::write(&file, &bytes).unwrap();
+        let words = Query {
+            words: "ada".into(),
+            ..Query::default()
+        };
+        let done = Catalog::with(at, |catalog| {
+            set_aside += catalog.remarks.len();
+            catalog.update(&mut |_, _| {})?;
+            catalog.find(&words)?;
+            catalog.all()
+        });
+        assert!(done.is_ok(), "{done:?}");
+    }
+    assert!(set_aside > 10, "{set_aside}");
+}
+
+fn random_byte(random: &mut Random) -> u8 {
+    random.below(256) as u8
+}
+
+#[test]
+fn a_catalog_of_another_version_is_made_anew_without_a_word() {
+    let library = library(3, 61);
+    let at = library.path();
+    let expected = updated(at).all().unwrap();
+    let file = at.join(CATALOG_FILE);
+    let mut bytes = fs::read(&file).unwrap();
+    // The user version, four bytes at 60 (SQLite file format, 1.3).
+    bytes[60..64].copy_from_slice(&999u32.to_be_bytes());
+    fs::write(&file, bytes).unwrap();
+    let catalog = updated(at);
+    assert_eq!(catalog.all().unwrap(), expected);
+    assert!(catalog.remarks.is_empty());
+    assert!(!at.join(format!("{CATALOG_FILE}.aside-1")).exists());
+}
