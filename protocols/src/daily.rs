@@ -147,7 +147,7 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// What to tell before the run of a plan on a rig. Plans that touch no tissue, such as a calibration or
+    /// What to tell before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
     pub fn of(
         plan: &Plan,
@@ -156,7 +156,9 @@ impl Gate {
         is_virtual: bool,
         now: SystemTime,
     ) -> Result<Self, CheckFileError> {
-        let is_touching = |step: &Step| matches!(step, Step::FindContact(_));
+        // The check jogs between its two homings; nothing else it could do touches.
+        let is_own = |step: &Step| plan.name == DAILY_CHECK && matches!(step, Step::Jog { .. });
+        let is_touching = |step: &Step| step.may_touch() && !is_own(step);
         if !plan.steps.iter().any(|planned| is_touching(&planned.step)) {
             return Ok(Self::Open);
         }

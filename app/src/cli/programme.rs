@@ -2,15 +2,19 @@
 
 use super::Failure;
 use super::output::Output;
+use super::protocol::FileReport;
 use super::rig::{OpenRig, RigArgs};
-use super::run::HowArgs;
+use super::run::{HowArgs, USUAL_INDENTER};
 use crate::report::programme::Page;
 use crate::report::text::in_columns;
-use palpate_protocols::preview::preview;
+use palpate_protocols::file::Problem;
+use palpate_protocols::plans::Plan;
 use palpate_protocols::programme::{
-    Done, Event, Laboratory, Programme, RunError, run as carry_out,
+    Done, Event, Foreseen, Laboratory, Programme, ProgrammeError, RunError, foresee,
+    run as carry_out,
 };
 use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
+use palpate_sessions::about::pair_of;
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
 use serde::Serialize;
@@ -23,6 +27,9 @@ const PAGE_FILE: &str = "summary.html";
 
 /// Name of the calibration in force at the end.
 const CALIBRATION_FILE: &str = "calibration.json";
+
+/// How what is asked for is told.
+const TELL: &str = "write it into [about] of the file, or into [specimen.N] for one specimen, or add --operator, --specimen or --about KEY=VALUE";
 
 /// Whether a name is the file of a programme.
 pub(super) fn is_one(name: &str) -> bool {
@@ -53,17 +60,46 @@ pub(super) fn run(
         ));
     }
     let text = read(file).map_err(Failure::usage)?;
-    let mut programme = read_programme(file, &text)?;
-    if !how.operator.is_empty() {
-        programme.operator.clone_from(&how.operator);
-    }
+    let mut programme = parse(file, &text).map_err(|err| refusal(file, &err))?;
     programme.is_acknowledged |= how.acknowledge;
+    tell(&mut programme, how)?;
     let rig_args = with_settings(&how.rig, &programme.simulated)?;
     let bench = super::rig::open(&rig_args)?;
-    let planned = foreseen(file, &programme, &bench)?;
+    let planned = look_ahead(&programme, &bench)?.map_err(|err| refusal(file, &err))?;
+    for note in &planned.notes {
+        output.note(&format!("{}, {note}", file.display()));
+    }
+    if let Some(first) = planned.to_acknowledge.first() {
+        return Err(refuse(file, first));
+    }
     if how.preview {
-        output.result(&planned, || contents(&programme, &planned));
+        let report = Ahead::of(&programme, &planned);
+        output.result(&report, || contents(&programme, &report));
         return Ok(());
+    }
+    ask(file, &programme)?;
+    let description = bench.rig.description().clone();
+    let is_virtual = bench.rig.is_virtual();
+    let gate = |plan: &Plan| {
+        let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
+        match gate.to_acknowledge() {
+            // What the file accepts are forces, not a rig that failed.
+            reasons if how.acknowledge => Ok(reasons),
+            reasons => match reasons.first() {
+                Some(reason) => Err(format!(
+                    "{reason}; or add --acknowledge to run all the same, which is recorded"
+                )),
+                None => Ok(reasons),
+            },
+        }
+    };
+    for task in &programme.tasks {
+        if let Some(plan) = task.plan(1, None) {
+            gate(&plan).map_err(|reason| {
+                let message = format!("task '{}': {reason}", task.name);
+                refuse(file, &Problem::error(task.line, message))
+            })?;
+        }
     }
     let folder = match &how.out {
         Some(folder) => folder.clone(),
@@ -73,8 +109,6 @@ pub(super) fn run(
         }
     };
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
-    let description = bench.rig.description().clone();
-    let is_virtual = bench.rig.is_virtual();
     let answers = if is_virtual {
         Answers::Confirm
     } else {
@@ -95,20 +129,7 @@ pub(super) fn run(
         calibration: bench.calibration,
         folder: &folder,
         answers,
-        indenter: how.indenter.clone(),
-        gate: &|plan| {
-            let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
-            match gate.to_acknowledge() {
-                // What the file accepts are forces, not a rig that failed.
-                reasons if how.acknowledge => Ok(reasons),
-                reasons => match reasons.first() {
-                    Some(reason) => Err(format!(
-                        "{reason}; or add --acknowledge to run all the same, which is recorded"
-                    )),
-                    None => Ok(reasons),
-                },
-            }
-        },
+        gate: &gate,
     };
     let done = watch(&programme, &checksum(&text), laboratory, output)?;
     drop(runner);
@@ -191,8 +212,8 @@ fn leave(
     Ok(())
 }
 
-fn read_programme(file: &Path, text: &str) -> Result<Programme, Failure> {
-    // Protocols that are not built in lie beside the programme.
+/// The programme of a file; protocols that are not built in lie beside it.
+fn parse(file: &Path, text: &str) -> Result<Programme, ProgrammeError> {
     let beside = |name: &str| {
         let path = file.parent().unwrap_or(Path::new(".")).join(name);
         read(&path).map_err(|err| {
@@ -202,7 +223,114 @@ fn read_programme(file: &Path, text: &str) -> Result<Programme, Failure> {
         })
     };
     Programme::read(text, &beside)
-        .map_err(|err| Failure::usage(format!("{}: {err}", file.display())))
+}
+
+/// The first problem, as a protocol's is told.
+fn refusal(file: &Path, err: &ProgrammeError) -> Failure {
+    let (first, rest) = match err.0.split_first() {
+        Some((first, rest)) => (first.to_string(), rest.len()),
+        None => (String::new(), 0),
+    };
+    let name = file.display();
+    let more = match rest {
+        0 => String::new(),
+        count => format!("; and {count} more: see 'palpate protocol check {name}'"),
+    };
+    Failure::usage(format!("{name}, {first}{more}"))
+}
+
+/// What would only be looked at before a check keeps a run from starting.
+fn refuse(file: &Path, problem: &Problem) -> Failure {
+    let error = Problem::error(problem.line, problem.message.clone());
+    Failure::usage(format!("{}, {error}", file.display()))
+}
+
+/// What the command line says of every session holds over the file.
+fn tell(programme: &mut Programme, how: &HowArgs) -> Result<(), Failure> {
+    programme.usual.indenter = USUAL_INDENTER.to_owned();
+    let indenter = how.indenter.as_deref().unwrap_or_default();
+    let labels = [
+        ("operator", how.operator.as_str()),
+        ("specimen", how.specimen.as_str()),
+        ("indenter", indenter),
+    ];
+    for (key, value) in labels.into_iter().filter(|(_, value)| !value.is_empty()) {
+        programme
+            .tell(key, value)
+            .map_err(|err| Failure::usage(format!("--{key}: {err}")))?;
+    }
+    for text in &how.about {
+        pair_of(text)
+            .map_err(|err| err.to_string())
+            .and_then(|(key, value)| programme.tell(key, value))
+            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+    }
+    Ok(())
+}
+
+/// Refuses while something that protocols ask for is not told.
+fn ask(file: &Path, programme: &Programme) -> Result<(), Failure> {
+    let questions = programme.questions();
+    if questions.is_empty() {
+        return Ok(());
+    }
+    let told: Vec<String> = questions
+        .iter()
+        .map(|question| format!("line {}: {}", question.line, question.message))
+        .collect();
+    Err(Failure::usage(format!(
+        "{}: nothing has begun, for {}; {TELL}",
+        file.display(),
+        told.join("; ")
+    )))
+}
+
+/// Everything that can be said of a programme file before it runs, in order of lines.
+pub(super) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> {
+    let text = read(Path::new(file)).map_err(Failure::usage)?;
+    let mut report = FileReport {
+        file: file.to_owned(),
+        name: None,
+        problems: Vec::new(),
+        expected_s: None,
+    };
+    let programme = match parse(Path::new(file), &text) {
+        Ok(programme) => programme,
+        Err(err) => {
+            report.problems = err.0;
+            return Ok(report);
+        }
+    };
+    // What cannot be a setting of the simulated rig is a mistake of the file.
+    if let Err(err) = with_settings(&RigArgs::default(), &programme.simulated) {
+        report.problems.push(Problem::error(0, err.sentence()));
+    }
+    let questions = programme.questions().into_iter();
+    report.problems.extend(
+        questions.map(|question| {
+            Problem::warning(question.line, format!("{}; {TELL}", question.message))
+        }),
+    );
+    match look_ahead(&programme, bench)? {
+        Ok(ahead) => {
+            report.expected_s = Some(ahead.expected().0);
+            report.problems.extend(ahead.notes);
+            report.problems.extend(ahead.to_acknowledge);
+        }
+        Err(err) => report.problems.extend(err.0),
+    }
+    report.problems.sort_by_key(|problem| problem.line);
+    report.name = Some(programme.name);
+    Ok(report)
+}
+
+fn look_ahead(
+    programme: &Programme,
+    bench: &OpenRig,
+) -> Result<Result<Foreseen, ProgrammeError>, Failure> {
+    let curve = bench.calibration.curve().map_err(Failure::usage)?;
+    let rig = bench.rig.description();
+    Ok(foresee(programme, rig, &bench.limits, &curve))
 }
 
 /// What the programme says of a simulated rig, where the command line says nothing else.
@@ -230,76 +358,48 @@ fn with_settings(args: &RigArgs, simulated: &BTreeMap<String, String>) -> Result
     Ok(args)
 }
 
-/// What a programme will do, session by session, as far as it can be known.
+/// What a programme will do, as `--preview` tells it.
 #[derive(Serialize)]
-struct Foreseen {
+struct Ahead<'a> {
     command: &'static str,
-    programme: String,
+    programme: &'a str,
     sessions: u32,
     expected_s: f64,
-    tasks: Vec<ForeseenTask>,
+    tasks: Vec<AheadTask<'a>>,
 }
 
 /// One task of it.
 #[derive(Serialize)]
-struct ForeseenTask {
-    task: String,
+struct AheadTask<'a> {
+    task: &'a str,
     repeats: u32,
     expected_s: f64,
     longest_s: f64,
     force_band_n: [f64; 2],
 }
 
-/// Previews every task before anything moves; the first that cannot run refuses with its line.
-fn foreseen(file: &Path, programme: &Programme, bench: &OpenRig) -> Result<Foreseen, Failure> {
-    let curve = bench.calibration.curve().map_err(Failure::usage)?;
-    let rig = bench.rig.description();
-    let mut tasks = Vec::new();
-    for task in &programme.tasks {
-        let at = format!(
-            "{}: line {}: task '{}'",
-            file.display(),
-            task.line,
-            task.name
-        );
-        let mut total = ForeseenTask {
-            task: task.name.clone(),
-            repeats: task.repeats,
-            expected_s: 0.0,
-            longest_s: 0.0,
-            force_band_n: [0.0; 2],
-        };
-        for repeat in 1..=task.repeats {
-            let Some(plan) = task.plan(repeat, None) else {
-                return Err(Failure::usage(format!(
-                    "{at}: its protocol cannot be written out"
-                )));
-            };
-            let preview = preview(&plan, rig, &bench.limits, &curve, false);
-            if let Err(reason) = preview.verdict(programme.is_acknowledged) {
-                let hint = if preview.refusals.is_empty() {
-                    "; write acknowledge = true into the file, or add --acknowledge"
-                } else {
-                    ""
-                };
-                return Err(Failure::usage(format!("{at}: {reason}{hint}")));
-            }
-            total.expected_s += preview.expected.0;
-            total.longest_s += preview.longest.0;
-            total.force_band_n = preview.force_band.map(|force| force.0);
+impl<'a> Ahead<'a> {
+    fn of(programme: &'a Programme, foreseen: &Foreseen) -> Self {
+        let pairs = programme.tasks.iter().zip(&foreseen.tasks);
+        Self {
+            command: "run",
+            programme: &programme.name,
+            sessions: programme.session_count(),
+            expected_s: foreseen.expected().0,
+            tasks: pairs
+                .map(|(task, ahead)| AheadTask {
+                    task: &task.name,
+                    repeats: task.repeats,
+                    expected_s: ahead.expected.0,
+                    longest_s: ahead.longest.0,
+                    force_band_n: ahead.force_band.map(|force| force.0),
+                })
+                .collect(),
         }
-        tasks.push(total);
     }
-    Ok(Foreseen {
-        command: "run",
-        programme: programme.name.clone(),
-        sessions: programme.session_count(),
-        expected_s: tasks.iter().map(|task| task.expected_s).sum(),
-        tasks,
-    })
 }
 
-fn contents(programme: &Programme, foreseen: &Foreseen) -> String {
+fn contents(programme: &Programme, foreseen: &Ahead<'_>) -> String {
     let mut lines = vec![
         ["task", "times", "min", "at most", "peak N", "protocol"]
             .map(str::to_owned)
