@@ -292,6 +292,26 @@ mod tests {
             Gate::of(&calibration, at, "bench", false, now).unwrap(),
             Gate::Open
         );
+        // Of the built-in protocols, those that cannot touch stay open.
+        let built_in = |name: &str, values: &[(&str, &str)]| {
+            let protocol = crate::file::built_in(name).unwrap().unwrap();
+            let own = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+            protocol.plan(&values.iter().map(own).collect()).unwrap()
+        };
+        let is_open = |plan: &Plan| {
+            let gate = Gate::of(plan, at, "bench", false, now).unwrap();
+            gate == Gate::Open
+        };
+        let names = crate::file::BUILT_IN.iter().map(|(name, _)| *name);
+        let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
+        assert_eq!(open, ["load-cell-calibration", "daily-check"]);
+        assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));
+        // Nor does the name of the check open what it does not do.
+        let plan = Plan {
+            name: DAILY_CHECK.into(),
+            ..RampHold::default().plan()
+        };
+        assert!(!is_open(&plan));
         check.is_passed = true;
         add_check(library.path(), &check).unwrap();
         assert_eq!(gate(false), Gate::Open);

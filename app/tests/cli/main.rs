@@ -221,7 +221,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
             run(&["--speed", "0.76", "--out", "x"]),
             "the nearest are 0.7500 and 0.7800 mm/s",
         ),
-        (run(&["--hold", "-1", "--out", "x"]), "is not possible"),
+        (run(&["--hold", "-1", "--out", "x"]), "give 0 s or more"),
         (
             vec!["run", "ramp-hold", "--time-scale", "fast"],
             "is not a time scale",

@@ -136,7 +136,10 @@ impl Programme {
         let own = number.and_then(|number| self.told.specimens.get(&number));
         let own = own.map_or(&[][..], Vec::as_slice);
         let mut labels = self.usual.clone();
-        for (key, value) in self.told.all.iter().chain(own).chain(&self.told.over) {
+        let told = self.told.all.iter().chain(own).chain(&self.told.over);
+        // Weights are no specimen.
+        let is_weighed = self.tasks[task].calibrates;
+        for (key, value) in told.filter(|(key, _)| !(is_weighed && key.starts_with(SPECIMEN))) {
             labels.tell(key, value)?;
         }
         let names = |pairs: &[Pair]| pairs.iter().any(|(key, _)| key == SPECIMEN);
