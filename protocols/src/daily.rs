@@ -304,7 +304,7 @@ mod tests {
         };
         let names = crate::file::BUILT_IN.iter().map(|(name, _)| *name);
         let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
-        assert_eq!(open, ["load-cell-calibration", "daily-check"]);
+        assert_eq!(open, ["daily-check", "load-cell-calibration", "check-home"]);
         assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));
         // Nor does the name of the check open what it does not do.
         let plan = Plan {

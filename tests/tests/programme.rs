@@ -206,6 +206,7 @@ fn the_day_in_the_laboratory_is_a_programme() {
     let text = std::fs::read_to_string(workspace().join("examples/day-in-the-lab.toml")).unwrap();
     assert!(Programme::is_meant(&text));
     assert_eq!(programme(&text).session_count(), 10);
+    assert_eq!(programme(&text).questions(), []);
 }
 
 const TOLD: &str = r#"
@@ -340,7 +341,7 @@ fn what_cannot_be_told_is_refused_with_its_line() {
         (
             "specimen-source = \"x\"\n\n[specimen.2]",
             "[specimen.9]",
-            "[specimen.9] tells of a specimen that no task clips in",
+            "line 11: [specimen.9] tells of a specimen that no task clips in",
         ),
         (
             "purpose",
@@ -356,4 +357,25 @@ fn what_cannot_be_told_is_refused_with_its_line() {
         let told = wrong(from, to);
         assert!(told.contains(words), "{to}: {told}");
     }
+}
+
+#[test]
+fn the_programme_of_the_guide_is_one() {
+    let page = std::fs::read_to_string(workspace().join("docs/guide/programmes.md")).unwrap();
+    let text = page
+        .split("```toml")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let told = programme(text);
+    let labels = |task| told.labels(task, 1).unwrap();
+    let (first, second) = (labels(0), labels(1));
+    assert_eq!(
+        (first.operator.as_str(), first.specimen.as_str()),
+        ("Ada", "specimen 1")
+    );
+    assert_eq!(second.specimen, "stomach 8, fundus");
+    assert!(second.is_told("specimen.source") && second.is_told("specimen.thickness_mm"));
 }

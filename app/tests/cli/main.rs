@@ -204,7 +204,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
     };
     let cases: &[(Vec<&str>, &str)] = &[
         (run(&["--depth", "200", "--out", "x"]), "beyond the travel"),
-        (run(&["--depth", "-3", "--out", "x"]), "above 0 mm"),
+        (run(&["--depth", "-3", "--out", "x"]), "give more than 0"),
         (
             run(&["--depth", "nan", "--out", "x"]),
             "not a finite number",

@@ -176,12 +176,12 @@ impl Programme {
         // Tasks with mistakes are not there to be counted.
         if problems.is_empty() {
             let is_used = |number| tasks.iter().any(|task| task.specimen == Some(number));
-            let unused = told.specimens().filter(|number| !is_used(*number));
-            problems.extend(unused.map(|number| {
+            let unused = told.specimens().filter(|(number, _)| !is_used(*number));
+            problems.extend(unused.map(|(number, line)| {
                 let message = format!(
                     "[specimen.{number}] tells of a specimen that no task clips in; add specimen = {number} to the task that does, or take it out"
                 );
-                Problem::error(0, message)
+                Problem::error(line, message)
             }));
         }
         problems.sort_by_key(|problem| problem.line);

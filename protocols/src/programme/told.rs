@@ -17,7 +17,8 @@ const SPECIMEN: &str = "specimen";
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub(super) struct Told {
     all: Vec<Pair>,
-    specimens: BTreeMap<u64, Vec<Pair>>,
+    /// Of each specimen, with the line where that begins.
+    specimens: BTreeMap<u64, (u32, Vec<Pair>)>,
     over: Vec<Pair>,
 }
 
@@ -58,13 +59,15 @@ impl Told {
                 continue;
             };
             let known = self.specimens.entry(number).or_default();
-            pairs(own, "specimen.", known, problems);
+            known.0 = entry.line;
+            pairs(own, "specimen.", &mut known.1, problems);
         }
     }
 
-    /// Numbers of the specimens of which something is told.
-    pub fn specimens(&self) -> impl Iterator<Item = u64> {
-        self.specimens.keys().copied()
+    /// Numbers of the specimens of which something is told, and the line where that begins.
+    pub fn specimens(&self) -> impl Iterator<Item = (u64, u32)> {
+        let specimens = self.specimens.iter();
+        specimens.map(|(number, (line, _))| (*number, *line))
     }
 }
 
@@ -134,7 +137,7 @@ impl Programme {
     pub fn labels(&self, task: usize, repeat: u32) -> Result<Labels, AboutError> {
         let number = self.specimen_at(task);
         let own = number.and_then(|number| self.told.specimens.get(&number));
-        let own = own.map_or(&[][..], Vec::as_slice);
+        let own = own.map_or(&[][..], |(_, pairs)| pairs.as_slice());
         let mut labels = self.usual.clone();
         let told = self.told.all.iter().chain(own).chain(&self.told.over);
         // Weights are no specimen.
