@@ -22,6 +22,7 @@ pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;
+mod packed;
 pub mod record;
 mod schema;
 pub mod text;
@@ -40,8 +41,8 @@ pub use folder::{
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use log::{
-    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
-    SegmentSource, Session, SessionWriter, Sink,
+    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Outline, Pace, ReadError,
+    SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
-pub use record::{EndRecord, Entry, EntryKind, Row};
+pub use record::{Block, EndRecord, Entry, EntryKind, Row};
