@@ -13,6 +13,8 @@ use std::time::SystemTime;
 
 /// Name of the built-in protocol.
 pub const DAILY_CHECK: &str = "daily-check";
+/// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
+const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
 /// The empty cell may read so much of the greatest calibrated force: the 1 % that ASTM E4 allows a force.
 const ZERO_SHARE: f64 = 0.01;
 /// Two homings may differ by so many pulses: the switch closes between two of them.
@@ -156,9 +158,9 @@ impl Gate {
         is_virtual: bool,
         now: SystemTime,
     ) -> Result<Self, CheckFileError> {
-        // The check jogs between its two homings; nothing else it could do touches.
-        let is_own = |step: &Step| plan.name == DAILY_CHECK && matches!(step, Step::Jog { .. });
-        let is_touching = |step: &Step| step.may_touch() && !is_own(step);
+        let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
+        let is_touching =
+            |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog { .. }));
         if !plan.steps.iter().any(|planned| is_touching(&planned.step)) {
             return Ok(Self::Open);
         }
