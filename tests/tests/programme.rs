@@ -257,7 +257,7 @@ fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_a
     let asked: Vec<String> = whole.questions().iter().map(ToString::to_string).collect();
     assert_eq!(asked.len(), 3, "{asked:?}");
     assert!(
-        asked[0].starts_with("line 25: warning: task 'first' asks for specimen.source (animal"),
+        asked[0].starts_with("line 24: warning: task 'first' asks for specimen.source (animal"),
         "{asked:?}"
     );
     assert!(
@@ -336,12 +336,12 @@ fn what_cannot_be_told_is_refused_with_its_line() {
         (
             "specimen-source = \"x\"\n\n[specimen.2]",
             "[specimen.two]",
-            "line 11: 'two' is no table of a specimen",
+            "line 10: 'two' is no table of a specimen",
         ),
         (
             "specimen-source = \"x\"\n\n[specimen.2]",
             "[specimen.9]",
-            "line 11: [specimen.9] tells of a specimen that no task clips in",
+            "line 10: [specimen.9] tells of a specimen that no task clips in",
         ),
         (
             "purpose",

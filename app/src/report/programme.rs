@@ -70,12 +70,11 @@ impl SpecimenPart {
         let told: Vec<String> = told
             .map(|(key, value)| format!("  {key}: {value}"))
             .collect();
-        format!(
-            "{}, with the {}\n{}",
-            self.specimen,
-            self.indenter,
-            told.join("\n")
-        )
+        let probe = match self.indenter.as_str() {
+            "" => String::new(),
+            indenter => format!(", with the {indenter}"),
+        };
+        format!("{}{probe}\n{}", self.specimen, told.join("\n"))
     }
 }
 
