@@ -91,8 +91,12 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         "write",
         samples,
         || -> Result<(), Box<dyn std::error::Error>> {
-            let mut writer =
-                SessionWriter::start(SessionFolder::create(&path)?, &manifest, Pace::Virtual)?;
+            let mut writer = SessionWriter::start(
+                SessionFolder::create(&path)?,
+                None,
+                &manifest,
+                Pace::Virtual,
+            )?;
             for index in 0..samples {
                 writer.push_row(row(index, &mut random))?;
             }

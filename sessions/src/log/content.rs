@@ -146,8 +146,9 @@ impl<'v> Content<'v> {
         }
         let next = &mut self.sequences[channel as usize];
         let expected = next.unwrap_or(sequence);
-        let is_again = sequence < expected && (self.is_rewrite || channel == Channel::Manifest);
-        if is_again && channel != Channel::Manifest {
+        let is_bookkeeping = matches!(channel, Channel::Manifest | Channel::Rewrite);
+        let is_again = sequence < expected && (self.is_rewrite || is_bookkeeping);
+        if is_again && !is_bookkeeping {
             // It was read, and verified, where it was first written.
             return Ok(());
         }
@@ -160,7 +161,6 @@ impl<'v> Content<'v> {
         if !is_again {
             *next = Some(expected.wrapping_add(1));
         }
-        let is_bookkeeping = matches!(channel, Channel::Manifest | Channel::Rewrite);
         if self.end.is_some() && !is_bookkeeping {
             return Err("something was recorded after the end".into());
         }

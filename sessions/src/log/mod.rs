@@ -14,5 +14,5 @@ pub mod writer;
 pub use reader::{Outline, ReadError, Session};
 pub use sink::{FileSink, FolderSegments, SegmentSource, Sink};
 pub use summary::Summary;
-pub use thread::{Pace, SessionWriter};
+pub use thread::{Notice, Pace, SessionWriter};
 pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter};

@@ -11,10 +11,11 @@ use super::content::{Content, Refusal};
 use super::frames::ChunkReader;
 use super::source::Source;
 use super::walk::walk;
-use crate::folder::{LOG_FILE, segment_file, segment_number};
+use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{Block, EndRecord, Entry, Row};
 use palpate_model::Nanos;
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -167,21 +168,36 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         path: path.into(),
         source,
     };
-    let mut numbers = Vec::new();
-    for item in std::fs::read_dir(path).map_err(failed)? {
-        let name = item.map_err(failed)?.file_name();
-        numbers.extend(name.to_str().and_then(segment_number));
+    let mut found = BTreeMap::new();
+    let mut add = |folder: &Path| -> io::Result<()> {
+        for item in std::fs::read_dir(folder)? {
+            let name = item?.file_name();
+            if let Some(number) = name.to_str().and_then(segment_number) {
+                found.entry(number).or_insert(folder.join(name));
+            }
+        }
+        Ok(())
+    };
+    add(path).map_err(failed)?;
+    if let Ok(spare) = std::fs::read_to_string(path.join(SPARE_FILE)) {
+        let spare = PathBuf::from(spare);
+        // It is only made when it is needed.
+        if spare.is_dir() {
+            add(&spare).map_err(failed)?;
+        }
     }
-    numbers.sort_unstable();
-    let whole = (0..).zip(&numbers).take_while(|(i, n)| i == *n).count();
+    let whole = (0..).zip(found.keys()).take_while(|(i, n)| i == *n).count();
     // With a gap, the first missing file is listed too: it will be looked for and not found.
-    let count = if whole < numbers.len() {
+    let count = if whole < found.len() {
         whole + 1
     } else {
         whole
     };
-    Ok((0..count.max(1))
-        .map(|number| path.join(segment_file(number as u32)))
+    Ok((0..count.max(1) as u32)
+        .map(|number| {
+            let own = || path.join(segment_file(number));
+            found.remove(&number).unwrap_or_else(own)
+        })
         .collect())
 }
 
@@ -211,8 +227,8 @@ struct Reader<'v> {
     content: Content<'v>,
     /// Session time of the newest sample.
     last_sample: Nanos,
-    /// Where the segment before broke off.
-    broken_off: Option<Damage>,
+    /// Where the segments before broke off, until a later one has made that good.
+    broken_off: Vec<Damage>,
     /// Name of the segment before, if it was not finished.
     unfinished: Option<String>,
     /// Whether the file read last has its data's checksum and its index.
@@ -246,7 +262,7 @@ impl<'v> Reader<'v> {
             chunks,
             content: Content::new(!is_folder, visit),
             last_sample: Nanos::ZERO,
-            broken_off: None,
+            broken_off: Vec::new(),
             unfinished: None,
             is_finished: false,
             notes: Vec::new(),
@@ -273,7 +289,10 @@ impl<'v> Reader<'v> {
             }
         }
         // Damage that no later segment made good.
-        let damage = damage.or_else(|| self.broken_off.take().filter(|one| !one.is_torn));
+        let damage = damage.or_else(|| {
+            let is_damaged = self.broken_off.iter().any(|one| !one.is_torn);
+            is_damaged.then(|| self.broken_off.swap_remove(0))
+        });
         let path = files[0].clone();
         let mut end = self.content.end.take();
         if let Some(Damage {
@@ -370,7 +389,7 @@ impl<'v> Reader<'v> {
         };
         if !path.is_file() {
             let reason = "this segment is missing, though a later one is there";
-            return Ok(Err(self.earlier_damage().unwrap_or(damage(0, reason))));
+            return Ok(Err(damage(0, reason)));
         }
         let source = Source::open(path).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
@@ -379,7 +398,9 @@ impl<'v> Reader<'v> {
         } else if is_last && source.is_barely_begun().map_err(failed)? {
             return Ok(Ok(Outcome::Nothing));
         } else if !is_ours {
-            return Ok(Err(damage(0, "it does not begin like a segment")));
+            self.broken_off
+                .push(damage(0, "it does not begin like a segment"));
+            return Ok(Ok(Outcome::GoOn));
         }
         let had_end = self.content.end.is_some();
         self.content.begin_segment();
@@ -397,10 +418,14 @@ impl<'v> Reader<'v> {
         let stop = walked.err();
         if stop.as_ref().is_none_or(|stop| stop.is_torn) {
             if !self.content.has_manifest {
-                return Ok(if !is_first && is_last && !is_finished {
+                let here = damage(source.length(), NOT_BEGUN);
+                return Ok(if is_first || is_finished {
+                    Err(here)
+                } else if is_last {
                     Ok(Outcome::Nothing)
                 } else {
-                    Err(damage(source.length(), NOT_BEGUN))
+                    self.broken_off.push(here);
+                    Ok(Outcome::GoOn)
                 });
             }
             // However a file ends: once there is an end record, all it counted must be there.
@@ -413,14 +438,16 @@ impl<'v> Reader<'v> {
             ..damage(stop.offset, &stop.reason)
         });
         let is_damaged = here.as_ref().is_some_and(|here| !here.is_torn);
-        if let Some(earlier) = self.broken_off.take() {
-            // What is missing there shows as missing here, and is told as what it is. Otherwise
-            // the messages go on without a gap, so nothing is missing; but only a segment that
-            // was begun because of a failure makes up for damage.
-            if is_damaged || !(earlier.is_torn || is_rewrite) {
-                return Ok(Err(earlier));
-            }
+        // Messages that go on without a gap prove that nothing is missing. But what is damaged, and
+        // not only torn, is made good by nothing but a segment that was begun because of it.
+        let is_strange = self.broken_off.iter().any(|one| !one.is_torn);
+        if !self.broken_off.is_empty() && !is_rewrite && (is_damaged || is_strange) {
+            return Ok(Err(self.broken_off.swap_remove(0)));
         }
+        if !is_damaged {
+            self.broken_off.clear();
+        }
+        self.broken_off.extend(here);
         if let Some(name) = self.unfinished.take() {
             self.notes.push(if is_rewrite {
                 let name_here = name_of(path);
@@ -433,12 +460,7 @@ impl<'v> Reader<'v> {
         if !is_finished || is_damaged {
             self.unfinished = Some(name_of(path));
         }
-        self.broken_off = here;
         Ok(Ok(Outcome::GoOn))
-    }
-
-    fn earlier_damage(&mut self) -> Option<Damage> {
-        self.broken_off.take().filter(|one| !one.is_torn)
     }
 }
 
