@@ -11,6 +11,8 @@ mod faults;
 #[cfg(test)]
 mod pace;
 #[cfg(test)]
+mod recovery;
+#[cfg(test)]
 mod round_trip;
 #[cfg(test)]
 mod segments;
