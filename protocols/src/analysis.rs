@@ -4,6 +4,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
+use palpate_sessions::analyses::AnalysisError;
 use palpate_sessions::edits::EditError;
 use palpate_sessions::import::{ColumnNames, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
@@ -11,7 +12,7 @@ use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
-use crate::edited;
+use crate::analysed::{self, Opened};
 use crate::engine::{Effect, Record};
 
 /// Samples for a fit, and what a reader should know about them.
@@ -98,6 +99,9 @@ pub enum SourceError {
     /// The session's edits cannot be read.
     #[error(transparent)]
     Edits(#[from] EditError),
+    /// The session's analyses cannot be read, or have none of that name.
+    #[error(transparent)]
+    Analysis(#[from] AnalysisError),
     /// Somebody, or the program, decided that the session is not to be used.
     #[error(
         "the session was rejected ({reason}) and is not used; --include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict"
@@ -105,6 +109,12 @@ pub enum SourceError {
     Rejected {
         /// Why.
         reason: String,
+    },
+    /// A table has no analyses.
+    #[error("a table has no analyses, so there is no '{name}'; name a session")]
+    TableAnalysis {
+        /// What was asked for.
+        name: String,
     },
     /// The table cannot be read.
     #[error(transparent)]
@@ -160,6 +170,16 @@ pub fn read_stretch(
     columns: Option<&ColumnNames>,
     wanted: impl Into<Wanted>,
 ) -> Result<FitSource, SourceError> {
+    read_analysed(path, columns, wanted, None)
+}
+
+/// As [`read_stretch`], a session as one of its analyses reads it. A table has none.
+pub fn read_analysed(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+    wanted: impl Into<Wanted>,
+    analysis: Option<&str>,
+) -> Result<FitSource, SourceError> {
     let Wanted {
         stretch,
         is_rejected_included,
@@ -169,6 +189,11 @@ pub fn read_stretch(
             .extension()
             .is_some_and(|extension| extension == "mcap");
     if !is_session && path.exists() {
+        if let Some(name) = analysis {
+            return Err(SourceError::TableAnalysis {
+                name: name.to_owned(),
+            });
+        }
         let table = read_table(path, columns)?;
         return Ok(FitSource {
             samples: samples_of_table(&table, stretch),
@@ -178,21 +203,24 @@ pub fn read_stretch(
             calibration: None,
         });
     }
-    let edited = edited::open(path)?;
+    let Opened {
+        edited, left_out_s, ..
+    } = analysed::open(path, analysis)?;
     if let (Some(reason), false) = (edited.rejection(), is_rejected_included) {
         return Err(SourceError::Rejected {
             reason: reason.to_owned(),
         });
     }
     let session = edited.session;
-    let samples = samples_of(&session, stretch)?;
+    let mut samples = samples_of(&session, stretch)?;
+    leave_out(&session, stretch, &left_out_s, &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;
     let censored = samples.iter().filter(|one| !one.is_measured()).count();
     if censored > 0 {
         notes.push(format!(
-            "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, or the probe had left the tissue"
+            "{censored} samples count with their depth only: the converter was at the end of its range, an interlock had tripped, the probe had left the tissue, or somebody left them out"
         ));
     }
     let specimen = session.manifest.specimen.trim();
@@ -299,6 +327,29 @@ pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceE
             }),
         })
         .collect()
+}
+
+/// Forces in stretches of time, in s since the session's first sample, count no more.
+fn leave_out(
+    session: &Session,
+    stretch: Stretch,
+    left_out_s: &[[f64; 2]],
+    samples: &mut [FitSample],
+) {
+    let first = session.rows.iter().find(|row| is_fitted(row, stretch));
+    let (Some(origin), Some(first)) = (session.rows.first(), first) else {
+        return;
+    };
+    let offset = analysed::seconds_since(session, origin, first);
+    for sample in samples {
+        let at = offset + sample.t.0;
+        if left_out_s
+            .iter()
+            .any(|[from, to]| (*from..=*to).contains(&at))
+        {
+            sample.sigma = Newtons(f64::INFINITY);
+        }
+    }
 }
 
 /// Session time of the first sample that a fit takes.

@@ -5,6 +5,7 @@
 //! same engine. Nothing here draws, and nothing in [`engine`] or [`plans`] does any I/O.
 //! Start reading at [`engine::step`].
 
+pub mod analysed;
 pub mod analysis;
 pub mod cycles;
 pub mod daily;

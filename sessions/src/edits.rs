@@ -2,12 +2,14 @@
 //! over: the log stays as it is, and every edit stays in `edits.jsonl` beside it. Of several verdicts, or
 //! several corrections of one contact, the last counts.
 
+use crate::analyses::Input;
 use crate::chain::{self, ChainError};
 use crate::folder::{LOCK_FILE, segment_number};
 use crate::lock::{HolderLock, LockError};
 use chrono::{DateTime, Utc};
 use palpate_model::units::Position;
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
@@ -57,6 +59,48 @@ impl FromStr for Verdict {
     }
 }
 
+/// What a person who looked at a session decided.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Decision {
+    /// It stands, with its analyses.
+    Accepted,
+    /// It does not.
+    Rejected,
+    /// It is to be done again.
+    Repeat,
+}
+
+impl Decision {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Accepted => "accepted",
+            Self::Rejected => "rejected",
+            Self::Repeat => "to be repeated",
+        }
+    }
+}
+
+/// The review that counts, and what has changed since.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Review {
+    /// What was decided.
+    pub decision: Decision,
+    /// By whom.
+    pub by: String,
+    /// When.
+    pub at: DateTime<Utc>,
+    /// Why.
+    pub reason: String,
+    /// What is not any more as it was seen; empty while the review stands.
+    pub changed: Vec<String>,
+}
+
+/// Longest tag in letters.
+const TAG_MAX: usize = 40;
+
 /// What is said.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "edit", rename_all = "lowercase")]
@@ -74,6 +118,22 @@ pub enum Change {
         position_mm: Position,
         /// Position that was found, from home.
         was_mm: Position,
+    },
+    /// Words by which it is found.
+    Tags {
+        /// Those it gets.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        add: Vec<String>,
+        /// Those it loses.
+        #[serde(default, skip_serializing_if = "Vec::is_empty")]
+        remove: Vec<String>,
+    },
+    /// That somebody looked at it and decided.
+    Review {
+        /// What.
+        decision: Decision,
+        /// The files that were seen, with their hashes.
+        seen: Vec<Input>,
     },
 }
 
@@ -114,6 +174,12 @@ pub enum EditError {
     /// Nobody would know why.
     #[error("an edit needs a reason; say why in a few words")]
     NoReason,
+    /// Not a word that can be searched.
+    #[error("'{tag}' cannot be a tag; give one word of at most {TAG_MAX} letters, as in +pilot")]
+    Tag {
+        /// What was given.
+        tag: String,
+    },
     /// A part of a recording, or a file, has no place for edits.
     #[error("{} is not a session folder; name the folder", path.display())]
     NotAFolder {
@@ -159,7 +225,7 @@ impl Edits {
     pub fn verdict(&self) -> Option<(Verdict, &Edit)> {
         self.all.iter().rev().find_map(|edit| match edit.change {
             Change::Verdict { verdict } => Some((verdict, edit)),
-            Change::Contact { .. } => None,
+            _ => None,
         })
     }
 
@@ -175,6 +241,60 @@ impl Edits {
             _ => None,
         })
     }
+
+    /// The tags it has.
+    #[must_use]
+    pub fn tags(&self) -> BTreeSet<&str> {
+        let mut tags = BTreeSet::new();
+        for edit in &self.all {
+            if let Change::Tags { add, remove } = &edit.change {
+                tags.extend(add.iter().map(String::as_str));
+                for tag in remove {
+                    tags.remove(tag.as_str());
+                }
+            }
+        }
+        tags
+    }
+
+    /// The last review. `now` are files as they are: each is compared with what was seen of it.
+    #[must_use]
+    pub fn review(&self, now: &[Input]) -> Option<Review> {
+        let place = |edit: &Edit| matches!(edit.change, Change::Review { .. });
+        let at = self.all.iter().rposition(place)?;
+        let (edit, later) = (&self.all[at], &self.all[at + 1..]);
+        let Change::Review { decision, seen } = &edit.change else {
+            return None;
+        };
+        let is_other = |one: &&Input| {
+            let seen = seen.iter().find(|seen| seen.what == one.what);
+            seen.map(|seen| &seen.sha256) != Some(&one.sha256)
+        };
+        let changed = now.iter().filter(is_other);
+        let mut changed: Vec<String> = changed.map(|one| one.what.clone()).collect();
+        let is_tags = |edit: &Edit| matches!(edit.change, Change::Tags { .. });
+        if !later.iter().all(is_tags) {
+            changed.push(EDITS_FILE.to_owned());
+        }
+        Some(Review {
+            decision: *decision,
+            by: edit.by.clone(),
+            at: edit.at,
+            reason: edit.reason.clone(),
+            changed,
+        })
+    }
+}
+
+/// Whether a word can be a tag.
+fn check_tag(tag: &str) -> Result<(), EditError> {
+    let is_word = !tag.is_empty() && !tag.chars().any(|it| it.is_whitespace() || it.is_control());
+    if is_word && tag.chars().count() <= TAG_MAX {
+        return Ok(());
+    }
+    Err(EditError::Tag {
+        tag: tag.to_owned(),
+    })
 }
 
 fn edits_file(session: &Path) -> Option<PathBuf> {
@@ -187,8 +307,14 @@ fn edits_file(session: &Path) -> Option<PathBuf> {
 
 /// Adds an edit to a session folder whose recording has ended.
 pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
-    if edit.reason.trim().is_empty() {
-        return Err(EditError::NoReason);
+    match &edit.change {
+        // A tag says by itself why it is there.
+        Change::Tags { add, remove } => add
+            .iter()
+            .chain(remove)
+            .try_for_each(|tag| check_tag(tag))?,
+        _ if edit.reason.trim().is_empty() => return Err(EditError::NoReason),
+        _ => {}
     }
     if !folder.is_dir() {
         return Err(EditError::NotAFolder {
@@ -256,6 +382,58 @@ mod tests {
             Edits::read(&at.join("alone.mcap"), "id").unwrap(),
             Edits::default()
         );
+    }
+
+    #[test]
+    fn tags_come_and_go_and_are_words() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let words = |words: &[&str]| words.iter().map(ToString::to_string).collect();
+        let tags = |add: &[&str], remove: &[&str]| Change::Tags {
+            add: words(add),
+            remove: words(remove),
+        };
+        add_edit(at, "id", &edit("", tags(&["pilot", "µ-gel"], &[]))).unwrap();
+        add_edit(at, "id", &edit("", tags(&["good"], &["pilot", "none"]))).unwrap();
+        let read = Edits::read(at, "id").unwrap();
+        assert_eq!(read.tags(), BTreeSet::from(["good", "µ-gel"]));
+        for tag in ["", "two words", "a\u{0}", &"x".repeat(41)] {
+            let refused = add_edit(at, "id", &edit("", tags(&[], &[tag])));
+            assert!(matches!(refused, Err(EditError::Tag { .. })), "{tag:?}");
+        }
+    }
+
+    #[test]
+    fn a_review_stands_until_something_it_saw_changes() {
+        let input = |what: &str, sha256: &str| Input {
+            what: what.into(),
+            sha256: sha256.into(),
+        };
+        let seen = vec![input("000.mcap", "a"), input("analyses.jsonl", "b")];
+        let decision = Decision::Accepted;
+        let review = Change::Review {
+            decision,
+            seen: seen.clone(),
+        };
+        let mut edits = Edits::default();
+        assert_eq!(edits.review(&seen), None);
+        edits.all = vec![
+            edit("before", verdict(Verdict::Suspect)),
+            edit("I looked", review),
+        ];
+        let changed = |edits: &Edits, now: &[Input]| edits.review(now).unwrap().changed;
+        assert!(changed(&edits, &seen).is_empty());
+        assert!(changed(&edits, &seen[..1]).is_empty());
+        let other = [input("000.mcap", "c"), input("001.mcap", "d")];
+        assert_eq!(changed(&edits, &other), ["000.mcap", "001.mcap"]);
+        let tags = Change::Tags {
+            add: vec!["good".into()],
+            remove: Vec::new(),
+        };
+        edits.all.push(edit("", tags));
+        assert!(changed(&edits, &seen).is_empty());
+        edits.all.push(edit("after", verdict(Verdict::Valid)));
+        assert_eq!(changed(&edits, &seen), [EDITS_FILE]);
     }
 
     #[test]

@@ -11,6 +11,7 @@
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
 pub mod about;
+pub mod analyses;
 pub mod calibrations;
 pub mod catalog;
 mod chain;
@@ -31,12 +32,13 @@ pub mod text;
 pub mod trade;
 
 pub use about::{About, AboutError, Labels};
+pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
 pub use calibrations::{
     Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
 };
 pub use catalog::{Catalog, CatalogError};
 pub use chain::ChainError;
-pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
+pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,

@@ -6,7 +6,7 @@ use super::output::Output;
 use crate::report::catalog as report;
 use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
 use clap::{Args, ValueEnum};
-use palpate_sessions::catalog::{Condition, Entry, Order, Query, VerdictIs};
+use palpate_sessions::catalog::{Condition, Entry, Order, Query, ReviewIs, VerdictIs};
 use palpate_sessions::library_folder;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -33,13 +33,19 @@ pub struct FindArgs {
     /// Started on this day or before, UTC, or before a time
     #[arg(long, value_name = "DAY", value_parser = ending)]
     until: Option<DateTime<Utc>>,
-    /// A condition on a value of the protocol or on what was told, as in depth>=2mm,
-    /// ramp.speed=3 or specimen.thickness_mm<12; may be repeated
+    /// A condition on a value of the protocol, on what was told or on a saved fit, as in
+    /// depth>=2mm, specimen.thickness_mm<12 or fit.tau_eps>1.5; may be repeated
     #[arg(long = "where", value_name = "CONDITION")]
     conditions: Vec<Condition>,
     /// valid, suspect, rejected or none
     #[arg(long)]
     verdict: Option<VerdictIs>,
+    /// A tag; may be repeated
+    #[arg(long = "tag", value_name = "TAG")]
+    tags: Vec<String>,
+    /// accepted, rejected, repeat, outdated or none
+    #[arg(long)]
+    review: Option<ReviewIs>,
     /// What the sessions are sorted by
     #[arg(long, value_enum, default_value = "started")]
     sort: Sort,
@@ -125,6 +131,8 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
         before: args.until,
         conditions: args.conditions.clone(),
         verdict: args.verdict,
+        review: args.review,
+        tags: args.tags.clone(),
         order: args.sort.into(),
         is_reversed: args.reverse,
         skip: limit.saturating_mul(page - 1),

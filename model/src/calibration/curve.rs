@@ -211,6 +211,15 @@ impl Curve {
         })
     }
 
+    /// The force in N above the unloaded cell, whose signal the tare found: the curve is moved along the
+    /// signal so that it passes through zero there. Without a tare, above the calibration's own zero.
+    #[must_use]
+    pub fn newtons_above(&self, signal: Volts, tare: Option<Volts>) -> Newtons {
+        let zero = self.volts_from_newtons(Newtons(0.0));
+        let shift = tare.map_or(0.0, |tare| tare.0 - zero.0);
+        self.newtons_from_volts(Volts(signal.0 - shift))
+    }
+
     /// The slope of the curve in V/N at a force; always positive.
     #[must_use]
     pub fn sensitivity_at(&self, force: Newtons) -> f64 {

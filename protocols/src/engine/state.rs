@@ -431,9 +431,7 @@ impl State {
 
     /// Force above tare of a signal; before tare, above the calibration's own zero.
     pub(super) fn force_from_volts(&self, volts: Volts) -> Newtons {
-        let curve = &self.config.curve;
-        let zero = curve.volts_from_newtons(Newtons(0.0));
-        let shift = self.tare.map_or(0.0, |tare| tare.volts.0 - zero.0);
-        curve.newtons_from_volts(Volts(volts.0 - shift))
+        let tare = self.tare.map(|tare| tare.volts);
+        self.config.curve.newtons_above(volts, tare)
     }
 }

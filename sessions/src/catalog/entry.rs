@@ -1,9 +1,11 @@
 //! What the catalog knows of one session. All of it comes from the session's folder.
 
 use super::walk::Place;
-use crate::edits::{Edits, Verdict};
+use crate::analyses::{Analysed, Analyses};
+use crate::edits::{Edits, Review, Verdict};
 use crate::log::Summary;
 use crate::manifest::Manifest;
+use chrono::{DateTime, Utc};
 use palpate_model::quantity::{base_unit, in_base_unit, split};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -44,7 +46,7 @@ pub struct Entry {
     pub duration_s: f64,
     /// Bytes of the log.
     pub bytes: u64,
-    /// Whether it was recorded here or imported.
+    /// Whether it was recorded here, imported, or recovered.
     pub origin: Origin,
     /// How it ended; `None` if it was interrupted or is being recorded.
     pub ending: Option<String>,
@@ -54,12 +56,32 @@ pub struct Entry {
     pub verdict: Option<Verdict>,
     /// Why.
     pub verdict_reason: String,
-    /// What can be searched by name: parameters of the protocol, what was told.
+    /// The last review, and which of edits and analyses have changed since; that the log has not is for
+    /// `palpate info`, which reads all of it.
+    pub review: Option<Review>,
+    /// Words by which it is found.
+    pub tags: Vec<String>,
+    /// The analyses that count.
+    pub analyses: Vec<Made>,
+    /// What can be searched by name: parameters of the protocol, what was told, parameters of its fits.
     pub named: Vec<Named>,
     /// Other words of it: acknowledgements, reasons of edits.
     pub words: Vec<String>,
     /// Why it cannot be read, or not all of it.
     pub trouble: Option<String>,
+}
+
+/// An analysis of a session.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Made {
+    /// Its name.
+    pub name: String,
+    /// `fit`, `recalibration` or `mask`.
+    pub what: String,
+    /// When.
+    pub at: DateTime<Utc>,
+    /// By whom.
+    pub by: String,
 }
 
 /// Where a session comes from.
@@ -71,6 +93,8 @@ pub enum Origin {
     Recorded,
     /// Made of another program's file.
     Imported,
+    /// What could be kept of a damaged or interrupted one.
+    Recovered,
 }
 
 /// Where a named value stands.
@@ -81,11 +105,13 @@ pub enum Source {
     Plan,
     /// Among what was told of specimen, probe and series.
     About,
+    /// A fitted parameter.
+    Fit,
 }
 
 impl Source {
     /// All of them.
-    pub(super) const ALL: [Self; 2] = [Self::Plan, Self::About];
+    pub(super) const ALL: [Self; 3] = [Self::Plan, Self::About, Self::Fit];
 
     /// The word for it, which stands before the name in a condition.
     #[must_use]
@@ -93,6 +119,7 @@ impl Source {
         match self {
             Self::Plan => "plan",
             Self::About => "about",
+            Self::Fit => "fit",
         }
     }
 }
@@ -129,10 +156,16 @@ impl Entry {
                 return entry;
             }
         }
+        let analyses = Analyses::read(&place.path, &entry.session_id);
+        let analyses = analyses.unwrap_or_else(|err| {
+            entry.trouble = Some(err.to_string());
+            Analyses::default()
+        });
         match Edits::read(&place.path, &entry.session_id) {
-            Ok(edits) => entry.take_edits(&edits),
+            Ok(edits) => entry.take_edits(&edits, &analyses),
             Err(err) => entry.trouble = Some(err.to_string()),
         }
+        entry.take_analyses(&analyses);
         entry
     }
 
@@ -153,9 +186,16 @@ impl Entry {
         self.specimen.clone_from(&manifest.specimen);
         self.indenter.clone_from(&manifest.indenter);
         self.software_version.clone_from(&manifest.software_version);
-        self.rig.clone_from(&manifest.rig.identity);
-        self.words.clone_from(&manifest.acknowledgements);
+        // By its JSON: an imported session has no rig, and nothing says that it is imported in others.
+        let facts = serde_json::to_value(manifest).unwrap_or_default();
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
+        self.rig = text(&facts["rig"]["identity"]);
+        self.origin = match (&manifest.recovered, &facts["imported"]) {
+            (Some(_), _) => Origin::Recovered,
+            (None, Value::Null) => Origin::Recorded,
+            (None, _) => Origin::Imported,
+        };
+        self.words.clone_from(&manifest.acknowledgements);
         let (plan, calibration) = (&manifest.plan, &manifest.calibration);
         self.protocol = text(&plan["name"]);
         self.protocol_version = plan["version"].as_u64();
@@ -197,13 +237,33 @@ impl Entry {
         self.named = named;
     }
 
-    fn take_edits(&mut self, edits: &Edits) {
+    fn take_edits(&mut self, edits: &Edits, analyses: &Analyses) {
         if let Some((verdict, edit)) = edits.verdict() {
             self.verdict = Some(verdict);
             self.verdict_reason.clone_from(&edit.reason);
         }
+        self.tags = edits.tags().into_iter().map(str::to_owned).collect();
+        let now = analyses.input();
+        self.review = edits.review(now.as_slice());
         for edit in &edits.all {
             self.words.extend([edit.by.clone(), edit.reason.clone()]);
+        }
+    }
+
+    fn take_analyses(&mut self, analyses: &Analyses) {
+        for one in analyses.counting() {
+            self.words.extend([one.by.clone(), one.reason.clone()]);
+            self.analyses.push(Made {
+                name: one.name.clone(),
+                what: one.what.word().to_owned(),
+                at: one.at,
+                by: one.by.clone(),
+            });
+            if let Analysed::Fit { results, .. } = &one.what {
+                let parameters = results["parameters"].as_array();
+                self.named
+                    .extend(parameters.into_iter().flatten().filter_map(fitted));
+            }
         }
     }
 
@@ -226,9 +286,23 @@ impl Entry {
         let mut words: Vec<&str> = own.into_iter().map(String::as_str).collect();
         words.extend(named.map(|one| one.text.as_str()));
         words.extend(self.words.iter().map(String::as_str));
+        words.extend(self.tags.iter().map(String::as_str));
+        words.extend(self.analyses.iter().map(|one| one.name.as_str()));
         words.extend(self.trouble.as_deref());
         words.join("\n")
     }
+}
+
+/// A parameter of a fit, as `palpate fit --json` prints it.
+fn fitted(parameter: &Value) -> Option<Named> {
+    let number = parameter["value"].as_f64()?;
+    Some(Named {
+        source: Source::Fit,
+        name: parameter["name"].as_str()?.to_owned(),
+        number: Some(number),
+        unit: parameter["unit"].as_str().unwrap_or_default().to_owned(),
+        text: number.to_string(),
+    })
 }
 
 /// The number in a text such as `20 mm`, in its base unit; none where it is anything else.

@@ -15,8 +15,8 @@ mod update;
 mod walk;
 
 pub use condition::{Condition, ConditionError};
-pub use entry::{Entry, Named, Origin, Source};
-pub use search::{Found, Order, Query, VerdictIs};
+pub use entry::{Entry, Made, Named, Origin, Source};
+pub use search::{Found, Order, Query, ReviewIs, VerdictIs};
 pub use update::{Changes, Doubt};
 
 use rusqlite::{Connection, ErrorCode};

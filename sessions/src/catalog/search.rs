@@ -4,7 +4,7 @@ use super::condition::Condition;
 use super::entry::Entry;
 use super::update::entry_of;
 use super::{Catalog, CatalogError};
-use crate::edits::Verdict;
+use crate::edits::{Decision, Review, Verdict};
 use chrono::{DateTime, Utc};
 use rusqlite::params_from_iter;
 use rusqlite::types::Value as Sql;
@@ -29,6 +29,10 @@ pub struct Query {
     pub conditions: Vec<Condition>,
     /// What they are worth.
     pub verdict: Option<VerdictIs>,
+    /// What a review came to.
+    pub review: Option<ReviewIs>,
+    /// Tags they all have.
+    pub tags: Vec<String>,
     /// In which order they come.
     pub order: Order,
     /// The other way round.
@@ -59,6 +63,60 @@ impl FromStr for VerdictIs {
                 .map(Self::Given)
                 .map_err(|err: String| format!("{err}, or none")),
         }
+    }
+}
+
+/// What a review came to, or that there is none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ReviewIs {
+    /// It stands, and decided so.
+    Given(Decision),
+    /// What was seen has changed since.
+    Outdated,
+    /// Nobody has looked.
+    None,
+}
+
+impl ReviewIs {
+    const ALL: [Self; 5] = [
+        Self::Given(Decision::Accepted),
+        Self::Given(Decision::Rejected),
+        Self::Given(Decision::Repeat),
+        Self::Outdated,
+        Self::None,
+    ];
+
+    /// That of a session.
+    #[must_use]
+    pub fn of(review: Option<&Review>) -> Self {
+        match review {
+            None => Self::None,
+            Some(review) if !review.changed.is_empty() => Self::Outdated,
+            Some(review) => Self::Given(review.decision),
+        }
+    }
+
+    /// The word for it.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::Given(Decision::Accepted) => "accepted",
+            Self::Given(Decision::Rejected) => "rejected",
+            Self::Given(Decision::Repeat) => "repeat",
+            Self::Outdated => "outdated",
+            Self::None => "none",
+        }
+    }
+}
+
+impl FromStr for ReviewIs {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|one| one.word() == text);
+        found.ok_or_else(|| {
+            format!("'{text}' is no review; give accepted, rejected, repeat, outdated or none")
+        })
     }
 }
 
@@ -137,6 +195,14 @@ impl Query {
             };
             parts.push("verdict = ?".to_owned());
             values.push(word.to_owned().into());
+        }
+        if let Some(review) = self.review {
+            parts.push("review = ?".to_owned());
+            values.push(review.word().to_owned().into());
+        }
+        for tag in &self.tags {
+            parts.push("id IN (SELECT session FROM tag WHERE tag = ?)".to_owned());
+            values.push(tag.clone().into());
         }
         for condition in &self.conditions {
             parts.push(condition.sql(&mut values));

@@ -1,6 +1,7 @@
 //! The catalog follows the sessions: what changed is read again, what is gone goes.
 
 use super::entry::Entry;
+use super::search::ReviewIs;
 use super::walk::{Place, walk};
 use super::{Catalog, CatalogError};
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
@@ -170,8 +171,8 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     let started = chrono::DateTime::parse_from_rfc3339(&entry.started_at);
     let verdict = entry.verdict.map_or("", |verdict| verdict.word());
     db.prepare_cached(
-        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, verdict, duration_s, entry)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, verdict, review, duration_s, entry)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )?
     .execute(params![
         entry.folder,
@@ -182,6 +183,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         entry.protocol,
         entry.rig,
         verdict,
+        ReviewIs::of(entry.review.as_ref()).word(),
         entry.duration_s,
         text,
     ])?;
@@ -194,6 +196,10 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         named.execute(params![
             id, source, one.name, one.unit, one.number, one.text
         ])?;
+    }
+    let mut tags = db.prepare_cached("INSERT INTO tag (session, tag) VALUES (?, ?)")?;
+    for tag in &entry.tags {
+        tags.execute(params![id, tag])?;
     }
     db.prepare_cached("INSERT INTO words (rowid, text) VALUES (?, ?)")?
         .execute(params![id, entry.text()])?;

@@ -1,0 +1,256 @@
+//! A session as one of its analyses reads it, and the record of a new one.
+//!
+//! A recalibration makes every force anew from the raw signal and the tares that were found; a mask names
+//! stretches whose forces do not count. The log itself stays as it is.
+
+use crate::analysis::{SourceError, calibration_of, decisions};
+use crate::edited::{self, Edited};
+use crate::engine::{ENGINE_VERSION, Effect, Record};
+use crate::runner::wall_now;
+use palpate_model::calibration::Calibration;
+use palpate_model::units::Volts;
+use palpate_sessions::analyses::{
+    Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
+};
+use palpate_sessions::log::Session;
+use palpate_sessions::record::Row;
+use serde::Serialize;
+use std::path::Path;
+
+/// A session with its edits made, read as an analysis has it.
+#[derive(Clone, Debug)]
+pub struct Opened {
+    /// The session and its edits.
+    pub edited: Edited,
+    /// Its analyses.
+    pub analyses: Analyses,
+    /// Stretches whose forces do not count: from and to in s since the first sample.
+    pub left_out_s: Vec<[f64; 2]>,
+}
+
+/// What another calibration does to the forces of a session.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct ForceChange {
+    /// Samples with a force.
+    pub samples: u64,
+    /// Root mean square of the change in N.
+    pub rms_n: f64,
+    /// Largest change in N.
+    pub max_n: f64,
+    /// Highest force before, in N; `None` without any.
+    pub peak_before_n: Option<f64>,
+    /// Highest force after, in N.
+    pub peak_after_n: Option<f64>,
+}
+
+/// Opens a session as an analysis of it does; without a name as its edits leave it.
+pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
+    let edited = edited::open(path)?;
+    let analyses = Analyses::read(path, &edited.session.manifest.session_id)?;
+    let mut opened = Opened {
+        edited,
+        analyses,
+        left_out_s: Vec::new(),
+    };
+    // A fit reads the session as what it is based on did. Each is older than the one that names it.
+    let mut next = name.map(str::to_owned);
+    while let Some(name) = next.take() {
+        let one = opened.analyses.get(&name)?.clone();
+        let changed = changed_inputs(&one, &inputs_of(path)?);
+        let session = &mut opened.edited.session;
+        if !changed.is_empty() {
+            session.notes.push(format!(
+                "analysis '{name}' was made before {} changed",
+                changed.join(", ")
+            ));
+        }
+        match one.what {
+            Analysed::Fit { based_on, .. } => next = based_on,
+            Analysed::Recalibration { calibration, .. } => {
+                let calibration = serde_json::from_value(calibration).map_err(bad_calibration)?;
+                recalibrate(session, &calibration)?;
+                session.notes.push(format!(
+                    "forces are made from the raw signal with calibration {}, as analysis '{name}' has it",
+                    calibration.name
+                ));
+            }
+            Analysed::Mask { left_out_s } => {
+                let stretches = left_out_s.len();
+                opened.left_out_s = left_out_s;
+                session.notes.push(format!(
+                    "forces in {stretches} stretches do not count, as analysis '{name}' has it"
+                ));
+            }
+            // It never counts, so it is not found.
+            Analysed::Withdrawal => {}
+        }
+    }
+    Ok(opened)
+}
+
+impl Opened {
+    /// Takes the forces out that do not count, for tables that know no weights.
+    pub fn blank(&mut self) {
+        let session = &mut self.edited.session;
+        let Some(first) = session.rows.first().copied() else {
+            return;
+        };
+        let times: Vec<f64> = session
+            .rows
+            .iter()
+            .map(|row| seconds_since(session, &first, row))
+            .collect();
+        for (row, at) in session.rows.iter_mut().zip(times) {
+            let is_in = |[from, to]: &[f64; 2]| (*from..=*to).contains(&at);
+            if self.left_out_s.iter().any(is_in) {
+                row.force = None;
+            }
+        }
+    }
+
+    /// What an analysis made now goes by: the session's files, its calibration, and what it is based on.
+    pub fn inputs(&self, path: &Path, based_on: Option<&str>) -> Result<Vec<Input>, AnalysisError> {
+        let mut inputs = inputs_of(path)?;
+        let calibration = &self.edited.session.manifest.calibration;
+        inputs.push(document_input("calibration", calibration));
+        if let Some(name) = based_on {
+            let record = serde_json::to_value(self.analyses.get(name)?).unwrap_or_default();
+            inputs.push(document_input(&format!("analysis {name}"), &record));
+        }
+        Ok(inputs)
+    }
+}
+
+fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
+    SourceError::Calibration {
+        detail: err.to_string(),
+    }
+}
+
+/// Controller time in s from one sample to another.
+pub(crate) fn seconds_since(session: &Session, first: &Row, row: &Row) -> f64 {
+    row.tick.saturating_sub(first.tick) as f64 * session.manifest.rig.tick().0
+}
+
+/// Makes every force of a session anew from its raw signal with a calibration, which takes the place of its
+/// own. A sample whose force was not known, such as one before the tare, stays so.
+pub fn recalibrate(
+    session: &mut Session,
+    calibration: &Calibration,
+) -> Result<ForceChange, SourceError> {
+    let curve = calibration.curve().map_err(bad_calibration)?;
+    let found = decisions(session)?;
+    let tares = found.iter().filter_map(|(after, effect)| match effect {
+        Effect::Record(Record::Tared { volts, .. }) => Some((*after, *volts)),
+        _ => None,
+    });
+    let mut tares = tares.peekable();
+    let (mut tare, mut change, mut squares) = (None, ForceChange::default(), 0.0);
+    let higher = |peak: Option<f64>, force: f64| Some(peak.map_or(force, |peak| peak.max(force)));
+    for (index, row) in session.rows.iter_mut().enumerate() {
+        while let Some((_, volts)) = tares.next_if(|(after, _)| *after <= index as u64) {
+            tare = Some(volts);
+        }
+        let Some(force) = &mut row.force else {
+            continue;
+        };
+        let anew = curve.newtons_above(Volts(row.volts), tare).0;
+        change.samples += 1;
+        squares += (anew - *force).powi(2);
+        change.max_n = change.max_n.max((anew - *force).abs());
+        change.peak_before_n = higher(change.peak_before_n, *force);
+        change.peak_after_n = higher(change.peak_after_n, anew);
+        *force = anew;
+    }
+    if change.samples > 0 {
+        change.rms_n = (squares / change.samples as f64).sqrt();
+    }
+    session.manifest.calibration = serde_json::to_value(calibration).map_err(bad_calibration)?;
+    Ok(change)
+}
+
+/// What a new recalibration of a session is: its record, and what it does to the forces.
+pub fn recalibration(
+    path: &Path,
+    calibration: &Calibration,
+) -> Result<(Opened, Vec<Input>, Analysed, ForceChange), SourceError> {
+    let mut opened = open(path, None)?;
+    // That the session's own can be read tells that its forces came from one.
+    calibration_of(&opened.edited.session)?;
+    let change = recalibrate(&mut opened.edited.session, calibration)?;
+    // The calibration that went in is the new one.
+    let inputs = opened.inputs(path, None)?;
+    let what = Analysed::Recalibration {
+        calibration: opened.edited.session.manifest.calibration.clone(),
+        results: serde_json::to_value(change).unwrap_or_default(),
+    };
+    Ok((opened, inputs, what, change))
+}
+
+/// A record that is made now by this program.
+#[must_use]
+pub fn record(name: &str, by: &str, reason: &str, inputs: Vec<Input>, what: Analysed) -> Analysis {
+    Analysis {
+        name: name.trim().to_owned(),
+        at: wall_now().into(),
+        by: by.to_owned(),
+        reason: reason.trim().to_owned(),
+        software_version: env!("CARGO_PKG_VERSION").to_owned(),
+        engine_version: ENGINE_VERSION,
+        inputs,
+        what,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn recorded(name: &str) -> Session {
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        Session::open(&sessions.join(name)).unwrap()
+    }
+
+    #[test]
+    fn its_own_calibration_gives_a_session_its_forces_back() {
+        for name in ["ramp-hold-lab", "over-force-galil", "hold-until-lab"] {
+            let mut session = recorded(name);
+            let before = session.clone();
+            let own = calibration_of(&session).unwrap();
+            let change = recalibrate(&mut session, &own).unwrap();
+            println!("{name}: {change:?}");
+            assert!(change.samples > 50_000, "{name}: {change:?}");
+            assert!(change.max_n <= 1e-9, "{name}: {change:?}");
+            // Were they not made anew at all, this would be so too: other forces are.
+            let rows = &mut session.rows;
+            rows.iter_mut()
+                .filter_map(|row| row.force.as_mut())
+                .for_each(|force| *force = -1.0);
+            recalibrate(&mut session, &own).unwrap();
+            for (row, old) in session.rows.iter().zip(&before.rows) {
+                assert_eq!(row.force.is_some(), old.force.is_some());
+                let apart = row.force.unwrap_or(0.0) - old.force.unwrap_or(0.0);
+                assert!(apart.abs() <= 1e-9, "{name}: {apart}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_cell_that_feels_half_as_much_makes_forces_twice_as_large() {
+        let mut session = recorded("ramp-hold-lab");
+        let before = session.clone();
+        let mut heavier = calibration_of(&session).unwrap();
+        for step in &mut heavier.steps {
+            step.mass_g *= 2.0;
+        }
+        assert!(!heavier.steps.is_empty());
+        recalibrate(&mut session, &heavier).unwrap();
+        for (row, old) in session.rows.iter().zip(&before.rows) {
+            let (Some(force), Some(old)) = (row.force, old.force) else {
+                continue;
+            };
+            assert!((force - 2.0 * old).abs() < 1e-9, "{force} against {old}");
+        }
+        assert_eq!(calibration_of(&session).unwrap(), heavier);
+    }
+}

@@ -1,0 +1,426 @@
+//! What was made of a session afterwards: fits, stretches left out, forces read with another calibration.
+//!
+//! Every one is a named record in `analyses.jsonl` beside the log, with who made it, when, with which
+//! version, of what (SHA-256 of every file that went in), how, and what came out. Nothing is ever written
+//! over and no name is used twice. To undo one is to add a record that withdraws it.
+
+use crate::chain::{self, ChainError};
+use crate::edits::EDITS_FILE;
+use crate::folder::{LOCK_FILE, segment_number};
+use crate::lock::{HolderLock, LockError};
+use crate::log::ReadError;
+use crate::log::reader::find_files;
+use crate::text::{sha256, sha256_of_file};
+use chrono::{DateTime, Utc};
+use serde::{Deserialize, Serialize};
+use serde_json::Value;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Name of the file of analyses in a session folder.
+pub const ANALYSES_FILE: &str = "analyses.jsonl";
+/// Longest name of an analysis in letters: it has to fit on a line.
+const NAME_MAX: usize = 80;
+
+/// Something that went into an analysis.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Input {
+    /// A file of the session, or `calibration` or `analysis NAME`.
+    pub what: String,
+    /// Of the file's bytes, or of the compact JSON with its keys in alphabetical order.
+    pub sha256: String,
+}
+
+/// What an analysis is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "analysis", rename_all = "lowercase")]
+pub enum Analysed {
+    /// A fit of a model.
+    Fit {
+        /// The analysis that the session was read with, if any.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        based_on: Option<String>,
+        /// What was asked for.
+        settings: Value,
+        /// What was found, as `palpate fit --json` prints it.
+        results: Value,
+    },
+    /// Forces made from the raw signal with another calibration.
+    Recalibration {
+        /// The calibration's document.
+        calibration: Value,
+        /// How the forces change.
+        results: Value,
+    },
+    /// Stretches of a session whose forces do not count.
+    Mask {
+        /// Session time from and to, in s.
+        left_out_s: Vec<[f64; 2]>,
+    },
+    /// The analysis of this name does not count any more.
+    Withdrawal,
+}
+
+impl Analysed {
+    /// The word for it.
+    #[must_use]
+    pub const fn word(&self) -> &'static str {
+        match self {
+            Self::Fit { .. } => "fit",
+            Self::Recalibration { .. } => "recalibration",
+            Self::Mask { .. } => "mask",
+            Self::Withdrawal => "withdrawal",
+        }
+    }
+}
+
+/// One record.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Analysis {
+    /// What it is called; of a withdrawal, what is withdrawn.
+    pub name: String,
+    /// When it was made.
+    pub at: DateTime<Utc>,
+    /// By whom.
+    pub by: String,
+    /// Why; may be empty but for a withdrawal.
+    pub reason: String,
+    /// Version of the program that made it.
+    pub software_version: String,
+    /// Version of the decision rules in that program.
+    pub engine_version: u32,
+    /// What went in.
+    pub inputs: Vec<Input>,
+    /// What it is.
+    #[serde(flatten)]
+    pub what: Analysed,
+}
+
+/// Analyses could not be read or made.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum AnalysisError {
+    /// The file is not as it was written, or the disk refuses.
+    #[error(transparent)]
+    Chain(#[from] ChainError),
+    /// The session is still being recorded.
+    #[error(transparent)]
+    Lock(#[from] LockError),
+    /// What it is an analysis of cannot be read.
+    #[error(transparent)]
+    Session(#[from] ReadError),
+    /// A file that went in cannot be read.
+    #[error("{} cannot be read ({source}); check its permissions", path.display())]
+    Input {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// A later version wrote it.
+    #[error("line {line} of {} is an analysis that this palpate does not know ({detail}); update palpate", path.display())]
+    Unknown {
+        /// The file.
+        path: PathBuf,
+        /// Which line, from 1.
+        line: usize,
+        /// The parser's words.
+        detail: String,
+    },
+    /// A name that cannot be.
+    #[error("'{name}' cannot be the name of an analysis; give 1 to {NAME_MAX} letters on one line")]
+    Name {
+        /// What was given.
+        name: String,
+    },
+    /// Taken, if only by one that was withdrawn.
+    #[error(
+        "the session has an analysis '{name}' already, and a name is never used twice; choose another"
+    )]
+    Taken {
+        /// The name.
+        name: String,
+    },
+    /// There is none, or not any more.
+    #[error("the session has no analysis '{name}'{known}; 'palpate info' shows them")]
+    None {
+        /// The name.
+        name: String,
+        /// Why not, or what there is.
+        known: String,
+    },
+    /// Nobody would know why.
+    #[error("to withdraw an analysis needs a reason; say why in a few words")]
+    NoReason,
+    /// A part of a recording, or a file, has no place for them.
+    #[error("{} is not a session folder; name the folder", path.display())]
+    NotAFolder {
+        /// What was named.
+        path: PathBuf,
+    },
+}
+
+/// Every record of a session, in the order made.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Analyses {
+    /// The records, withdrawals among them.
+    pub all: Vec<Analysis>,
+    /// SHA-256 of the file; empty where there is none.
+    pub sha256: String,
+}
+
+impl Analyses {
+    /// Reads those of a session, given its folder or a log file in it.
+    pub fn read(session: &Path, session_id: &str) -> Result<Self, AnalysisError> {
+        let Some(path) = file_beside(session) else {
+            return Ok(Self::default());
+        };
+        let chain = chain::read(&path, session_id)?;
+        let record = |(index, body)| {
+            serde_json::from_value(body).map_err(|err| AnalysisError::Unknown {
+                path: path.clone(),
+                line: index + 1,
+                detail: err.to_string(),
+            })
+        };
+        let bodies = chain.bodies.into_iter().enumerate();
+        let all: Vec<Analysis> = bodies.map(record).collect::<Result<_, _>>()?;
+        let sha256 = if all.is_empty() {
+            String::new()
+        } else {
+            sha256_of_file(&path).map_err(|source| AnalysisError::Input { path, source })?
+        };
+        Ok(Self { all, sha256 })
+    }
+
+    /// The file as an input; none where there is no analysis.
+    #[must_use]
+    pub fn input(&self) -> Option<Input> {
+        (!self.all.is_empty()).then(|| Input {
+            what: ANALYSES_FILE.to_owned(),
+            sha256: self.sha256.clone(),
+        })
+    }
+
+    /// The withdrawal of an analysis, if there is one.
+    #[must_use]
+    pub fn withdrawal(&self, name: &str) -> Option<&Analysis> {
+        let is_it = |one: &&Analysis| one.name == name && one.what == Analysed::Withdrawal;
+        self.all.iter().find(is_it)
+    }
+
+    /// Those that count, in the order made.
+    pub fn counting(&self) -> impl Iterator<Item = &Analysis> {
+        let is_open = |one: &&Analysis| {
+            one.what != Analysed::Withdrawal && self.withdrawal(&one.name).is_none()
+        };
+        self.all.iter().filter(is_open)
+    }
+
+    /// One that counts, by its name.
+    pub fn get(&self, name: &str) -> Result<&Analysis, AnalysisError> {
+        self.counting()
+            .find(|one| one.name == name)
+            .ok_or_else(|| AnalysisError::None {
+                name: name.to_owned(),
+                known: match self.withdrawal(name) {
+                    Some(by) => format!(" any more, {} withdrew it: {}", by.by, by.reason),
+                    None if self.all.is_empty() => ", it has none".to_owned(),
+                    None => String::new(),
+                },
+            })
+    }
+}
+
+fn file_beside(session: &Path) -> Option<PathBuf> {
+    if session.is_dir() {
+        return Some(session.join(ANALYSES_FILE));
+    }
+    let name = session.file_name()?.to_str()?;
+    segment_number(name).map(|_| session.with_file_name(ANALYSES_FILE))
+}
+
+/// The files of a session that any analysis goes by: its log and its edits, with their hashes.
+pub fn inputs_of(session: &Path) -> Result<Vec<Input>, AnalysisError> {
+    let mut files = find_files(session)?;
+    let edits = match session.is_dir() {
+        true => session.join(EDITS_FILE),
+        false => session.with_file_name(EDITS_FILE),
+    };
+    files.extend(edits.is_file().then_some(edits));
+    let input = |path: PathBuf| match sha256_of_file(&path) {
+        Ok(sha256) => Ok(Input {
+            what: path
+                .file_name()
+                .unwrap_or_default()
+                .to_string_lossy()
+                .into_owned(),
+            sha256,
+        }),
+        Err(source) => Err(AnalysisError::Input { path, source }),
+    };
+    files.into_iter().map(input).collect()
+}
+
+/// A document as an input.
+#[must_use]
+pub fn document_input(what: &str, document: &Value) -> Input {
+    Input {
+        what: what.to_owned(),
+        sha256: sha256(document.to_string().as_bytes()),
+    }
+}
+
+/// Which of the files that went into an analysis are others now. Only those of [`inputs_of`] are compared.
+#[must_use]
+pub fn changed_inputs(analysis: &Analysis, now: &[Input]) -> Vec<String> {
+    let of = |inputs: &[Input], what: &str| {
+        let found = inputs.iter().find(|one| one.what == what);
+        found.map(|one| one.sha256.clone())
+    };
+    let is_file = |one: &&Input| one.what == EDITS_FILE || segment_number(&one.what).is_some();
+    let mut names: Vec<&str> = analysis
+        .inputs
+        .iter()
+        .filter(is_file)
+        .chain(now)
+        .map(|one| one.what.as_str())
+        .collect();
+    names.sort_unstable();
+    names.dedup();
+    let is_other = |name: &&str| of(&analysis.inputs, name) != of(now, name);
+    names
+        .into_iter()
+        .filter(is_other)
+        .map(str::to_owned)
+        .collect()
+}
+
+/// Adds a record to a session folder whose recording has ended.
+pub fn add_analysis(
+    folder: &Path,
+    session_id: &str,
+    analysis: &Analysis,
+) -> Result<(), AnalysisError> {
+    let name = &analysis.name;
+    let is_line = !name.trim().is_empty() && !name.chars().any(char::is_control);
+    if !is_line || name.chars().count() > NAME_MAX {
+        return Err(AnalysisError::Name { name: name.clone() });
+    }
+    if !folder.is_dir() {
+        return Err(AnalysisError::NotAFolder {
+            path: folder.into(),
+        });
+    }
+    let _lock = HolderLock::acquire(&folder.join(LOCK_FILE))?;
+    let there = Analyses::read(folder, session_id)?;
+    if analysis.what == Analysed::Withdrawal {
+        there.get(name)?;
+        if analysis.reason.trim().is_empty() {
+            return Err(AnalysisError::NoReason);
+        }
+    } else if there.all.iter().any(|one| one.name == *name) {
+        return Err(AnalysisError::Taken { name: name.clone() });
+    }
+    let path = folder.join(ANALYSES_FILE);
+    let body = serde_json::to_value(analysis).map_err(|err| ChainError::Io {
+        what: "added to",
+        path: path.clone(),
+        source: err.into(),
+    })?;
+    Ok(chain::append(&path, session_id, body)?)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use chrono::TimeZone;
+
+    fn analysis(name: &str, reason: &str, what: Analysed) -> Analysis {
+        Analysis {
+            name: name.into(),
+            at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
+            by: "Ada".into(),
+            reason: reason.into(),
+            software_version: "0.1.0".into(),
+            engine_version: 1,
+            inputs: Vec::new(),
+            what,
+        }
+    }
+
+    fn mask(from: f64) -> Analysed {
+        Analysed::Mask {
+            left_out_s: vec![[from, from + 1.0]],
+        }
+    }
+
+    #[test]
+    fn a_name_is_used_once_and_withdrawn_by_a_record() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let add = |one: &Analysis| add_analysis(at, "id", one);
+        add(&analysis("bump", "", mask(0.1 + 0.2))).unwrap();
+        add(&analysis("µ \"two\"", "", mask(3.0))).unwrap();
+        let taken = add(&analysis("bump", "", mask(5.0))).unwrap_err();
+        assert!(taken.to_string().contains("never used twice"), "{taken}");
+        let withdrawal = |name, reason| analysis(name, reason, Analysed::Withdrawal);
+        assert!(matches!(
+            add(&withdrawal("bump", " ")),
+            Err(AnalysisError::NoReason)
+        ));
+        assert!(matches!(
+            add(&withdrawal("other", "why")),
+            Err(AnalysisError::None { .. })
+        ));
+        add(&withdrawal("bump", "wrong stretch")).unwrap();
+        let again = add(&withdrawal("bump", "again")).unwrap_err().to_string();
+        assert!(again.contains("Ada withdrew it: wrong stretch"), "{again}");
+        assert!(matches!(
+            add(&analysis("bump", "", mask(5.0))),
+            Err(AnalysisError::Taken { .. })
+        ));
+        let read = Analyses::read(at, "id").unwrap();
+        assert_eq!(read.all.len(), 3);
+        assert_eq!(read.all[0].what, mask(0.1 + 0.2));
+        let names: Vec<&str> = read.counting().map(|one| one.name.as_str()).collect();
+        assert_eq!(names, ["µ \"two\""]);
+        assert!(read.get("bump").is_err() && read.get("µ \"two\"").is_ok());
+        for name in ["", " ", "a\nb", "\u{0}", &"x".repeat(81)] {
+            let refused = add(&analysis(name, "", mask(0.0)));
+            assert!(
+                matches!(refused, Err(AnalysisError::Name { .. })),
+                "{name:?}"
+            );
+        }
+        // What was written is never changed unnoticed.
+        let path = at.join(ANALYSES_FILE);
+        let text = std::fs::read_to_string(&path).unwrap();
+        std::fs::write(&path, text.replacen("3.0", "3.5", 1)).unwrap();
+        assert!(Analyses::read(at, "id").is_err());
+    }
+
+    #[test]
+    fn inputs_that_are_others_now_are_named() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        std::fs::write(at.join("000.mcap"), "log").unwrap();
+        let calibration = document_input("calibration", &serde_json::json!({"b": 1, "a": 2}));
+        // `printf '{"a":2,"b":1}' | sha256sum`
+        let expected = "d3626ac30a87e6f7a6428233b3c68299976865fa5508e4267c5415c76af7a772";
+        assert_eq!(calibration.sha256, expected);
+        let mut inputs = inputs_of(at).unwrap();
+        inputs.push(calibration);
+        let one = Analysis {
+            inputs,
+            ..analysis("a", "", mask(0.0))
+        };
+        assert!(changed_inputs(&one, &inputs_of(at).unwrap()).is_empty());
+        std::fs::write(at.join(EDITS_FILE), "edit").unwrap();
+        let changed = changed_inputs(&one, &inputs_of(at).unwrap());
+        assert_eq!(changed, [EDITS_FILE]);
+        std::fs::write(at.join("000.mcap"), "lug").unwrap();
+        let changed = changed_inputs(&one, &inputs_of(at).unwrap());
+        assert_eq!(changed, ["000.mcap", EDITS_FILE]);
+    }
+}
