@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::{Args, ValueEnum};
-use palpate_protocols::edited;
+use palpate_protocols::analysed;
 use palpate_sessions::export::{ExportError, export_csv, export_parquet};
 use palpate_sessions::log::Session;
 use std::path::PathBuf;
@@ -19,6 +19,10 @@ pub struct ExportArgs {
     /// Folder to write to; the file takes the session folder's name
     #[arg(long, value_name = "DIR", default_value = ".")]
     to: PathBuf,
+    /// Write the session as this analysis of it reads it: with another calibration, or with stretches
+    /// left out, whose forces are empty
+    #[arg(long, value_name = "NAME")]
+    analysis: Option<String>,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -33,8 +37,10 @@ enum Format {
 }
 
 pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
-    let edited = edited::open(&args.session).map_err(super::source_failure)?;
-    let session = edited.session;
+    let opened = analysed::open(&args.session, args.analysis.as_deref());
+    let mut opened = opened.map_err(super::source_failure)?;
+    opened.blank();
+    let session = opened.edited.session;
     session.notes.iter().for_each(|note| output.note(note));
     let name = args
         .session

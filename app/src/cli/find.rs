@@ -27,6 +27,12 @@ pub struct FindArgs {
     /// The protocol's name, exactly
     #[arg(long, value_name = "NAME")]
     protocol: Option<String>,
+    /// The rig's name, exactly
+    #[arg(long, value_name = "NAME")]
+    rig: Option<String>,
+    /// Serial number of the load cell, exactly
+    #[arg(long, value_name = "NUMBER")]
+    cell: Option<String>,
     /// Started on this day or later, UTC, or at a time such as 2026-03-05T14:00:00Z
     #[arg(long, value_name = "DAY", value_parser = beginning)]
     since: Option<DateTime<Utc>>,
@@ -127,6 +133,8 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
         specimen: args.specimen.clone(),
         operator: args.operator.clone(),
         protocol: args.protocol.clone(),
+        rig: args.rig.clone(),
+        cell: args.cell.clone(),
         since: args.since,
         before: args.until,
         conditions: args.conditions.clone(),

@@ -4,10 +4,11 @@ use super::Failure;
 use super::output::Output;
 use clap::Args;
 use palpate_model::rig::SignalFacts;
-use palpate_protocols::edited;
-use palpate_sessions::About;
-use palpate_sessions::edits::{Change, Edit, Verdict};
+use palpate_protocols::analysed;
+use palpate_sessions::analyses::{Analysis, inputs_of};
+use palpate_sessions::edits::{Change, Edit, Review, Verdict};
 use palpate_sessions::log::Session;
+use palpate_sessions::{About, EDITS_FILE};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -48,12 +49,19 @@ struct Info<'a> {
     verdict: Option<Verdict>,
     verdict_reason: Option<&'a str>,
     edits: &'a [Edit],
+    tags: Vec<&'a str>,
+    review: Option<Review>,
+    analyses: &'a [Analysis],
     notes: &'a [String],
 }
 
 pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
-    let edited = edited::open(&args.session).map_err(super::source_failure)?;
-    let (session, edits) = (edited.session, edited.edits);
+    let opened = analysed::open(&args.session, None).map_err(super::source_failure)?;
+    let (session, edits) = (opened.edited.session, opened.edited.edits);
+    let mut now = inputs_of(&args.session).map_err(super::analysis::failure)?;
+    // The review itself is among the edits; what came after it is told by their order.
+    now.retain(|one| one.what != EDITS_FILE);
+    now.extend(opened.analyses.input());
     let manifest = &session.manifest;
     let info = Info {
         command: "info",
@@ -81,6 +89,9 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         verdict: edits.verdict().map(|(verdict, _)| verdict),
         verdict_reason: edits.verdict().map(|(_, edit)| edit.reason.as_str()),
         edits: &edits.all,
+        tags: edits.tags().into_iter().collect(),
+        review: edits.review(&now),
+        analyses: &opened.analyses.all,
         notes: &session.notes,
     };
     output.result(&info, || text(&info));
@@ -159,6 +170,11 @@ fn text(info: &Info<'_>) -> String {
         lines.push(format!("time use   {}", spent.join(", ")));
     }
     lines.extend(info.edits.iter().map(edit_text));
+    if !info.tags.is_empty() {
+        lines.push(format!("tags       {}", info.tags.join(", ")));
+    }
+    lines.extend(info.review.as_ref().map(review_text));
+    lines.extend(info.analyses.iter().map(analysis_text));
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
     lines.join("\n")
 }
@@ -178,8 +194,14 @@ fn signal_text(signal: &SignalFacts) -> String {
 
 fn edit_text(edit: &Edit) -> String {
     let at = edit.at.format("%Y-%m-%d %H:%M:%SZ");
-    let what = match edit.change {
+    let what = match &edit.change {
         Change::Verdict { verdict } => verdict.to_string(),
+        Change::Tags { add, remove } => {
+            let added = add.iter().map(|tag| format!("+{tag}"));
+            let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
+            format!("tags {}", signs.collect::<Vec<_>>().join(" "))
+        }
+        Change::Review { decision, .. } => format!("review, {}", decision.word()),
         Change::Contact {
             number,
             position_mm,
@@ -189,7 +211,33 @@ fn edit_text(edit: &Edit) -> String {
             position_mm.0, was_mm.0
         ),
     };
-    format!("edit       {at} {}: {what}: {}", edit.by, edit.reason)
+    let why = match edit.reason.as_str() {
+        "" => String::new(),
+        reason => format!(": {reason}"),
+    };
+    format!("edit       {at} {}: {what}{why}", edit.by)
+}
+
+fn review_text(review: &Review) -> String {
+    let stands = match review.changed.as_slice() {
+        [] => "everything is as it was seen".to_owned(),
+        changed => format!(
+            "but {} changed since; it is to be reviewed again",
+            changed.join(", ")
+        ),
+    };
+    let decision = review.decision.word();
+    format!("review     {decision} by {}, {stands}", review.by)
+}
+
+fn analysis_text(one: &Analysis) -> String {
+    let at = one.at.format("%Y-%m-%d %H:%M:%SZ");
+    let why = match one.reason.as_str() {
+        "" => String::new(),
+        reason => format!(": {reason}"),
+    };
+    let what = one.what.word();
+    format!("analysis   {at} {}: {what} '{}'{why}", one.by, one.name)
 }
 
 /// The protocol by name and version with the values chosen, where the plan is one of ours.

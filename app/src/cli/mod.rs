@@ -1,6 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
 
 mod analyse;
+mod analysis;
 mod calibration;
 mod catalog;
 mod daily_check;
@@ -8,6 +9,7 @@ mod export;
 mod extremes;
 mod find;
 mod fit;
+mod history;
 mod info;
 mod last_fit;
 mod new_file;
@@ -17,6 +19,7 @@ mod programme;
 mod protocol;
 mod replay;
 mod report;
+mod review;
 mod rig;
 mod run;
 mod select;
@@ -72,6 +75,8 @@ enum Command {
     Export(export::ExportArgs),
     /// Find sessions of the library
     Find(Box<find::FindArgs>),
+    /// Tell what is known of a specimen, a rig or a load cell over time
+    History(history::HistoryArgs),
     /// Make the catalog of the library anew, or check it
     #[command(subcommand)]
     Catalog(catalog::CatalogCommand),
@@ -83,6 +88,16 @@ enum Command {
     Verdict(verdict::VerdictArgs),
     /// Correct where a session found contact; its log stays as it is
     CorrectContact(verdict::CorrectArgs),
+    /// Give sessions tags to find them by, or take them away
+    Tag(review::TagArgs),
+    /// Say that you looked at a session and what you decided, with hashes of what was seen
+    Review(review::ReviewArgs),
+    /// Make the forces of sessions anew from the raw signal with another calibration, as an analysis beside them
+    Recalibrate(analysis::RecalibrateArgs),
+    /// Name stretches of a session whose forces do not count, as an analysis beside it
+    Mask(analysis::MaskArgs),
+    /// Let an analysis count no more; its record stays
+    Withdraw(analysis::WithdrawArgs),
 }
 
 /// Why a command did not do what was asked.
@@ -172,6 +187,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Find(args)) => with(args.json, |out| find::run(&args, out)),
+        Some(Command::History(args)) => with(args.json, |out| history::run(&args, out)),
         Some(Command::Catalog(command)) => {
             with(command.is_json(), |out| catalog::run(&command, out))
         }
@@ -179,6 +195,13 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
         Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
+        Some(Command::Tag(args)) => with(args.json, |out| review::tag(&args, out)),
+        Some(Command::Review(args)) => with(args.json, |out| review::review(&args, out)),
+        Some(Command::Recalibrate(args)) => {
+            with(args.json, |out| analysis::recalibrate(&args, out))
+        }
+        Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
+        Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -213,7 +236,10 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Analysis(err) => analysis::failure(err),
+        SourceError::Table(_)
+        | SourceError::TableAnalysis { .. }
+        | SourceError::Rejected { .. } => Failure::usage(err),
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

@@ -6,7 +6,7 @@ use clap::Args;
 use palpate_model::units::Position;
 use palpate_protocols::edited::{self, Edited};
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::edits::{Change, Edit, EditError, Verdict, add_edit};
+use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate verdict`.
@@ -43,7 +43,7 @@ pub struct CorrectArgs {
 
 /// Who says so, and why.
 #[derive(Debug, Args)]
-struct Why {
+pub(super) struct Why {
     /// Why, in a few words
     #[arg(long, value_name = "TEXT")]
     reason: String,
@@ -53,27 +53,28 @@ struct Why {
 }
 
 impl Why {
-    fn edit(&self, change: Change) -> Edit {
-        let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
+    pub(super) fn edit(&self, change: Change) -> Edit {
         Edit {
             at: wall_now().into(),
-            by: self
-                .by
-                .clone()
-                .or_else(|| login().ok())
-                .unwrap_or_else(|| "somebody".into()),
+            by: author(self.by.as_deref()),
             reason: self.reason.trim().to_owned(),
             change,
         }
     }
 }
 
+/// The name given, or that of the login.
+pub(super) fn author(given: Option<&str>) -> String {
+    let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
+    given.map_or_else(
+        || login().unwrap_or_else(|_| "somebody".into()),
+        str::to_owned,
+    )
+}
+
 fn add(folder: &Path, edited: &Edited, edit: &Edit) -> Result<(), Failure> {
     let id = &edited.session.manifest.session_id;
-    add_edit(folder, id, edit).map_err(|err| match err {
-        EditError::Chain(_) | EditError::Unknown { .. } => Failure::failed(err),
-        _ => Failure::usage(err),
-    })
+    add_edit(folder, id, edit).map_err(super::review::edit_failure)
 }
 
 /// Says what a session is worth.

@@ -1,7 +1,7 @@
 //! What was found in the catalog, as text.
 
 use super::text::in_columns;
-use palpate_sessions::catalog::{Entry, Found};
+use palpate_sessions::catalog::{Entry, Event, Found, ReviewIs};
 
 /// One line a session, and how many there are.
 #[must_use]
@@ -10,7 +10,7 @@ pub fn list(found: &Found, page: usize, pages: usize) -> String {
         return "no session is like that".into();
     }
     let head = [
-        "started", "specimen", "operator", "protocol", "length", "verdict", "folder",
+        "started", "specimen", "operator", "protocol", "length", "verdict", "review", "folder",
     ];
     let mut lines = vec![head.map(String::from).to_vec()];
     lines.extend(found.entries.iter().map(line));
@@ -40,6 +40,10 @@ fn line(entry: &Entry) -> Vec<String> {
     };
     // To the second: `2026-03-05T14:15:07.000Z`.
     let started = entry.started_at.get(..19).unwrap_or(&entry.started_at);
+    let mut folder = one_line(&entry.folder);
+    if !entry.tags.is_empty() {
+        folder += &format!("  [{}]", entry.tags.join(", "));
+    }
     vec![
         started.replace('T', " "),
         or_dash(&entry.specimen),
@@ -47,8 +51,31 @@ fn line(entry: &Entry) -> Vec<String> {
         or_dash(&entry.protocol),
         length,
         entry.verdict.map_or("-".into(), |it| it.to_string()),
-        one_line(&entry.folder),
+        ReviewIs::of(entry.review.as_ref()).word().to_owned(),
+        folder,
     ]
+}
+
+/// One line an event, oldest first.
+#[must_use]
+pub fn history(events: &[Event]) -> String {
+    let line = |event: &Event| {
+        let at = event
+            .at
+            .get(..19)
+            .map_or("undated".to_owned(), |at| at.replace('T', " "));
+        let by = match event.by.as_str() {
+            "" => "-".to_owned(),
+            by => one_line(by),
+        };
+        let what = one_line(&event.sentence);
+        let what = match event.folder.as_str() {
+            "" => what,
+            folder => format!("{what} ({})", one_line(folder)),
+        };
+        vec![at, event.what.clone(), by, what]
+    };
+    in_columns(&events.iter().map(line).collect::<Vec<_>>())
 }
 
 /// A text without anything that would end its line or move the cursor.

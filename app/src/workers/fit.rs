@@ -67,7 +67,18 @@ pub fn fit_source(
     wanted: Wanted,
     options: &FitOptions,
 ) -> Result<Fitted, SourceError> {
-    let source = analysis::read_stretch(path, columns, wanted)?;
+    fit_analysed(path, columns, wanted, None, options)
+}
+
+/// As [`fit_source`], a session as one of its analyses reads it.
+pub fn fit_analysed(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+    wanted: Wanted,
+    name: Option<&str>,
+    options: &FitOptions,
+) -> Result<Fitted, SourceError> {
+    let source = analysis::read_analysed(path, columns, wanted, name)?;
     let watch = Stopwatch::start();
     let result = fit(&source.samples, options);
     Ok(Fitted {

@@ -32,10 +32,14 @@ pub struct Entry {
     pub protocol_version: Option<u64>,
     /// Title of the protocol, where it has one.
     pub protocol_title: String,
-    /// The rig, as it describes itself.
+    /// Name of the rig.
     pub rig: String,
+    /// The rig, as it describes itself.
+    pub rig_identity: String,
     /// Name of the load-cell calibration.
     pub calibration: String,
+    /// Serial number of the load cell, where the calibration tells it.
+    pub cell: String,
     /// SHA-256 of the compact JSON of the calibration, keys in alphabetical order; empty without one.
     pub calibration_sha256: String,
     /// Version of the program that recorded.
@@ -189,7 +193,8 @@ impl Entry {
         // By its JSON: an imported session has no rig, and nothing says that it is imported in others.
         let facts = serde_json::to_value(manifest).unwrap_or_default();
         let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-        self.rig = text(&facts["rig"]["identity"]);
+        self.rig = text(&facts["rig"]["name"]);
+        self.rig_identity = text(&facts["rig"]["identity"]);
         self.origin = match (&manifest.recovered, &facts["imported"]) {
             (Some(_), _) => Origin::Recovered,
             (None, Value::Null) => Origin::Recorded,
@@ -201,6 +206,7 @@ impl Entry {
         self.protocol_version = plan["version"].as_u64();
         self.protocol_title = text(&plan["title"]);
         self.calibration = text(&calibration["name"]);
+        self.cell = text(&calibration["cell"]);
         if !calibration.is_null() {
             self.calibration_sha256 = crate::text::sha256(calibration.to_string().as_bytes());
         }
@@ -278,6 +284,8 @@ impl Entry {
             &self.protocol,
             &self.protocol_title,
             &self.rig,
+            &self.rig_identity,
+            &self.cell,
             &self.calibration,
             &self.reason,
             &self.verdict_reason,

@@ -9,6 +9,7 @@
 
 mod condition;
 mod entry;
+mod history;
 mod schema;
 mod search;
 mod update;
@@ -16,6 +17,7 @@ mod walk;
 
 pub use condition::{Condition, ConditionError};
 pub use entry::{Entry, Made, Named, Origin, Source};
+pub use history::{Event, Subject};
 pub use search::{Found, Order, Query, ReviewIs, VerdictIs};
 pub use update::{Changes, Doubt};
 

@@ -5,7 +5,7 @@ use rusqlite::{Connection, TransactionBehavior};
 /// Marks the file as ours: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and of what stands in them. Another one is replaced.
-pub(super) const VERSION: i64 = 2;
+pub(super) const VERSION: i64 = 3;
 
 /// `entry` has all that is known of a session, as JSON; the other columns are what is searched.
 const TABLES: &str = "
@@ -18,6 +18,7 @@ CREATE TABLE session (
     specimen TEXT NOT NULL,
     protocol TEXT NOT NULL,
     rig TEXT NOT NULL,
+    cell TEXT NOT NULL,
     verdict TEXT NOT NULL,
     review TEXT NOT NULL,
     duration_s REAL NOT NULL,

@@ -21,6 +21,10 @@ pub struct Query {
     pub operator: Option<String>,
     /// The protocol's name, exactly.
     pub protocol: Option<String>,
+    /// The rig's name, exactly.
+    pub rig: Option<String>,
+    /// The load cell's serial number, exactly.
+    pub cell: Option<String>,
     /// Started then or later.
     pub since: Option<DateTime<Utc>>,
     /// Started before then.
@@ -175,6 +179,8 @@ impl Query {
             ("specimen", &self.specimen),
             ("operator", &self.operator),
             ("protocol", &self.protocol),
+            ("rig", &self.rig),
+            ("cell", &self.cell),
         ] {
             if let Some(wanted) = wanted {
                 parts.push(format!("{column} = ?"));

@@ -171,8 +171,8 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     let started = chrono::DateTime::parse_from_rfc3339(&entry.started_at);
     let verdict = entry.verdict.map_or("", |verdict| verdict.word());
     db.prepare_cached(
-        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, verdict, review, duration_s, entry)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )?
     .execute(params![
         entry.folder,
@@ -182,6 +182,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         entry.specimen,
         entry.protocol,
         entry.rig,
+        entry.cell,
         verdict,
         ReviewIs::of(entry.review.as_ref()).word(),
         entry.duration_s,

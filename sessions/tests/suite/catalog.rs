@@ -3,8 +3,11 @@
 
 use crate::support::{MemorySink, Random, end, manifest, rows};
 use chrono::{Duration, TimeZone, Utc};
-use palpate_sessions::catalog::{CATALOG_FILE, Catalog, Condition, Entry, Order, Query, VerdictIs};
-use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
+use palpate_sessions::analyses::{Analysed, Analysis, add_analysis};
+use palpate_sessions::catalog::{
+    CATALOG_FILE, Catalog, Condition, Entry, Order, Query, ReviewIs, VerdictIs,
+};
+use palpate_sessions::edits::{Change, Decision, Edit, Verdict, add_edit};
 use palpate_sessions::{LOG_FILE, Labels, LogWriter, Manifest};
 use std::fs;
 use std::path::Path;
@@ -74,6 +77,57 @@ fn judge(folder: &Path, id: &str, verdict: Verdict, reason: &str) {
     add_edit(folder, id, &edit(reason, Change::Verdict { verdict })).unwrap();
 }
 
+fn fit_of(name: &str, tau: f64) -> Analysis {
+    Analysis {
+        name: name.into(),
+        at: Utc.with_ymd_and_hms(2026, 4, 2, 9, 0, 0).unwrap(),
+        by: "Mary Somerville".into(),
+        reason: String::new(),
+        software_version: "0.1.0".into(),
+        engine_version: 1,
+        inputs: Vec::new(),
+        what: Analysed::Fit {
+            based_on: None,
+            settings: serde_json::Value::Null,
+            results: serde_json::json!({"parameters": [
+                {"name": "tau_eps", "value": tau, "unit": "s"}
+            ]}),
+        },
+    }
+}
+
+/// Some of a session's tags, analyses and reviews, at random.
+fn talk(folder: &Path, id: &str, random: &mut Random) {
+    let tags = |word: &str| Change::Tags {
+        add: vec![word.into(), "all".into()],
+        remove: vec!["none".into()],
+    };
+    let analyse = |name: &str, tau: f64| add_analysis(folder, id, &fit_of(name, tau)).unwrap();
+    match random.below(4) {
+        0 => add_edit(folder, id, &edit("", tags("pilot"))).unwrap(),
+        1 => add_edit(folder, id, &edit("", tags("good"))).unwrap(),
+        _ => {}
+    }
+    let tau = random.below(5) as f64;
+    if random.below(2) == 0 {
+        analyse("first fit", tau);
+    }
+    let decision = [Decision::Accepted, Decision::Rejected, Decision::Repeat][random.below(3)];
+    if random.below(2) == 0 {
+        let seen = palpate_sessions::Analyses::read(folder, id)
+            .unwrap()
+            .input();
+        let seen = seen.into_iter().collect();
+        let change = Change::Review { decision, seen };
+        add_edit(folder, id, &edit("seen by two", change)).unwrap();
+    }
+    match random.below(4) {
+        0 => analyse("second fit", tau + 0.5),
+        1 => judge(folder, id, Verdict::Suspect, "second thoughts"),
+        _ => {}
+    }
+}
+
 /// A library of random sessions, some without an end, some judged, one damaged.
 fn library(count: usize, seed: u64) -> tempfile::TempDir {
     let library = tempfile::tempdir().unwrap();
@@ -89,6 +143,7 @@ fn library(count: usize, seed: u64) -> tempfile::TempDir {
             let reason = ["hair on the probe", "Überlast (naïve)"][random.below(2)];
             judge(&folder, &manifest.session_id, *verdict, reason);
         }
+        talk(&folder, &manifest.session_id, &mut random);
     }
     let damaged = library.path().join("sessions/damaged");
     fs::create_dir_all(&damaged).unwrap();
@@ -124,12 +179,17 @@ fn words_of(entry: &Entry) -> Vec<String> {
         &entry.protocol,
         &entry.protocol_title,
         &entry.rig,
+        &entry.rig_identity,
+        &entry.cell,
+        &entry.calibration,
         &entry.reason,
         &entry.verdict_reason,
     ]
     .map(String::as_str)
     .join(" ");
-    for one in named.map(|one| &one.text).chain(&entry.words) {
+    let names = entry.analyses.iter().map(|one| &one.name);
+    let words = named.map(|one| &one.text).chain(&entry.words);
+    for one in words.chain(&entry.tags).chain(names) {
         text = format!("{text} {one}");
     }
     text += entry.trouble.as_deref().unwrap_or_default();
@@ -145,6 +205,18 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
     is(&query.specimen, &entry.specimen)
         && is(&query.operator, &entry.operator)
         && is(&query.protocol, &entry.protocol)
+        && is(&query.rig, &entry.rig)
+        && query.tags.iter().all(|tag| entry.tags.contains(tag))
+        && query
+            .review
+            .is_none_or(|wanted| match (wanted, &entry.review) {
+                (ReviewIs::None, review) => review.is_none(),
+                (_, None) => false,
+                (ReviewIs::Outdated, Some(review)) => !review.changed.is_empty(),
+                (ReviewIs::Given(decision), Some(review)) => {
+                    review.changed.is_empty() && review.decision == decision
+                }
+            })
         && query
             .since
             .is_none_or(|since| start.is_some_and(|at| at >= since))
@@ -200,6 +272,9 @@ fn random_query(random: &mut Random) -> Query {
         "s00",
         "damaged",
         "nobody",
+        "pilot",
+        "somer",
+        "second",
     ];
     for _ in 0..1 + random.below(2) {
         match random.below(7) {
@@ -216,6 +291,18 @@ fn random_query(random: &mut Random) -> Query {
         }
     }
     let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+    query.review = match random.below(12) {
+        0 => Some(ReviewIs::None),
+        1 => Some(ReviewIs::Outdated),
+        2 => Some(ReviewIs::Given(Decision::Accepted)),
+        _ => None,
+    };
+    query.tags = match random.below(12) {
+        0 => vec!["pilot".into()],
+        1 => vec!["all".into(), "good".into()],
+        2 => vec!["none".into()],
+        _ => Vec::new(),
+    };
     query.verdict = match random.below(8) {
         0 => Some(VerdictIs::None),
         1 => Some(VerdictIs::Given(verdicts[random.below(3)])),

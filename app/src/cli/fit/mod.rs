@@ -4,13 +4,15 @@ mod batch;
 mod family;
 mod intervals;
 mod joint;
+mod saved;
 pub(super) mod sources;
 
 use super::Failure;
+use super::analysis::Who;
 use super::new_file;
 use super::output::Output;
 use crate::report::{picture, text};
-use crate::workers::fit::{Fitted, fit_source};
+use crate::workers::fit::{Fitted, fit_analysed};
 use clap::Args;
 use intervals::Intervals;
 use palpate_model::calibration::ForceUncertainty;
@@ -65,6 +67,14 @@ pub struct FitArgs {
     /// Take sessions though they were rejected
     #[arg(long)]
     include_rejected: bool,
+    /// Read a session as this analysis of it does: with another calibration, or with stretches left out
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["share", "family"])]
+    analysis: Option<String>,
+    /// Keep the fit as an analysis of this name beside its session
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["share", "family"])]
+    save: Option<String>,
+    #[command(flatten)]
+    who: Who,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -93,6 +103,7 @@ struct Recipe {
     columns: Option<ColumnNames>,
     is_systematic: bool,
     wanted: Wanted,
+    analysis: Option<String>,
 }
 
 impl Recipe {
@@ -101,7 +112,8 @@ impl Recipe {
     }
 
     fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
-        let fitted = fit_source(path, self.columns.as_ref(), self.wanted, &self.options);
+        let (columns, analysis) = (self.columns.as_ref(), self.analysis.as_deref());
+        let fitted = fit_analysed(path, columns, self.wanted, analysis, &self.options);
         let fitted = fitted?;
         Ok(match self.is_systematic {
             true => fitted.with_systematic(&self.options),
@@ -140,6 +152,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         columns,
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
+        analysis: args.analysis.clone(),
     };
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
@@ -149,9 +162,9 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     {
         return one(source, &recipe, args, output);
     }
-    if args.picture.is_some() || args.profile || args.bootstrap.is_some() {
+    if args.picture.is_some() || args.profile || args.bootstrap.is_some() || args.save.is_some() {
         return Err(Failure::usage(
-            "--picture, --profile and --bootstrap are for one fit; name a single session or table",
+            "--picture, --profile, --bootstrap and --save are for one fit; name a single session or table",
         ));
     }
     let found = sources::find(&args.sources)?;
@@ -162,6 +175,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
 fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
     new_file::check("picture", to)?;
+    saved::check(args, source)?;
     let fitted = recipe.fit(source)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
@@ -191,6 +205,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         systematic: fitted.systematic,
         seconds: fitted.seconds,
     };
+    saved::keep(args, source, &object)?;
     output.result(&object, || {
         let mut lines = vec![text::whole(&report)];
         lines.extend(intervals.lines(&report));

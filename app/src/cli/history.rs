@@ -1,0 +1,75 @@
+//! `palpate history`: what is known of a specimen, a rig or a load cell over time.
+
+use super::Failure;
+use super::catalog::with_updated;
+use super::output::Output;
+use crate::report::catalog as report;
+use clap::{Args, ValueEnum};
+use palpate_sessions::catalog::{Event, Subject};
+use palpate_sessions::library_folder;
+use serde::Serialize;
+
+/// Arguments of `palpate history`.
+#[derive(Debug, Args)]
+pub struct HistoryArgs {
+    /// Of what
+    #[arg(value_enum)]
+    subject: Kind,
+    /// Its name; a load cell's serial number
+    name: String,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Kind {
+    /// What was indented
+    Specimen,
+    /// A rig
+    Rig,
+    /// A load cell
+    Cell,
+}
+
+impl From<Kind> for Subject {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Specimen => Self::Specimen,
+            Kind::Rig => Self::Rig,
+            Kind::Cell => Self::Cell,
+        }
+    }
+}
+
+#[derive(Serialize)]
+struct HistoryReport<'a> {
+    command: &'static str,
+    subject: Subject,
+    name: &'a str,
+    events: &'a [Event],
+}
+
+pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
+    let library = library_folder().map_err(Failure::usage)?;
+    let subject = Subject::from(args.subject);
+    let found = with_updated(&library, output, |catalog| {
+        catalog.history(subject, &args.name)
+    });
+    let (events, remarks) = found?;
+    remarks.iter().for_each(|remark| output.note(remark));
+    if events.is_empty() {
+        return Err(Failure::usage(format!(
+            "nothing is known of '{}'; the name must be written exactly as in 'palpate find'",
+            args.name
+        )));
+    }
+    let object = HistoryReport {
+        command: "history",
+        subject,
+        name: &args.name,
+        events: &events,
+    };
+    output.result(&object, || report::history(&events));
+    Ok(())
+}

@@ -1,0 +1,164 @@
+//! What is known of a specimen, a rig or a load cell over time: its sessions with all that was said of them,
+//! the rig's daily checks, and the calibrations of rig and cell.
+
+use super::search::{Order, Query};
+use super::{Catalog, CatalogError};
+use crate::calibrations::{Shelf, taken_at};
+use crate::checks::read_checks;
+use crate::edits::{Change, Edit, Edits};
+use chrono::{DateTime, SecondsFormat, Utc};
+use serde::Serialize;
+
+/// Whose history it is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Subject {
+    /// What was indented.
+    Specimen,
+    /// A rig, by its name.
+    Rig,
+    /// A load cell, by its serial number.
+    Cell,
+}
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Event {
+    /// When, UTC, RFC 3339 to the millisecond; empty where nobody knows.
+    pub at: String,
+    /// `session`, `verdict`, `contact`, `tags`, `review`, `fit`, `recalibration`, `mask`, `calibration` or
+    /// `check`.
+    pub what: String,
+    /// Folder of the session below the library; empty for what is of no session.
+    pub folder: String,
+    /// By whom; empty where nobody is told.
+    pub by: String,
+    /// What, in words.
+    pub sentence: String,
+}
+
+fn stamp(at: DateTime<Utc>) -> String {
+    at.to_rfc3339_opts(SecondsFormat::Millis, true)
+}
+
+impl Catalog {
+    /// The history of one of them, oldest first, and sentences about what cannot be read. The catalog is
+    /// taken as it is: see [`Catalog::update`].
+    pub fn history(
+        &self,
+        subject: Subject,
+        name: &str,
+    ) -> Result<(Vec<Event>, Vec<String>), CatalogError> {
+        let wanted = Some(name.to_owned());
+        let mut query = Query {
+            order: Order::Started,
+            ..Query::default()
+        };
+        match subject {
+            Subject::Specimen => query.specimen = wanted,
+            Subject::Rig => query.rig = wanted,
+            Subject::Cell => query.cell = wanted,
+        }
+        let (mut events, mut remarks) = (Vec::new(), Vec::new());
+        for entry in self.find(&query)?.entries {
+            let ending = entry.ending.as_deref().unwrap_or("no end");
+            events.push(Event {
+                at: entry.started_at.clone(),
+                what: "session".into(),
+                folder: entry.folder.clone(),
+                by: entry.operator.clone(),
+                sentence: format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s),
+            });
+            match Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
+                Ok(edits) => events.extend(edits.all.iter().map(|one| said(&entry.folder, one))),
+                Err(err) => remarks.push(err.to_string()),
+            }
+            events.extend(entry.analyses.iter().map(|one| Event {
+                at: stamp(one.at),
+                what: one.what.clone(),
+                folder: entry.folder.clone(),
+                by: one.by.clone(),
+                sentence: one.name.clone(),
+            }));
+        }
+        self.calibrations(subject, name, &mut events, &mut remarks);
+        if subject == Subject::Rig {
+            match read_checks(&self.library, name) {
+                Ok(checks) => events.extend(checks.iter().map(|one| Event {
+                    at: stamp(one.at),
+                    what: "check".into(),
+                    folder: String::new(),
+                    by: one.by.clone(),
+                    sentence: match one.is_passed {
+                        true => "daily check passed".to_owned(),
+                        false => format!("daily check failed: {}", one.failures()),
+                    },
+                })),
+                Err(err) => remarks.push(err.to_string()),
+            }
+        }
+        // Times of one form sort as they are written; of equals, a session comes before what is said of it.
+        events.sort_by(|a, b| a.at.cmp(&b.at));
+        Ok((events, remarks))
+    }
+
+    fn calibrations(
+        &self,
+        subject: Subject,
+        name: &str,
+        events: &mut Vec<Event>,
+        remarks: &mut Vec<String>,
+    ) {
+        let shelf = Shelf::open(&self.library);
+        remarks.extend(shelf.unreadable.iter().map(ToString::to_string));
+        for kept in &shelf.kept {
+            let one = &kept.calibration;
+            let is_its = match subject {
+                Subject::Specimen => false,
+                Subject::Rig => one.rig == name,
+                Subject::Cell => one.cell == name,
+            };
+            if !is_its {
+                continue;
+            }
+            let at = taken_at(one).ok().flatten();
+            let instead = one.supersedes.as_ref();
+            let instead = instead.map_or(String::new(), |old| format!(" in the place of {old}"));
+            events.push(Event {
+                at: at.map_or(String::new(), |at| stamp(at.to_utc())),
+                what: "calibration".into(),
+                folder: String::new(),
+                by: one.operator.clone(),
+                sentence: format!("{}{instead}", kept.id),
+            });
+        }
+    }
+}
+
+/// An edit as an event.
+fn said(folder: &str, edit: &Edit) -> Event {
+    let (what, words) = match &edit.change {
+        Change::Verdict { verdict } => ("verdict", verdict.to_string()),
+        Change::Contact { position_mm, .. } => ("contact", format!("at {:.3} mm", position_mm.0)),
+        Change::Tags { add, remove } => {
+            let signs = |sign: &str, tags: &[String]| -> Vec<String> {
+                tags.iter().map(|tag| format!("{sign}{tag}")).collect()
+            };
+            (
+                "tags",
+                [signs("+", add), signs("-", remove)].concat().join(" "),
+            )
+        }
+        Change::Review { decision, .. } => ("review", decision.word().to_owned()),
+    };
+    Event {
+        at: stamp(edit.at),
+        what: what.into(),
+        folder: folder.to_owned(),
+        by: edit.by.clone(),
+        sentence: match edit.reason.as_str() {
+            "" => words,
+            reason => format!("{words}: {reason}"),
+        },
+    }
+}
