@@ -3,6 +3,7 @@
 mod analyse;
 mod calibration;
 mod daily_check;
+mod doctor;
 mod export;
 mod extremes;
 mod fit;
@@ -66,6 +67,10 @@ enum Command {
     /// Keep, show and check load-cell calibrations
     #[command(subcommand)]
     Calibration(calibration::CalibrationCommand),
+    /// Tell in which state sessions are: whole, interrupted, damaged, newer or something else
+    Doctor(doctor::DoctorArgs),
+    /// Keep what is whole of interrupted or damaged sessions, beside the originals
+    Recover(doctor::RecoverArgs),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -163,6 +168,8 @@ pub fn main() -> ExitCode {
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
+        Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
+        Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),

@@ -156,6 +156,9 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     if programme::is_one(name) {
         return programme::run(Path::new(name), how, &values, output);
     }
+    if let Ok(library) = library_folder() {
+        super::doctor::recover_unfinished(&library, output);
+    }
     let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
     let labels = labels(how)?;

@@ -3,6 +3,7 @@
 mod analyse;
 mod calibration;
 mod disk;
+mod doctor;
 mod extremes;
 mod fit;
 mod plan;
