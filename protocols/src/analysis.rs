@@ -11,6 +11,7 @@ use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
+use crate::compliance::CorrectionError;
 use crate::edited;
 use crate::engine::{Effect, Record};
 
@@ -25,6 +26,8 @@ pub struct FitSource {
     pub notes: Vec<String>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
+    /// Name of the rig it was recorded on; `None` for a table.
+    pub rig: Option<String>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
 }
@@ -130,6 +133,9 @@ pub enum SourceError {
         /// The parser's words.
         detail: String,
     },
+    /// Depths cannot be corrected as asked.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration {
@@ -170,6 +176,7 @@ pub fn read_stretch(
             start: Seconds(0.0),
             notes: table.notes,
             specimen: None,
+            rig: None,
             calibration: None,
         });
     }
@@ -192,6 +199,7 @@ pub fn read_stretch(
     }
     let specimen = session.manifest.specimen.trim();
     Ok(FitSource {
+        rig: Some(session.manifest.rig.name),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
         samples,
         start,
@@ -306,7 +314,7 @@ fn start_of(session: &Session) -> Seconds {
 }
 
 /// The signal's noise as the tare found it.
-fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
+pub(crate) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
     decisions.iter().find_map(|(_, effect)| match effect {
         Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
         _ => None,

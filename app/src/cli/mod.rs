@@ -2,6 +2,7 @@
 
 mod analyse;
 mod calibration;
+mod compliance;
 mod daily_check;
 mod export;
 mod extremes;
@@ -66,6 +67,8 @@ enum Command {
     /// Keep, show and check load-cell calibrations
     #[command(subcommand)]
     Calibration(calibration::CalibrationCommand),
+    /// Find how far a rig gives way, from a session of stiff-surface
+    Compliance(compliance::ComplianceArgs),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -163,6 +166,7 @@ pub fn main() -> ExitCode {
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
+        Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
@@ -202,7 +206,9 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Table(_) | SourceError::Rejected { .. } | SourceError::Correction(_) => {
+            Failure::usage(err)
+        }
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

@@ -22,7 +22,7 @@ const PASS_OVERRUN_MM: f64 = 0.5;
 const TRAVEL_MARGIN_MM: f64 = 1.0;
 
 /// Share of the force of the second touch from which the surfaces count as seated.
-const SEATED_SHARE: f64 = 0.3;
+pub(crate) const SEATED_SHARE: f64 = 0.3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {

@@ -28,6 +28,7 @@ mod tests;
 mod touch_log;
 mod weigh;
 
+pub(crate) use base::SEATED_SHARE;
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
 pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, Tare};

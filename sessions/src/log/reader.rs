@@ -108,6 +108,19 @@ impl Session {
         Reader::new(path, OnDamage::StopBefore)?.read()
     }
 
+    /// CRC-32 over the raw of every sample in order: tick, volts and pulses, eight bytes each, lowest first.
+    /// How the log is cut into files is not in it.
+    #[must_use]
+    pub fn checksum(&self) -> u32 {
+        let mut hasher = crc32fast::Hasher::new();
+        for row in &self.rows {
+            hasher.update(&row.tick.to_le_bytes());
+            hasher.update(&row.volts.to_le_bytes());
+            hasher.update(&row.pulses.to_le_bytes());
+        }
+        hasher.finalize()
+    }
+
     /// Session time of the newest sample or entry.
     #[must_use]
     pub fn last_time(&self) -> Nanos {
