@@ -1,6 +1,6 @@
 //! From what is on disk to what a fit takes: sessions and foreign tables alike.
 
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
@@ -217,15 +217,20 @@ pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
     })
 }
 
+/// The curve of that calibration.
+pub(crate) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
+    let curve = calibration_of(session)?.curve();
+    curve.map_err(|err| SourceError::Calibration {
+        detail: err.to_string(),
+    })
+}
+
 /// What a fit takes of a session, each force weighted by what the signal's noise and the
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
 /// one at an end of the converter's range, every one after an interlock, and every one after the probe
 /// has left the tissue on the way back.
 pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
-    let bad = |detail: String| SourceError::Calibration { detail };
-    let curve = calibration_of(session)?
-        .curve()
-        .map_err(|err| bad(err.to_string()))?;
+    let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.rig.tick().0;

@@ -3,7 +3,7 @@
 //! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
 
 use crate::analysis::{
-    FitSource, SourceError, calibration_of, decisions, is_saturated, noise_of, trusted_samples,
+    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, trusted_samples,
 };
 use crate::engine::{Effect, Record, SEATED_SHARE};
 use palpate_model::fit::FitSample;
@@ -72,7 +72,9 @@ pub fn measured(
 
 /// The ways in after a stiff surface was found, press by press.
 fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureError> {
+    let curve = curve_of(session)?;
     let decisions = decisions(session)?;
+    let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
     let found = decisions
         .iter()
         .rev()
@@ -96,6 +98,7 @@ fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureErr
         let sample = StiffSample {
             position: Position(surface.0 + depth),
             force: Newtons(force),
+            sigma: curve.force_sigma(Newtons(force), noise),
         };
         match presses.last_mut() {
             Some((press, samples)) if *press == row.cycle => samples.push(sample),
@@ -303,9 +306,7 @@ fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
 /// The corrected depths of a session as columns beside its own: empty before contact, and where the converter
 /// was at an end of its range or an interlock had tripped, for there the force is not known.
 pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
-    let bad = |detail: String| SourceError::Calibration { detail };
-    let curve = calibration_of(session)?.curve();
-    let curve = curve.map_err(|err| bad(err.to_string()))?;
+    let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let noise = noise_of(&decisions);

@@ -10,6 +10,9 @@ pub struct StiffSample {
     pub position: Position,
     /// Force above tare.
     pub force: Newtons,
+    /// Its standard uncertainty beside that of the others: only ratios matter. Where a load cell hardly answers,
+    /// forces are worth little.
+    pub sigma: Newtons,
 }
 
 /// Compliance of a rig with everything that was between its axis and the stiff surface, the surface included.
@@ -23,7 +26,7 @@ pub struct Compliance {
     pub surface: Position,
     /// Its standard error in mm.
     pub surface_std_error_mm: f64,
-    /// Standard deviation of the forces about the line, in N.
+    /// Standard deviation of the forces about the line in N, each by its weight.
     pub rmse_n: f64,
 }
 
@@ -71,23 +74,26 @@ const BEND_SIGMAS: f64 = 3.0;
 /// the forces at or above `seating`: below it surfaces touch at their roughest points only.
 ///
 /// Positions are commanded and exact; forces carry the noise. So force is fitted over position,
-/// `F = (x - x_0) / C`, and `C` follows with its error to first order.
+/// `F = (x - x_0) / C`, by weighted least squares, and `C` follows with its error to first order.
 pub fn fit_compliance(
     samples: &[StiffSample],
     seating: Newtons,
 ) -> Result<Compliance, ComplianceError> {
-    let used: Vec<(f64, f64)> = samples
+    let used: Vec<(f64, f64, f64)> = samples
         .iter()
         .filter(|sample| sample.force >= seating && sample.position.is_finite())
-        .map(|sample| (sample.position.0, sample.force.0))
-        .filter(|(_, force)| force.is_finite())
+        .map(|sample| (sample.position.0, sample.force.0, sample.sigma.0.powi(-2)))
+        .filter(|(_, force, weight)| force.is_finite() && *weight > 0.0 && weight.is_finite())
         .collect();
+    let weights: f64 = used.iter().map(|one| one.2).sum();
     let count = used.len() as f64;
     if used.len() < SAMPLES_MIN {
         let samples = used.len();
         return Err(ComplianceError::TooShort { samples, seating });
     }
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| used.iter().map(of).sum::<f64>() / count;
+    let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+        used.iter().map(|one| one.2 * of(one)).sum::<f64>() / weights
+    };
     let (middle, force_mean) = (mean(&|s| s.0), mean(&|s| s.1));
     let half = used
         .iter()
@@ -99,7 +105,7 @@ pub fn fit_compliance(
     let slope = mean(&|s| u(s.0) * s.1) / square;
     let parabola_square = mean(&|s| parabola(s.0).powi(2));
     let bend = mean(&|s| parabola(s.0) * s.1) / parabola_square;
-    let residual = |s: &(f64, f64)| s.1 - force_mean - slope * u(s.0);
+    let residual = |s: &(f64, f64, f64)| s.1 - force_mean - slope * u(s.0);
     let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
     let slope_error = (variance / count / square).sqrt();
     // Three standard errors: a slope that could be noise is none.
@@ -165,6 +171,7 @@ mod tests {
                 StiffSample {
                     position: Position(52.3 + x),
                     force: Newtons(force(x.max(0.0)) + noise * random.normal()),
+                    sigma: Newtons(1.0),
                 }
             })
             .collect()
@@ -188,6 +195,28 @@ mod tests {
         // Chi-square with 40 degrees: 16 to 76 holds all but 1e-3.
         assert!((16.0..76.0).contains(&slope), "{slope}");
         assert!((16.0..76.0).contains(&surface), "{surface}");
+    }
+
+    #[test]
+    fn forces_that_are_worth_little_hardly_count() {
+        // Above 3 N the cell says a tenth less than there is, and is known to be ten times as uncertain there.
+        let mut samples = run(0.005, 5, |x| x / 0.02);
+        let like = |samples: &[StiffSample]| fit_compliance(samples, Newtons(0.5)).unwrap();
+        for sample in samples.iter_mut().filter(|one| one.force.0 > 3.0) {
+            sample.force.0 -= 0.02;
+        }
+        let blind = like(&samples);
+        for sample in samples.iter_mut().filter(|one| one.force.0 > 3.0) {
+            sample.sigma = Newtons(10.0);
+        }
+        let weighed = like(&samples);
+        let miss = |found: &Compliance| (found.mm_per_newton - 0.02).abs();
+        assert!(miss(&weighed) < 0.2 * miss(&blind), "{blind:?} {weighed:?}");
+        // All alike count as before, however large.
+        let mut same = run(0.005, 5, |x| x / 0.02);
+        let before = like(&same);
+        same.iter_mut().for_each(|one| one.sigma = Newtons(4.0));
+        assert_eq!(before, like(&same));
     }
 
     #[test]
@@ -219,7 +248,8 @@ mod tests {
         let still = vec![
             StiffSample {
                 position: Position(1.0),
-                force: Newtons(1.0)
+                force: Newtons(1.0),
+                sigma: Newtons(1.0),
             };
             100
         ];

@@ -35,7 +35,7 @@ pub struct RigCompliance {
     pub surface_mm: f64,
     /// Its standard uncertainty in mm.
     pub surface_std_error_mm: f64,
-    /// Standard deviation of the forces about the line, in N.
+    /// Standard deviation of the forces about the line in N, each by its weight.
     pub rmse_n: f64,
     /// Samples in the line: all on the way in at or above the seating force.
     pub samples: usize,
@@ -157,6 +157,7 @@ mod tests {
             StiffSample {
                 position: Position(50.0 + x),
                 force: Newtons(x / mm_per_n),
+                sigma: Newtons(1.0),
             }
         };
         (0..1000).map(sample).collect()

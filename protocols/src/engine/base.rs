@@ -108,7 +108,13 @@ impl BaseSearch {
                 self.stage = Stage::SlowPass;
             }
             Stage::SlowPass => {
-                self.samples.push(StiffSample { position, force });
+                // Forces this small are all worth the same.
+                let sigma = Newtons(1.0);
+                self.samples.push(StiffSample {
+                    position,
+                    force,
+                    sigma,
+                });
                 if filtered >= self.plan.pass_force {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
