@@ -208,19 +208,19 @@ print(json.dumps([session, topics]))
 fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    type Export = fn(&Session, &Path) -> Result<(), ExportError>;
+    type Export = fn(&Session, &Beside, &Path) -> Result<(), ExportError>;
     for (name, export) in [
         ("one.csv", export_csv as Export),
         ("one.parquet", export_parquet as Export),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, "mine").unwrap();
-        let refusal = export(&session, &path).unwrap_err();
+        let refusal = export(&session, &Beside::default(), &path).unwrap_err();
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
         assert!(matches!(
-            export(&session, &nowhere),
+            export(&session, &Beside::default(), &nowhere),
             Err(ExportError::Io { .. })
         ));
     }
