@@ -19,7 +19,7 @@ pub struct ComplianceArgs {
     /// Session folder of a stiff-surface run
     session: PathBuf,
     /// Force in N from which the surfaces count as seated [default: 0.3 of the highest]
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", allow_negative_numbers = true)]
     seating: Option<f64>,
     /// Keep it in the library, in the place of the one in force for the rig
     #[arg(long)]
