@@ -1,6 +1,7 @@
 //! The first message of every session: who measured what, on which rig, with which versions.
 
 use crate::about::About;
+use crate::recover::Recovered;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use serde::{Deserialize, Serialize};
@@ -49,6 +50,9 @@ pub struct Manifest {
     pub settings: serde_json::Value,
     /// Warnings the operator read and accepted before the start.
     pub acknowledgements: Vec<String>,
+    /// Set if this is what could be kept of another session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recovered: Option<Recovered>,
 }
 
 impl Manifest {

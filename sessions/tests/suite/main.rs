@@ -9,9 +9,12 @@ mod faults;
 #[cfg(test)]
 mod pace;
 #[cfg(test)]
+mod recovery;
+#[cfg(test)]
 mod round_trip;
 #[cfg(test)]
 mod segments;
 #[cfg(test)]
 mod support;
+#[cfg(test)]
 mod written_again;
