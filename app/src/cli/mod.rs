@@ -2,6 +2,7 @@
 
 mod analyse;
 mod calibration;
+mod compliance;
 mod daily_check;
 mod doctor;
 mod export;
@@ -71,6 +72,8 @@ enum Command {
     Doctor(doctor::DoctorArgs),
     /// Keep what is whole of interrupted or damaged sessions, beside the originals
     Recover(doctor::RecoverArgs),
+    /// Find how far a rig gives way, from a session of stiff-surface
+    Compliance(compliance::ComplianceArgs),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -170,6 +173,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
         Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
+        Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
@@ -209,7 +213,9 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Table(_) | SourceError::Rejected { .. } | SourceError::Correction(_) => {
+            Failure::usage(err)
+        }
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty
