@@ -18,6 +18,7 @@ pub mod edits;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod imported;
 pub mod journal;
 mod lock;
 pub mod log;
@@ -39,6 +40,7 @@ pub use folder::{
     library_folder, new_programme_folder, new_session_folder, segment_file,
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
+pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
     BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
     SegmentSource, Session, SessionWriter, Sink,

@@ -2,7 +2,8 @@
 //!
 //! Samples are stored in pairs of Protocol Buffers messages: a [`DaqBlock`] with what the rig
 //! reported and a [`DerivedBlock`] with what was made of it. Every array of a pair has one
-//! element per sample, except `counts`, which is empty on a rig without a converter.
+//! element per sample, except that `counts` is empty on a rig without a converter, and `volts` and
+//! `pulses_delta` are where an imported file has no such thing.
 
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
@@ -17,17 +18,17 @@ const DEPTH_VALID: u32 = 1 << 1;
 /// One sample: raw as reported, and derived as shown to the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Controller clock, in its own counts.
+    /// Controller clock, in its own counts; picoseconds since the first sample of an imported session.
     pub tick: u64,
     /// Arrival on the host's clock.
     pub host: Nanos,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
-    /// Load-cell signal in V, as received.
-    pub volts: f64,
-    /// Commanded position in pulses.
-    pub pulses: i64,
-    /// Bits of [`palpate_model::rig::AxisStatus`].
+    /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
+    pub volts: Option<f64>,
+    /// Commanded position in pulses; `None` in an imported session.
+    pub pulses: Option<i64>,
+    /// Bits of [`palpate_model::rig::AxisStatus`]; none in an imported session.
     pub status: u32,
     /// Force above tare in N; `None` before tare.
     pub force: Option<f64>,
@@ -43,7 +44,7 @@ impl Row {
     /// The first value of this row that is not a number, named; `None` when all are.
     #[must_use]
     pub fn non_finite(&self) -> Option<&'static str> {
-        if !self.volts.is_finite() {
+        if self.volts.is_some_and(|volts| !volts.is_finite()) {
             Some("signal")
         } else if self.force.is_some_and(|force| !force.is_finite()) {
             Some("force")
@@ -153,13 +154,22 @@ pub(crate) struct DerivedBlock {
     pub cycle: Vec<u32>,
 }
 
-/// Cuts rows where a block must end: at its size limit, and where counts appear or vanish.
+/// Which of its optional values a row has: counts, volts and pulses.
+fn held(row: &Row) -> [bool; 3] {
+    [
+        row.counts.is_some(),
+        row.volts.is_some(),
+        row.pulses.is_some(),
+    ]
+}
+
+/// Cuts rows where a block must end: at its size limit, and where counts, volts or pulses appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
-    rows.chunk_by(|a, b| a.counts.is_some() == b.counts.is_some())
+    rows.chunk_by(|a, b| held(a) == held(b))
         .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
 }
 
-/// The pair of blocks of some rows that all have counts or all have none.
+/// The pair of blocks of some rows that all have the same of their optional values.
 pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, DerivedBlock) {
     let mut daq = DaqBlock {
         first_sample,
@@ -173,10 +183,13 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     for row in rows {
         daq.tick_delta.push(row.tick.wrapping_sub(tick) as i64);
         daq.host_delta_ns.push(row.host.0.wrapping_sub(host) as i64);
-        daq.pulses_delta.push(row.pulses.wrapping_sub(pulses));
-        (tick, host, pulses) = (row.tick, row.host.0, row.pulses);
+        if let Some(to) = row.pulses {
+            daq.pulses_delta.push(to.wrapping_sub(pulses));
+            pulses = to;
+        }
+        (tick, host) = (row.tick, row.host.0);
         daq.counts.extend(row.counts);
-        daq.volts.push(row.volts);
+        daq.volts.extend(row.volts);
         daq.status.push(row.status);
         derived.force_newtons.push(row.force.unwrap_or(0.0));
         derived.depth_mm.push(row.depth.unwrap_or(0.0));
@@ -198,8 +211,6 @@ pub(crate) fn rows_from_blocks(
     let count = daq.tick_delta.len();
     let lengths = [
         daq.host_delta_ns.len(),
-        daq.volts.len(),
-        daq.pulses_delta.len(),
         daq.status.len(),
         derived.force_newtons.len(),
         derived.depth_mm.len(),
@@ -207,8 +218,11 @@ pub(crate) fn rows_from_blocks(
         derived.phase.len(),
         derived.cycle.len(),
     ];
-    let has_counts = !daq.counts.is_empty();
-    if lengths.iter().any(|&length| length != count) || (has_counts && daq.counts.len() != count) {
+    let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
+    let [has_counts, has_volts, has_pulses] = optional.map(|length| length > 0);
+    if lengths.iter().any(|&length| length != count)
+        || optional.iter().any(|&length| length > 0 && length != count)
+    {
         return Err("the columns of a sample block differ in length".into());
     }
     if count > BLOCK_ROWS_MAX {
@@ -221,7 +235,9 @@ pub(crate) fn rows_from_blocks(
     for i in 0..count {
         tick = tick.wrapping_add(daq.tick_delta[i] as u64);
         host = host.wrapping_add(daq.host_delta_ns[i] as u64);
-        pulses = pulses.wrapping_add(daq.pulses_delta[i]);
+        if has_pulses {
+            pulses = pulses.wrapping_add(daq.pulses_delta[i]);
+        }
         let validity = derived.validity[i];
         if validity & !(FORCE_VALID | DEPTH_VALID) != 0 {
             return Err(format!("validity bits {validity:#x} are unknown"));
@@ -231,8 +247,8 @@ pub(crate) fn rows_from_blocks(
             tick,
             host: Nanos(host),
             counts: has_counts.then(|| daq.counts[i]),
-            volts: daq.volts[i],
-            pulses,
+            volts: has_volts.then(|| daq.volts[i]),
+            pulses: has_pulses.then_some(pulses),
             status: daq.status[i],
             force: (validity & FORCE_VALID != 0).then_some(derived.force_newtons[i]),
             depth: (validity & DEPTH_VALID != 0).then_some(derived.depth_mm[i]),
@@ -256,8 +272,8 @@ mod tests {
             tick,
             host: Nanos(u64::MAX - tick),
             counts,
-            volts: 0.1 + tick as f64 * 1e-17,
-            pulses: i64::MIN.wrapping_add(tick as i64),
+            volts: (tick != 12).then_some(0.1 + tick as f64 * 1e-17),
+            pulses: (tick != 13).then_some(i64::MIN.wrapping_add(tick as i64)),
             status: u32::MAX,
             force: tick.is_multiple_of(2).then_some(-0.0),
             depth: tick.is_multiple_of(3).then_some(f64::MIN_POSITIVE),
@@ -273,6 +289,8 @@ mod tests {
             row(0, None),
             row(7, Some(i32::MIN)),
             row(12, Some(0)),
+            row(13, Some(1)),
+            row(14, Some(2)),
         ];
         let mut back = Vec::new();
         let mut first = 0;
@@ -291,10 +309,12 @@ mod tests {
         let rows = [row(1, Some(2)), row(2, Some(3))];
         let (daq, derived) = blocks_from_rows(0, &rows);
         type Edit = fn(&mut DaqBlock, &mut DerivedBlock);
-        let edits: [(Edit, &str); 6] = [
+        let edits: [(Edit, &str); 8] = [
             (|_, derived| derived.phase[1] = 99, "phase code 99"),
             (|_, derived| derived.cycle.clear(), "length"),
             (|daq, _| daq.counts.truncate(1), "length"),
+            (|daq, _| daq.volts.truncate(1), "length"),
+            (|daq, _| daq.pulses_delta.truncate(1), "length"),
             (|daq, _| daq.volts[0] = f64::NAN, "signal"),
             (|_, derived| derived.validity[0] = 4, "validity"),
             (|_, derived| derived.first_sample = 1, "numbered"),

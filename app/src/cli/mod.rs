@@ -6,6 +6,7 @@ mod daily_check;
 mod export;
 mod extremes;
 mod fit;
+mod import;
 mod info;
 mod last_fit;
 mod new_file;
@@ -66,6 +67,8 @@ enum Command {
     /// Keep, show and check load-cell calibrations
     #[command(subcommand)]
     Calibration(calibration::CalibrationCommand),
+    /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
+    Import(Box<import::ImportArgs>),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -163,6 +166,7 @@ pub fn main() -> ExitCode {
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
+        Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
@@ -202,7 +206,9 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } => Failure::usage(err),
+        SourceError::Table(_) | SourceError::Rejected { .. } | SourceError::Imported { .. } => {
+            Failure::usage(err)
+        }
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

@@ -273,6 +273,9 @@ impl Reader {
             notes: self.notes,
         };
         let last = session.last_time().seconds().0;
+        if let Some(imported) = &session.manifest.imported {
+            session.notes.extend(imported.notes());
+        }
         // Only a segment that others follow is finished without an end.
         let goes_on = !self.is_folder && self.is_finished && session.end.is_none();
         if goes_on {

@@ -111,7 +111,8 @@ pub struct LogWriter<S: Sink> {
     library: String,
     sequences: [u32; Channel::ALL.len()],
     started_ns: u64,
-    tick_nanos: u64,
+    /// `None` in an imported session, whose ticks are picoseconds.
+    tick_nanos: Option<u64>,
     controller_ns: u64,
     samples: u64,
     entries: u64,
@@ -135,7 +136,7 @@ impl<S: Sink> LogWriter<S> {
             library,
             sequences: [0; Channel::ALL.len()],
             started_ns: u64::try_from(started_ns).unwrap_or(0),
-            tick_nanos: manifest.rig.tick_nanos,
+            tick_nanos: manifest.rig.as_ref().map(|rig| rig.tick_nanos),
             controller_ns: 0,
             samples: 0,
             entries: 0,
@@ -215,7 +216,10 @@ impl<S: Sink> LogWriter<S> {
         for slice in block_slices(rows) {
             let Some(last) = slice.last() else { continue };
             let (daq, derived) = blocks_from_rows(self.samples, slice);
-            self.controller_ns = last.tick.saturating_mul(self.tick_nanos);
+            self.controller_ns = match self.tick_nanos {
+                Some(nanos) => last.tick.saturating_mul(nanos),
+                None => last.tick / 1000,
+            };
             self.put(Channel::Daq, last.host, &daq.encode_to_vec())?;
             self.put(Channel::Derived, last.host, &derived.encode_to_vec())?;
             self.samples += slice.len() as u64;

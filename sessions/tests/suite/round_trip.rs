@@ -143,7 +143,7 @@ fn what_could_not_be_read_back_is_not_written() {
     let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
     let good = rows(3, 5);
     let mut bad = good.clone();
-    bad[1].volts = f64::NAN;
+    bad[1].volts = Some(f64::NAN);
     let refusal = log.append(&bad, &[]).unwrap_err();
     assert!(matches!(refusal, LogError::NotFinite { .. }), "{refusal}");
     let mut entries = entries(&rows(30, 5), 10);
@@ -165,7 +165,7 @@ fn what_could_not_be_read_back_is_not_written() {
     assert!(same_bits(&open_bytes(&bytes).unwrap().rows, &good));
 
     let mut manifest = manifest();
-    manifest.limits.travel_max.0 = f64::INFINITY;
+    manifest.limits.as_mut().unwrap().travel_max.0 = f64::INFINITY;
     let refusal = LogWriter::begin(MemorySink::default(), "memory", &manifest);
     assert!(refusal.is_err());
 }
