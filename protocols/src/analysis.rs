@@ -226,7 +226,6 @@ fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
 
 /// The samples of an imported session, its time from the first one.
 pub(crate) fn table_of_imported(session: &Session) -> Table {
-    let tick_secs = session.manifest.tick().0;
     let mut table = Table::default();
     for row in &session.rows {
         let is_taken = matches!(
@@ -236,7 +235,7 @@ pub(crate) fn table_of_imported(session: &Session) -> Table {
         let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else {
             continue;
         };
-        table.t.push(row.tick as f64 * tick_secs);
+        table.t.push(session.manifest.time_of(row.tick as i64).0);
         table.depth.push(depth);
         table.force.push(force);
         table.is_unload.push(row.phase == Phase::Unload);

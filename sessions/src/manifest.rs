@@ -13,9 +13,9 @@ use std::sync::atomic::{AtomicU32, Ordering};
 /// 2: imported sessions, which have no rig and no limits, and samples without volts and pulses.
 pub const RECORD_VERSION: u32 = 2;
 
-/// Length of a tick of an imported session: fine enough to keep every digit that a file's times have, and
-/// 64 bits of it are 213 days.
-pub const IMPORTED_TICK: Seconds = Seconds(1e-12);
+/// Ticks in a second of an imported session: fine enough to keep every digit that a file's times have, and
+/// 63 bits of them are 106 days.
+pub const IMPORTED_TICKS_PER_S: f64 = 1e12;
 
 /// What a session needs to be understood and replayed, beside its samples and entries.
 ///
@@ -70,7 +70,16 @@ impl Manifest {
     pub fn tick(&self) -> Seconds {
         self.rig
             .as_ref()
-            .map_or(IMPORTED_TICK, RigDescription::tick)
+            .map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
+    }
+
+    /// The length of so many ticks. Of an imported session it is the float that the file's decimal number is.
+    #[must_use]
+    pub fn time_of(&self, ticks: i64) -> Seconds {
+        Seconds(match &self.rig {
+            Some(rig) => ticks as f64 * rig.tick().0,
+            None => ticks as f64 / IMPORTED_TICKS_PER_S,
+        })
     }
 
     /// The start as an RFC 3339 text in UTC, to the millisecond.

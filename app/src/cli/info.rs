@@ -155,7 +155,7 @@ fn text(info: &Info<'_>) -> String {
         (Some(ending), Some(reason)) => format!("ending     {ending}: {reason}"),
         _ => "ending     none: the recording was interrupted".into(),
     });
-    if let Some(time_use) = info.time_use_s {
+    if let Some(time_use) = info.time_use_s.filter(|use_s| !use_s.is_empty()) {
         let spent: Vec<String> = time_use
             .iter()
             .map(|(phase, secs)| format!("{phase} {secs:.1} s"))

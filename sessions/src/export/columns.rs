@@ -21,11 +21,13 @@ pub const COLUMNS: [(&str, &str); 8] = [
 pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
     let rows = &session.rows;
     let first_tick = rows.first().map_or(0, |row| row.tick);
-    let tick_secs = session.manifest.tick().0;
     // A controller that restarted counts from zero again: its time is negative, not a failure.
     let t: Vec<f64> = rows
         .iter()
-        .map(|row| row.tick.wrapping_sub(first_tick) as i64 as f64 * tick_secs)
+        .map(|row| {
+            let ticks = row.tick.wrapping_sub(first_tick) as i64;
+            session.manifest.time_of(ticks).0
+        })
         .collect();
     let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
     let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();

@@ -5,7 +5,7 @@ use crate::about::Labels;
 use crate::folder::{FolderError, SessionFolder, check_free_space};
 use crate::imported::{Imported, ORIGINAL_FOLDER};
 use crate::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
-use crate::manifest::{IMPORTED_TICK, Manifest, RECORD_VERSION};
+use crate::manifest::{IMPORTED_TICKS_PER_S, Manifest, RECORD_VERSION};
 use crate::record::{EndRecord, Row};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
@@ -138,7 +138,7 @@ fn ticks(samples: &[Sample]) -> Result<Vec<u64>, KeepError> {
     let refused = |reason: String| KeepError::Times { reason };
     let mut ticks: Vec<u64> = Vec::with_capacity(samples.len());
     for sample in samples {
-        let tick = ((sample.t - first) / IMPORTED_TICK.0).round();
+        let tick = ((sample.t - first) * IMPORTED_TICKS_PER_S).round();
         // Beyond 2^63 ticks, 106 days, differences of ticks would lose their sign.
         if !(0.0..9.2e18).contains(&tick) {
             return Err(refused(format!(

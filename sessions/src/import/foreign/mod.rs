@@ -8,11 +8,14 @@ mod decimal;
 mod encoding;
 mod keep;
 mod layout;
+mod legacy;
 mod parts;
 mod rows;
 mod said;
 mod samples;
 mod told;
+mod unzipped;
+mod workbook;
 
 pub use decimal::Decimal;
 pub use encoding::TextEncoding;
@@ -31,6 +34,9 @@ use thiserror::Error;
 
 /// Largest text read, in bytes: with what is made of it, about four times as much memory.
 const TEXT_BYTES_MAX: u64 = 256 << 20;
+
+/// Largest workbook read, in bytes; its cells are counted beside.
+const WORKBOOK_BYTES_MAX: u64 = 64 << 20;
 
 /// A foreign file could not be read.
 #[derive(Debug, Error)]
@@ -104,7 +110,50 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
     if bytes.is_empty() {
         return Err("it is empty".into());
     }
+    let is_workbook = match told.format {
+        Some(format) => format == Format::Workbook,
+        None => workbook::is_one(&bytes),
+    };
     let mut said = Said::default();
+    let mut origin = Imported {
+        file: file.into(),
+        bytes: bytes.len() as u64,
+        checksum: format!("{:08x}", crc32fast::hash(&bytes)),
+        format: Format::Workbook.name().into(),
+        part: String::new(),
+        first_time_s: 0.0,
+        readings: Vec::new(),
+        facts: Vec::new(),
+        remarks: Vec::new(),
+    };
+    if is_workbook {
+        if bytes.len() as u64 > WORKBOOK_BYTES_MAX {
+            return Err(format!(
+                "the workbook has {} bytes, and {WORKBOOK_BYTES_MAX} are the most; export the measurement as text",
+                bytes.len()
+            ));
+        }
+        said.say(
+            "layout",
+            origin.format.as_str(),
+            told.format.is_some(),
+            "--format NAME",
+        );
+        origin.readings = said.0;
+        let sheets = workbook::sheets(&bytes)?
+            .into_iter()
+            .map(|(name, rows)| RawPart {
+                name,
+                facts: Vec::new(),
+                rows: Rows::Cells(rows),
+            });
+        let (parts, left_out) = understand(sheets.collect(), &origin, told)?;
+        return Ok(Foreign {
+            bytes,
+            parts,
+            left_out,
+        });
+    }
     let (text, how) = encoding::decode(&bytes, told.encoding)?;
     let lines = parts::lines_of(&text);
     let format = told.format.unwrap_or_else(|| parts::detect(&lines));
@@ -134,17 +183,8 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
             },
         })
         .collect();
-    let origin = Imported {
-        file: file.into(),
-        bytes: bytes.len() as u64,
-        checksum: format!("{:08x}", crc32fast::hash(&bytes)),
-        format: format.name().into(),
-        part: String::new(),
-        first_time_s: 0.0,
-        readings: said.0,
-        facts: Vec::new(),
-        remarks: Vec::new(),
-    };
+    origin.format = format.name().into();
+    origin.readings = said.0;
     let (parts, left_out) = understand(cut, &origin, told)?;
     Ok(Foreign {
         bytes,
@@ -220,7 +260,7 @@ fn understand_one(
 ) -> Result<ForeignPart, Unknown> {
     let mut said = Said(origin.readings.clone());
     let header = layout::find(&part.rows, told, &mut said)
-        .map_err(Unknown::Other)?
+        .map_err(Unknown::NoMeasurement)?
         .ok_or_else(|| Unknown::NoMeasurement("it has no rows of numbers".into()))?;
     if part.rows.len() - header.first < 2 {
         let reason = "it has fewer than two rows of numbers".into();
