@@ -9,6 +9,8 @@ use thiserror::Error;
 
 /// Name of the log in a session folder, or of its first segment.
 pub const LOG_FILE: &str = "000.mcap";
+/// Name of the file in a session folder that names the folder of segments its disk could not take.
+pub const SPARE_FILE: &str = "spare";
 /// Name of the lock in a session folder.
 pub const LOCK_FILE: &str = "lock";
 
@@ -144,6 +146,13 @@ fn library_from(
         (None, Some(home)) if !home.as_os_str().is_empty() => Ok(home.join("palpate")),
         _ => Err(FolderError::NoLibrary),
     }
+}
+
+/// Where recordings go on when the disk of their session fails: `PALPATE_SPARE`, if it is set.
+#[must_use]
+pub fn spare_folder() -> Option<PathBuf> {
+    let chosen = std::env::var_os("PALPATE_SPARE")?;
+    (!chosen.is_empty()).then(|| chosen.into())
 }
 
 /// The folder a new session gets in a library.

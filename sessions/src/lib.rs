@@ -23,6 +23,7 @@ pub mod journal;
 mod lock;
 pub mod log;
 pub mod manifest;
+mod packed;
 pub mod record;
 mod schema;
 pub mod text;
@@ -36,14 +37,15 @@ pub use chain::ChainError;
 pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
 pub use export::{ExportError, export_csv, export_parquet};
 pub use folder::{
-    FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SessionFolder, check_free_space,
-    library_folder, new_programme_folder, new_session_folder, segment_file,
+    FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
+    check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
+    spare_folder,
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
-    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Pace, ReadError,
-    SegmentSource, Session, SessionWriter, Sink,
+    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace,
+    ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
-pub use record::{EndRecord, Entry, EntryKind, Row};
+pub use record::{Block, EndRecord, Entry, EntryKind, Row};

@@ -5,6 +5,7 @@
 //! element per sample, except that `counts` is empty on a rig without a converter, and `volts` and
 //! `pulses_delta` are where an imported file has no such thing.
 
+use crate::packed::{Field, extend_doubles, extend_numbers, next_field, zigzag};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use serde::{Deserialize, Serialize};
@@ -154,6 +155,21 @@ pub(crate) struct DerivedBlock {
     pub cycle: Vec<u32>,
 }
 
+/// One of the thinned samples; what is not known is left out.
+#[derive(Clone, PartialEq, prost::Message)]
+pub(crate) struct View {
+    #[prost(double, tag = "1")]
+    pub t_s: f64,
+    #[prost(double, optional, tag = "2")]
+    pub signal_v: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    pub force_n: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    pub depth_mm: Option<f64>,
+    #[prost(uint32, tag = "5")]
+    pub cycle: u32,
+}
+
 /// Which of its optional values a row has: counts, volts and pulses.
 fn held(row: &Row) -> [bool; 3] {
     [
@@ -202,63 +218,206 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     (daq, derived)
 }
 
-/// Appends the rows of a pair of blocks, or says what is wrong with the pair.
-pub(crate) fn rows_from_blocks(
-    daq: &DaqBlock,
-    derived: &DerivedBlock,
-    rows: &mut Vec<Row>,
+/// Bytes of the largest block: every value of a sample in its longest form.
+const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 48;
+
+/// A verified block of samples, column by column. Its memory is used again for the next one.
+#[derive(Debug, Default)]
+pub struct Block {
+    // Once checked, the differences are summed up.
+    daq: DaqBlock,
+    derived: DerivedBlock,
+}
+
+impl Block {
+    /// Number of the first sample in the session.
+    #[must_use]
+    pub fn first_sample(&self) -> u64 {
+        self.daq.first_sample
+    }
+
+    /// How many samples there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.daq.tick_delta.len()
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.daq.tick_delta.is_empty()
+    }
+
+    /// Load-cell signal in V; empty where an imported file has none.
+    #[must_use]
+    pub fn volts(&self) -> &[f64] {
+        &self.daq.volts
+    }
+
+    /// Force above tare in N; 0 where [`Row::force`] is `None`.
+    #[must_use]
+    pub fn force(&self) -> &[f64] {
+        &self.derived.force_newtons
+    }
+
+    /// Depth below contact in mm; 0 where [`Row::depth`] is `None`.
+    #[must_use]
+    pub fn depth(&self) -> &[f64] {
+        &self.derived.depth_mm
+    }
+
+    /// Session time of the last sample.
+    #[must_use]
+    pub fn last_time(&self) -> Option<Nanos> {
+        self.daq.host_delta_ns.last().map(|ns| Nanos(*ns as u64))
+    }
+
+    /// One sample. Panics if there is none of that number.
+    #[must_use]
+    pub fn row(&self, index: usize) -> Row {
+        let (daq, derived) = (&self.daq, &self.derived);
+        let validity = derived.validity[index];
+        Row {
+            tick: daq.tick_delta[index] as u64,
+            host: Nanos(daq.host_delta_ns[index] as u64),
+            counts: daq.counts.get(index).copied(),
+            volts: daq.volts.get(index).copied(),
+            pulses: daq.pulses_delta.get(index).copied(),
+            status: daq.status[index],
+            force: (validity & FORCE_VALID != 0).then_some(derived.force_newtons[index]),
+            depth: (validity & DEPTH_VALID != 0).then_some(derived.depth_mm[index]),
+            // Checked when the block was read.
+            phase: Phase::from_code(derived.phase[index]).unwrap_or(Phase::Idle),
+            cycle: derived.cycle[index],
+        }
+    }
+
+    /// All samples, in order.
+    pub fn rows(&self) -> impl Iterator<Item = Row> {
+        (0..self.len()).map(|index| self.row(index))
+    }
+
+    /// Reads the raw half.
+    pub(crate) fn take_raw(&mut self, data: &[u8]) -> Result<(), String> {
+        let daq = &mut self.daq;
+        prost::Message::clear(daq);
+        read_fields(data, "samples", |number, field| match (number, field) {
+            (1, Field::Number(value)) => {
+                daq.first_sample = value;
+                Ok(())
+            }
+            (2, Field::Bytes(bytes)) => extend_numbers(&mut daq.tick_delta, bytes, zigzag),
+            (3, Field::Bytes(bytes)) => extend_numbers(&mut daq.host_delta_ns, bytes, zigzag),
+            (4, Field::Bytes(bytes)) => {
+                extend_numbers(&mut daq.counts, bytes, |value| zigzag(value) as i32)
+            }
+            (5, Field::Bytes(bytes)) => extend_doubles(&mut daq.volts, bytes),
+            (6, Field::Bytes(bytes)) => extend_numbers(&mut daq.pulses_delta, bytes, zigzag),
+            (7, Field::Bytes(bytes)) => extend_numbers(&mut daq.status, bytes, |it| it as u32),
+            _ => Ok(()),
+        })
+    }
+
+    /// Reads the other half and checks both, or says what is wrong with the pair.
+    pub(crate) fn take_derived(&mut self, data: &[u8]) -> Result<(), String> {
+        let derived = &mut self.derived;
+        prost::Message::clear(derived);
+        read_fields(data, "derived samples", |number, field| {
+            match (number, field) {
+                (1, Field::Number(value)) => {
+                    derived.first_sample = value;
+                    Ok(())
+                }
+                (2, Field::Bytes(bytes)) => extend_doubles(&mut derived.force_newtons, bytes),
+                (3, Field::Bytes(bytes)) => extend_doubles(&mut derived.depth_mm, bytes),
+                (4, Field::Bytes(bytes)) => {
+                    extend_numbers(&mut derived.validity, bytes, |it| it as u32)
+                }
+                (5, Field::Bytes(bytes)) => {
+                    extend_numbers(&mut derived.phase, bytes, |it| it as u32)
+                }
+                (6, Field::Bytes(bytes)) => {
+                    extend_numbers(&mut derived.cycle, bytes, |it| it as u32)
+                }
+                _ => Ok(()),
+            }
+        })?;
+        self.check()
+    }
+
+    fn check(&mut self) -> Result<(), String> {
+        let (daq, derived) = (&mut self.daq, &self.derived);
+        let count = daq.tick_delta.len();
+        let lengths = [
+            daq.host_delta_ns.len(),
+            daq.status.len(),
+            derived.force_newtons.len(),
+            derived.depth_mm.len(),
+            derived.validity.len(),
+            derived.phase.len(),
+            derived.cycle.len(),
+        ];
+        let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
+        let is_odd = |length: &usize| *length > 0 && *length != count;
+        if lengths.iter().any(|&length| length != count) || optional.iter().any(is_odd) {
+            return Err("the columns of a sample block differ in length".into());
+        }
+        if count > BLOCK_ROWS_MAX {
+            return Err(format!("a sample block holds {count} samples"));
+        }
+        if derived.first_sample != daq.first_sample {
+            return Err("raw and derived samples are numbered differently".into());
+        }
+        let known = FORCE_VALID | DEPTH_VALID;
+        if let Some(bits) = derived.validity.iter().find(|bits| **bits & !known != 0) {
+            return Err(format!("validity bits {bits:#x} are unknown"));
+        }
+        let is_unknown = |code: &&u32| Phase::from_code(**code).is_none();
+        if let Some(code) = derived.phase.iter().find(is_unknown) {
+            return Err(format!("phase code {code} is unknown"));
+        }
+        let columns = [
+            ("signal", &daq.volts),
+            ("force", &derived.force_newtons),
+            ("depth", &derived.depth_mm),
+        ];
+        for (name, column) in columns {
+            // Without a way out in the middle the loop is done several values at a time.
+            if !column.iter().fold(true, |all, x| all & x.is_finite()) {
+                return Err(format!("the {name} of a sample is not a number"));
+            }
+        }
+        for column in [
+            &mut daq.tick_delta,
+            &mut daq.host_delta_ns,
+            &mut daq.pulses_delta,
+        ] {
+            let mut sum = 0i64;
+            for value in column {
+                sum = sum.wrapping_add(*value);
+                *value = sum;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Goes through the fields of one half of a block. A field that is not known is passed over.
+fn read_fields<'a>(
+    mut data: &'a [u8],
+    what: &str,
+    mut take: impl FnMut(u32, Field<'a>) -> Result<(), String>,
 ) -> Result<(), String> {
-    let count = daq.tick_delta.len();
-    let lengths = [
-        daq.host_delta_ns.len(),
-        daq.status.len(),
-        derived.force_newtons.len(),
-        derived.depth_mm.len(),
-        derived.validity.len(),
-        derived.phase.len(),
-        derived.cycle.len(),
-    ];
-    let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
-    let [has_counts, has_volts, has_pulses] = optional.map(|length| length > 0);
-    if lengths.iter().any(|&length| length != count)
-        || optional.iter().any(|&length| length > 0 && length != count)
-    {
-        return Err("the columns of a sample block differ in length".into());
+    if data.len() > BLOCK_BYTES_MAX {
+        let count = data.len();
+        return Err(format!(
+            "a block of {what} has {count} bytes, more than any has"
+        ));
     }
-    if count > BLOCK_ROWS_MAX {
-        return Err(format!("a sample block holds {count} samples"));
-    }
-    if derived.first_sample != daq.first_sample {
-        return Err("raw and derived samples are numbered differently".into());
-    }
-    let (mut tick, mut host, mut pulses) = (0u64, 0u64, 0i64);
-    for i in 0..count {
-        tick = tick.wrapping_add(daq.tick_delta[i] as u64);
-        host = host.wrapping_add(daq.host_delta_ns[i] as u64);
-        if has_pulses {
-            pulses = pulses.wrapping_add(daq.pulses_delta[i]);
-        }
-        let validity = derived.validity[i];
-        if validity & !(FORCE_VALID | DEPTH_VALID) != 0 {
-            return Err(format!("validity bits {validity:#x} are unknown"));
-        }
-        let code = derived.phase[i];
-        let row = Row {
-            tick,
-            host: Nanos(host),
-            counts: has_counts.then(|| daq.counts[i]),
-            volts: has_volts.then(|| daq.volts[i]),
-            pulses: has_pulses.then_some(pulses),
-            status: daq.status[i],
-            force: (validity & FORCE_VALID != 0).then_some(derived.force_newtons[i]),
-            depth: (validity & DEPTH_VALID != 0).then_some(derived.depth_mm[i]),
-            phase: Phase::from_code(code).ok_or_else(|| format!("phase code {code} is unknown"))?,
-            cycle: derived.cycle[i],
-        };
-        if let Some(name) = row.non_finite() {
-            return Err(format!("the {name} of a sample is not a number"));
-        }
-        rows.push(row);
+    while !data.is_empty() {
+        next_field(&mut data)
+            .and_then(|(number, field)| take(number, field))
+            .map_err(|err| format!("a block of {what} is unreadable: {err}"))?;
     }
     Ok(())
 }
@@ -266,6 +425,7 @@ pub(crate) fn rows_from_blocks(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use prost::Message;
 
     fn row(tick: u64, counts: Option<i32>) -> Row {
         Row {
@@ -296,12 +456,38 @@ mod tests {
         let mut first = 0;
         for slice in block_slices(&rows) {
             let (daq, derived) = blocks_from_rows(first, slice);
-            rows_from_blocks(&daq, &derived, &mut back).unwrap();
+            let mut block = Block::default();
+            (block.daq, block.derived) = (daq, derived);
+            block.check().unwrap();
+            back.extend(block.rows());
             first += slice.len() as u64;
         }
         assert_eq!(back, rows);
         let sign = back[1].force.unwrap().is_sign_negative();
         assert!(sign, "minus zero lost its sign");
+    }
+
+    #[test]
+    fn blocks_are_read_as_the_general_decoder_reads_them() {
+        let rows: Vec<Row> = (0..1000u64)
+            .map(|i| row(i.wrapping_pow(9) >> (i % 60), Some((i * i) as i32 - 7)))
+            .collect();
+        let (daq, derived) = blocks_from_rows(3, &rows);
+        let mut ours = Block::default();
+        ours.take_raw(&daq.encode_to_vec()).unwrap();
+        assert_eq!(ours.daq, DaqBlock::decode(&*daq.encode_to_vec()).unwrap());
+        ours.take_derived(&derived.encode_to_vec()).unwrap();
+        assert_eq!(ours.derived, derived);
+        // Cut anywhere, both refuse or both read the same.
+        let bytes = daq.encode_to_vec();
+        for length in 0..bytes.len() {
+            let theirs = DaqBlock::decode(&bytes[..length]);
+            let outcome = ours.take_raw(&bytes[..length]);
+            assert_eq!(outcome.is_ok(), theirs.is_ok(), "{length}");
+            if let Ok(theirs) = theirs {
+                assert_eq!(ours.daq, theirs);
+            }
+        }
     }
 
     #[test]
@@ -322,7 +508,7 @@ mod tests {
         for (edit, expected) in edits {
             let (mut daq, mut derived) = (daq.clone(), derived.clone());
             edit(&mut daq, &mut derived);
-            let refusal = rows_from_blocks(&daq, &derived, &mut Vec::new()).unwrap_err();
+            let refusal = Block { daq, derived }.check().unwrap_err();
             assert!(refusal.contains(expected), "{refusal}");
         }
     }

@@ -19,10 +19,14 @@ pub(crate) enum Channel {
     Decision,
     Fit,
     End,
+    /// The samples thinned out, one message each, for programs that draw messages.
+    View,
+    /// Says that what may be lost of the segments before is written again in this one.
+    Rewrite,
 }
 
 impl Channel {
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Manifest,
         Self::Daq,
         Self::Derived,
@@ -30,6 +34,8 @@ impl Channel {
         Self::Decision,
         Self::Fit,
         Self::End,
+        Self::View,
+        Self::Rewrite,
     ];
 
     pub fn topic(self) -> &'static str {
@@ -41,6 +47,8 @@ impl Channel {
             Self::Decision => "/decision",
             Self::Fit => "/fit",
             Self::End => "/end",
+            Self::View => "/daq/view",
+            Self::Rewrite => "/rewrite",
         }
     }
 
@@ -59,14 +67,14 @@ impl Channel {
     /// The encoding of messages, and so of the schema: `protobuf` or `json`.
     pub fn message_encoding(self) -> &'static str {
         match self {
-            Self::Daq | Self::Derived => "protobuf",
+            Self::Daq | Self::Derived | Self::View => "protobuf",
             _ => "json",
         }
     }
 
     pub fn schema_encoding(self) -> &'static str {
         match self {
-            Self::Daq | Self::Derived => "protobuf",
+            Self::Daq | Self::Derived | Self::View => "protobuf",
             _ => "jsonschema",
         }
     }
@@ -78,6 +86,8 @@ impl Channel {
             Self::Derived => "palpate.DerivedBlock",
             Self::Input | Self::Decision | Self::Fit => "palpate.Entry",
             Self::End => "palpate.EndRecord",
+            Self::View => "palpate.View",
+            Self::Rewrite => "palpate.Rewrite",
         }
     }
 
@@ -88,6 +98,8 @@ impl Channel {
             Self::Manifest => MANIFEST_SCHEMA.into(),
             Self::Input | Self::Decision | Self::Fit => ENTRY_SCHEMA.into(),
             Self::End => END_SCHEMA.into(),
+            Self::View => descriptor_set("View", VIEW_FIELDS),
+            Self::Rewrite => REWRITE_SCHEMA.into(),
         }
     }
 
@@ -111,7 +123,13 @@ impl Channel {
             ],
             Self::Input | Self::Decision | Self::Fit => &[("now_ns", "ns since session start")],
             Self::End => &[("ended_at", "ns since session start"), ("time_use", "s")],
-            Self::Manifest => &[],
+            Self::View => &[
+                ("t_s", "s since session start"),
+                ("signal_V", "V"),
+                ("force_N", "N"),
+                ("depth_mm", "mm"),
+            ],
+            Self::Manifest | Self::Rewrite => &[],
         };
         units
             .iter()
@@ -139,6 +157,14 @@ const DERIVED_FIELDS: &[Field] = &[
     ("validity", 4, Label::Repeated, Type::Uint32),
     ("phase", 5, Label::Repeated, Type::Uint32),
     ("cycle", 6, Label::Repeated, Type::Uint32),
+];
+
+const VIEW_FIELDS: &[Field] = &[
+    ("t_s", 1, Label::Optional, Type::Double),
+    ("signal_V", 2, Label::Optional, Type::Double),
+    ("force_N", 3, Label::Optional, Type::Double),
+    ("depth_mm", 4, Label::Optional, Type::Double),
+    ("cycle", 5, Label::Optional, Type::Uint32),
 ];
 
 fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
@@ -169,6 +195,8 @@ const MANIFEST_SCHEMA: &str = r#"{"type":"object","properties":{"record_version"
 const ENTRY_SCHEMA: &str = r#"{"type":"object","properties":{"order":{"type":"integer"},"after_sample":{"type":"integer"},"now_ns":{"type":"integer"},"body":{}},"required":["order","after_sample","now_ns","body"]}"#;
 
 const END_SCHEMA: &str = r#"{"type":"object","properties":{"outcome":{"type":"string"},"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"},"ended_at":{"type":"integer"},"time_use":{"type":"array","items":{"type":"array"}}},"required":["outcome","reason","samples","entries","ended_at"]}"#;
+
+const REWRITE_SCHEMA: &str = r#"{"type":"object","properties":{"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"}},"required":["reason","samples","entries"]}"#;
 
 #[cfg(test)]
 mod tests {

@@ -35,6 +35,8 @@ fn settings(seed: u64, noise: &str, stiffness: &str) -> SimSettings {
 /// Errors of one combination with what was claimed and what is possible, in mm.
 struct Row {
     errors: Vec<f64>,
+    /// Searches that said they could not tell.
+    refused: u64,
     claimed: Vec<f64>,
     bounds: Vec<f64>,
     force_max: f64,
@@ -67,14 +69,15 @@ impl Row {
         let mean = self.errors.iter().sum::<f64>() / self.count();
         println!(
             "{noise:>4} mN  {stiffness:>4} %  {:>5} runs  rms {:.4} mm  worst {worst:.4}  bias {mean:+.4}  \
-             claimed {:.4}  bound {:.4}  ratio {:.3}  covers {:.1} %  at most {:.3} N",
+             claimed {:.4}  bound {:.4}  ratio {:.3}  covers {:.1} %  at most {:.3} N  refused {}",
             self.errors.len(),
             Self::rms(&self.errors),
             Self::rms(&self.claimed),
             Self::rms(&self.bounds),
             self.ratio(),
             100.0 * self.coverage(),
-            self.force_max
+            self.force_max,
+            self.refused
         );
     }
 }
@@ -85,6 +88,7 @@ fn row(noise: &str, stiffness: &str) -> Row {
     let plan = FindContact::default();
     let mut row = Row {
         errors: Vec::new(),
+        refused: 0,
         claimed: Vec::new(),
         bounds: Vec::new(),
         force_max: 0.0,
@@ -92,12 +96,16 @@ fn row(noise: &str, stiffness: &str) -> Row {
     for seed in 0..count {
         let settings = settings(seed, noise, stiffness);
         let found = search(settings, plan, None);
-        let contact = found.contact.unwrap_or_else(|| {
-            panic!(
-                "{noise} mN {stiffness} % seed {seed}: {}",
-                found.outcome.reason
-            )
-        });
+        let Some(contact) = found.contact else {
+            // The one honest way out: the noise of this search leaves the position open.
+            let reason = found.outcome.reason;
+            assert!(
+                reason.contains("is only known to"),
+                "{noise} mN {stiffness} % seed {seed}: {reason}"
+            );
+            row.refused += 1;
+            continue;
+        };
         row.errors.push(contact.position.0 - found.surface_mm);
         row.claimed.push(contact.std_error_mm);
         let noise = settings.noise.newtons();
@@ -117,7 +125,13 @@ fn row(noise: &str, stiffness: &str) -> Row {
 fn check_noisy(noise: &str) {
     for stiffness in ["50", "100", "200"] {
         let row = row(noise, stiffness);
-        let is_long = row.count() >= 1000.0;
+        let is_long = row.count() + row.refused as f64 >= 1000.0;
+        // Measured: one in a thousand of the noisiest, none of the others.
+        assert!(
+            row.refused as f64 <= 1.0 + 0.002 * row.count(),
+            "{stiffness} %: {}",
+            row.refused
+        );
         let (ratio, low, high) = if is_long {
             (1.3, 0.92, 0.97)
         } else {
@@ -145,6 +159,7 @@ fn check_noisy(noise: &str) {
 fn a_quiet_cell_finds_the_tissue_within_a_pulse() {
     for stiffness in ["50", "100", "200"] {
         let row = row("5", stiffness);
+        assert_eq!(row.refused, 0);
         // One pulse of the slide.
         assert!(row.errors.iter().all(|error| error.abs() <= 0.015));
     }

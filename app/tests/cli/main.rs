@@ -331,7 +331,7 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     manifest.record_version = palpate_sessions::RECORD_VERSION + 1;
     let newer = palpate_sessions::SessionFolder::create(&at.join("newer")).unwrap();
     let pace = palpate_sessions::Pace::Virtual;
-    drop(palpate_sessions::SessionWriter::start(newer, &manifest, pace).unwrap());
+    drop(palpate_sessions::SessionWriter::start(newer, None, &manifest, pace).unwrap());
     let output = palpate(at, &["info", "newer"]);
     assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
     assert!(

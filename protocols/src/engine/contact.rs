@@ -381,13 +381,15 @@ impl ContactSearch {
         let points = self.log.points();
         let found = fit_touch(points).map_err(|err| err.to_string())?;
         let begun = points.first().map_or(Position(0.0), |point| point.position);
-        // Three standard errors: a surface before the beginning was not approached.
+        // Three standard errors: a surface before the beginning was not approached. An estimate that
+        // is too vague for the plan says nothing about that either, and is refused for what it is.
         let ContactEstimate {
             position,
             std_error_mm,
             ..
         } = found.contact;
-        if position < begun.moved_by(3.0 * std_error_mm) {
+        let is_known = std_error_mm <= self.plan.std_error_mm_max;
+        if is_known && position < begun.moved_by(3.0 * std_error_mm) {
             return Err(
                 "the probe touched the tissue before the search began; retract and tare again"
                     .into(),

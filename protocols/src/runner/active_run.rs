@@ -171,6 +171,7 @@ impl ActiveRun {
     /// What the runner owes the engine after each input: news of a failed log, and the choice of
     /// an operator who is not there.
     fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(ToRig)) {
+        self.heed_log(now);
         if let (Some(detail), false) = (&self.log_failure, self.is_log_failure_told) {
             self.is_log_failure_told = true;
             let detail = detail.clone();
@@ -195,6 +196,22 @@ impl ActiveRun {
         if is_asked && self.answers == Answers::Confirm {
             let choice = Operator::Confirm;
             self.feed(now, Input::Operator { choice }, send);
+        }
+    }
+
+    /// News of the log: told, and a failure of the run where the disk will not do much longer.
+    fn heed_log(&mut self, now: Nanos) {
+        let notices = self.writer.as_mut().map(SessionWriter::take_notices);
+        for notice in notices.into_iter().flatten() {
+            let text = notice.to_string();
+            self.note(LogLine {
+                at: now,
+                text: text.clone(),
+                is_alarm: true,
+            });
+            if notice.ends_the_run() {
+                self.log_failure.get_or_insert(text);
+            }
         }
     }
 

@@ -10,7 +10,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_sessions::{
     Labels, Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space,
-    library_folder, new_session_folder, new_session_id,
+    library_folder, new_session_folder, new_session_id, spare_folder,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -155,7 +155,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
     } else {
         Pace::Real
     };
-    let writer = SessionWriter::start(folder, &manifest, pace)
+    let writer = SessionWriter::start(folder, spare_folder().as_deref(), &manifest, pace)
         .map_err(|err| StartError::Failed(err.to_string()))?;
     let config = Config {
         rig: bench.rig.as_ref().clone(),

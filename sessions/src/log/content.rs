@@ -3,13 +3,10 @@
 use super::frames::{Fields, frame_at};
 use super::segment::PROFILE;
 use crate::manifest::{Manifest, RECORD_VERSION};
-use crate::record::{
-    DaqBlock, DerivedBlock, EndRecord, Entry, EntryKind, EntryMessage, Row, rows_from_blocks,
-};
+use crate::record::{Block, EndRecord, Entry, EntryKind, EntryMessage};
 use crate::schema::Channel;
 use mcap::records::op;
 use palpate_model::Nanos;
-use prost::Message;
 use std::collections::BTreeMap;
 
 /// Why a log is not for this program, however whole it is.
@@ -21,7 +18,16 @@ pub(crate) enum Refusal {
 }
 
 /// What has been read so far, over all segments.
-pub(crate) struct Content {
+pub(crate) struct Content<'v> {
+    /// Gets every block of samples once it is verified.
+    visit: &'v mut dyn FnMut(&Block),
+    block: Block,
+    /// Whether a raw half waits for its derived one.
+    has_raw: bool,
+    /// Samples visited.
+    pub samples: u64,
+    /// Session time of the newest of them.
+    pub last_sample: Nanos,
     topics: BTreeMap<u16, Option<Channel>>,
     /// The next message of each channel; `None` where a lone later segment may begin anywhere.
     sequences: [Option<u32>; Channel::ALL.len()],
@@ -31,35 +37,35 @@ pub(crate) struct Content {
     pub has_manifest: bool,
     /// Whether what came before the first segment read is missing.
     pub is_later_part: bool,
-    /// Whether the segment being read holds anything but its manifest.
-    pub has_data: bool,
+    /// Whether the segment being read writes again what may be lost of the ones before.
+    pub is_rewrite: bool,
     pub manifest: Option<Manifest>,
     pub refusal: Option<Refusal>,
-    pub rows: Vec<Row>,
-    /// Raw samples that wait for their derived ones.
-    raw: Option<DaqBlock>,
     pub entries: Vec<Entry>,
     pub end: Option<EndRecord>,
 }
 
-impl Content {
+impl<'v> Content<'v> {
     /// Nothing read yet. A file that is read alone may be a later segment.
-    pub fn new(is_alone: bool) -> Self {
+    pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(&Block)) -> Self {
         let mut sequences = [Some(0); Channel::ALL.len()];
         if is_alone {
             sequences[Channel::Manifest as usize] = None;
         }
         Self {
+            visit,
+            block: Block::default(),
+            has_raw: false,
+            samples: 0,
+            last_sample: Nanos::ZERO,
             topics: BTreeMap::new(),
             sequences,
             first_sample: Some(0),
             has_manifest: false,
             is_later_part: false,
-            has_data: false,
+            is_rewrite: false,
             manifest: None,
             refusal: None,
-            rows: Vec::new(),
-            raw: None,
             entries: Vec::new(),
             end: None,
         }
@@ -69,7 +75,17 @@ impl Content {
     pub fn begin_segment(&mut self) {
         self.topics.clear();
         self.has_manifest = false;
-        self.has_data = false;
+        self.is_rewrite = false;
+        // A raw block that was cut off from its other half is written again, if at all.
+        self.has_raw = false;
+    }
+
+    /// Goes on at any later chunk of the same segment: what lies between is not missed.
+    pub fn begin_anywhere(&mut self) {
+        self.sequences = [None; Channel::ALL.len()];
+        self.first_sample = None;
+        self.samples = 0;
+        self.has_raw = false;
     }
 
     /// Reads the file's header: `profile` tells whose file it is.
@@ -130,20 +146,33 @@ impl Content {
         }
         let next = &mut self.sequences[channel as usize];
         let expected = next.unwrap_or(sequence);
-        if sequence != expected {
+        let is_bookkeeping = matches!(channel, Channel::Manifest | Channel::Rewrite);
+        let is_again = sequence < expected && (self.is_rewrite || is_bookkeeping);
+        if is_again && !is_bookkeeping {
+            // It was read, and verified, where it was first written.
+            return Ok(());
+        }
+        if sequence != expected && !is_again {
             return Err(format!(
                 "message {expected} of {} is missing",
                 channel.topic()
             ));
         }
-        *next = Some(expected.wrapping_add(1));
-        self.has_data |= channel != Channel::Manifest;
-        if self.end.is_some() {
+        if !is_again {
+            *next = Some(expected.wrapping_add(1));
+        }
+        if self.end.is_some() && !is_bookkeeping {
             return Err("something was recorded after the end".into());
         }
         let data = fields.0;
         match channel {
             Channel::Manifest => self.take_manifest(sequence, data),
+            Channel::Rewrite => {
+                self.is_rewrite = true;
+                Ok(())
+            }
+            // A thinned copy of the samples, for other programs.
+            Channel::View => Ok(()),
             Channel::Daq => self.take_raw(data),
             Channel::Derived => self.take_derived(data),
             Channel::Input => self.take_entry(EntryKind::Input, data),
@@ -195,35 +224,31 @@ impl Content {
     }
 
     fn take_raw(&mut self, data: &[u8]) -> Result<(), String> {
-        let raw = DaqBlock::decode(data)
-            .map_err(|err| format!("a block of samples is unreadable: {err}"))?;
-        if self.raw.is_some() {
+        if self.has_raw {
             return Err("a block of raw samples has no derived ones".into());
         }
-        let first = *self.first_sample.get_or_insert(raw.first_sample);
-        let expected = first.saturating_add(self.rows.len() as u64);
-        if raw.first_sample != expected {
+        self.block.take_raw(data)?;
+        let raw = self.block.first_sample();
+        let first = *self.first_sample.get_or_insert(raw);
+        let expected = first.saturating_add(self.samples);
+        if raw != expected {
             return Err(format!(
-                "sample {expected} is missing: the next block begins with sample {}",
-                raw.first_sample
+                "sample {expected} is missing: the next block begins with sample {raw}"
             ));
         }
-        self.raw = Some(raw);
+        self.has_raw = true;
         Ok(())
     }
 
     fn take_derived(&mut self, data: &[u8]) -> Result<(), String> {
-        let derived = DerivedBlock::decode(data)
-            .map_err(|err| format!("a block of derived samples is unreadable: {err}"))?;
-        let raw = self
-            .raw
-            .take()
-            .ok_or("a block of derived samples has no raw ones")?;
-        let length = self.rows.len();
-        rows_from_blocks(&raw, &derived, &mut self.rows).inspect_err(|_| {
-            // Nothing of a bad block is kept, not even its good beginning.
-            self.rows.truncate(length);
-        })
+        if !std::mem::take(&mut self.has_raw) {
+            return Err("a block of derived samples has no raw ones".into());
+        }
+        self.block.take_derived(data)?;
+        self.samples += self.block.len() as u64;
+        self.last_sample = self.block.last_time().unwrap_or(self.last_sample);
+        (self.visit)(&self.block);
+        Ok(())
     }
 
     fn take_entry(&mut self, kind: EntryKind, data: &[u8]) -> Result<(), String> {
@@ -255,11 +280,11 @@ impl Content {
         // What a lone later segment does not know of the ones before is not compared.
         let first = self
             .first_sample
-            .unwrap_or_else(|| end.samples.saturating_sub(self.rows.len() as u64));
-        let samples = first.saturating_add(self.rows.len() as u64);
+            .unwrap_or_else(|| end.samples.saturating_sub(self.samples));
+        let samples = first.saturating_add(self.samples);
         let entries = self.entries.len() as u64;
         let has_entries = end.entries == entries || (self.is_later_part && end.entries >= entries);
-        if self.raw.is_none() && end.samples == samples && has_entries {
+        if !self.has_raw && end.samples == samples && has_entries {
             return Ok(());
         }
         Err(format!(

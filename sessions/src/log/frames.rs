@@ -1,13 +1,12 @@
 //! A strict walk over the frames of an MCAP file: opcode, length, body.
 //!
-//! Nothing is trusted: lengths are bounded by the file and by 64 MiB, the checksum of every chunk
+//! Nothing is trusted: lengths are bounded by the file and by 24 MiB, the checksum of every chunk
 //! is verified before anything in it is looked at, and record bodies are parsed here so that no
 //! length inside a record can ask for memory. See <https://mcap.dev/spec>.
 
-use mcap::records::op;
-
-/// Largest frame, and largest chunk once decompressed.
-pub(crate) const FRAME_BYTES_MAX: usize = 64 << 20;
+/// Largest frame, and largest chunk once decompressed: a chunk is cut at 4 MiB, by a message of at
+/// most 16 MiB. Both together stay below 64 MiB.
+pub(crate) const FRAME_BYTES_MAX: usize = 24 << 20;
 /// Opcode and length.
 pub(crate) const FRAME_HEADER_BYTES: usize = 9;
 /// Footer frame and closing magic.
@@ -139,31 +138,4 @@ impl ChunkReader {
         }
         Ok(&self.records)
     }
-}
-
-/// Whether a whole, undamaged chunk lies anywhere after `offset`.
-///
-/// Tells a torn end, after which there is nothing, from damage in the middle.
-pub(crate) fn has_chunk_after(bytes: &[u8], offset: usize, chunks: &mut ChunkReader) -> bool {
-    // The compression's name, and how far into a chunk's frame it stands.
-    const MARK: &[u8] = b"\x04\0\0\0zstd";
-    const MARK_OFFSET: usize = FRAME_HEADER_BYTES + 8 + 8 + 8 + 4;
-    let start = offset.min(bytes.len());
-    let mut search = start;
-    while let Some(found) = bytes[search..]
-        .windows(MARK.len())
-        .position(|window| window == MARK)
-    {
-        let mark = search + found;
-        search = mark + 1;
-        let Some(place) = mark.checked_sub(MARK_OFFSET).filter(|&one| one > start) else {
-            continue;
-        };
-        let is_chunk = frame_at(bytes, place)
-            .is_ok_and(|frame| frame.opcode == op::CHUNK && chunks.open(frame.body).is_ok());
-        if is_chunk {
-            return true;
-        }
-    }
-    false
 }

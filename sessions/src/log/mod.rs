@@ -5,11 +5,14 @@ mod frames;
 pub mod reader;
 mod segment;
 pub mod sink;
+mod source;
+mod summary;
 pub mod thread;
 mod walk;
 pub mod writer;
 
-pub use reader::{ReadError, Session};
+pub use reader::{Outline, ReadError, Session};
 pub use sink::{FileSink, FolderSegments, SegmentSource, Sink};
-pub use thread::{Pace, SessionWriter};
+pub use summary::Summary;
+pub use thread::{Notice, Pace, SessionWriter};
 pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter};

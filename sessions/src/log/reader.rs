@@ -9,11 +9,13 @@
 
 use super::content::{Content, Refusal};
 use super::frames::ChunkReader;
-use super::walk::{has_footer, is_barely_begun, may_hold_data, walk};
-use crate::folder::{LOG_FILE, segment_file, segment_number};
+use super::source::Source;
+use super::walk::walk;
+use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
 use crate::manifest::{Manifest, RECORD_VERSION};
-use crate::record::{EndRecord, Entry, Row};
+use crate::record::{Block, EndRecord, Entry, Row};
 use palpate_model::Nanos;
+use std::collections::BTreeMap;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -94,18 +96,55 @@ enum OnDamage {
     StopBefore,
 }
 
+/// A recorded session without its samples.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Outline {
+    /// The log it was read from, or its first segment.
+    pub path: PathBuf,
+    /// What the session says about itself.
+    pub manifest: Manifest,
+    /// How many samples there are.
+    pub samples: u64,
+    /// Every entry, by `order`.
+    pub entries: Vec<Entry>,
+    /// How the session ended; `None` if it was interrupted.
+    pub end: Option<EndRecord>,
+    /// What a user of the data must know, one sentence each.
+    pub notes: Vec<String>,
+}
+
 impl Session {
     /// Opens a session folder, or one file of it alone.
     ///
     /// A log that was never ended opens with everything in its whole chunks; one that is damaged
     /// anywhere else is refused.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Reader::new(path, OnDamage::Refuse)?.read()
+        Self::collect(path, OnDamage::Refuse)
     }
 
     /// Opens what stands before the first damage, with a note that says where it is.
     pub fn recover(path: &Path) -> Result<Self, ReadError> {
-        Reader::new(path, OnDamage::StopBefore)?.read()
+        Self::collect(path, OnDamage::StopBefore)
+    }
+
+    /// Goes through the samples of a session block by block, so that no more than one block is in
+    /// memory. Nothing of it counts before this has returned without an error.
+    pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
+        Reader::new(path, OnDamage::Refuse, visit)?.read()
+    }
+
+    fn collect(path: &Path, policy: OnDamage) -> Result<Self, ReadError> {
+        let mut rows = Vec::new();
+        let mut visit = |block: &Block| rows.extend(block.rows());
+        let outline = Reader::new(path, policy, &mut visit)?.read()?;
+        Ok(Self {
+            path: outline.path,
+            manifest: outline.manifest,
+            rows,
+            entries: outline.entries,
+            end: outline.end,
+            notes: outline.notes,
+        })
     }
 
     /// Session time of the newest sample or entry.
@@ -118,7 +157,7 @@ impl Session {
 }
 
 /// The files to read.
-fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
     if !path.exists() {
         return Err(ReadError::Missing { path: path.into() });
     }
@@ -129,21 +168,36 @@ fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         path: path.into(),
         source,
     };
-    let mut numbers = Vec::new();
-    for item in std::fs::read_dir(path).map_err(failed)? {
-        let name = item.map_err(failed)?.file_name();
-        numbers.extend(name.to_str().and_then(segment_number));
+    let mut found = BTreeMap::new();
+    let mut add = |folder: &Path| -> io::Result<()> {
+        for item in std::fs::read_dir(folder)? {
+            let name = item?.file_name();
+            if let Some(number) = name.to_str().and_then(segment_number) {
+                found.entry(number).or_insert(folder.join(name));
+            }
+        }
+        Ok(())
+    };
+    add(path).map_err(failed)?;
+    if let Ok(spare) = std::fs::read_to_string(path.join(SPARE_FILE)) {
+        let spare = PathBuf::from(spare);
+        // It is only made when it is needed.
+        if spare.is_dir() {
+            add(&spare).map_err(failed)?;
+        }
     }
-    numbers.sort_unstable();
-    let whole = (0..).zip(&numbers).take_while(|(i, n)| i == *n).count();
+    let whole = (0..).zip(found.keys()).take_while(|(i, n)| i == *n).count();
     // With a gap, the first missing file is listed too: it will be looked for and not found.
-    let count = if whole < numbers.len() {
+    let count = if whole < found.len() {
         whole + 1
     } else {
         whole
     };
-    Ok((0..count.max(1))
-        .map(|number| path.join(segment_file(number as u32)))
+    Ok((0..count.max(1) as u32)
+        .map(|number| {
+            let own = || path.join(segment_file(number));
+            found.remove(&number).unwrap_or_else(own)
+        })
         .collect())
 }
 
@@ -158,19 +212,23 @@ enum Outcome {
 /// Damage, and the file it is in.
 struct Damage {
     path: PathBuf,
-    offset: usize,
+    offset: u64,
     reason: String,
+    /// Whether this is how an interrupted write looks.
+    is_torn: bool,
 }
 
 /// Reads the files of one session in order.
-struct Reader {
+struct Reader<'v> {
     files: Vec<PathBuf>,
     is_folder: bool,
     policy: OnDamage,
     chunks: ChunkReader,
-    content: Content,
-    /// Where the segment before broke off, if something may be missing from it.
-    broken_off: Option<Damage>,
+    content: Content<'v>,
+    /// Session time of the newest sample.
+    last_sample: Nanos,
+    /// Where the segments before broke off, until a later one has made that good.
+    broken_off: Vec<Damage>,
     /// Name of the segment before, if it was not finished.
     unfinished: Option<String>,
     /// Whether the file read last has its data's checksum and its index.
@@ -178,8 +236,12 @@ struct Reader {
     notes: Vec<String>,
 }
 
-impl Reader {
-    fn new(path: &Path, policy: OnDamage) -> Result<Self, ReadError> {
+impl<'v> Reader<'v> {
+    fn new(
+        path: &Path,
+        policy: OnDamage,
+        visit: &'v mut dyn FnMut(&Block),
+    ) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let is_folder = path.is_dir();
         let first = &files[0];
@@ -198,15 +260,16 @@ impl Reader {
             is_folder,
             policy,
             chunks,
-            content: Content::new(!is_folder),
-            broken_off: None,
+            content: Content::new(!is_folder, visit),
+            last_sample: Nanos::ZERO,
+            broken_off: Vec::new(),
             unfinished: None,
             is_finished: false,
             notes: Vec::new(),
         })
     }
 
-    fn read(mut self) -> Result<Session, ReadError> {
+    fn read(mut self) -> Result<Outline, ReadError> {
         let files = std::mem::take(&mut self.files);
         let mut damage = None;
         for (number, file) in files.iter().enumerate() {
@@ -225,18 +288,24 @@ impl Reader {
                 }
             }
         }
+        // Damage that no later segment made good.
+        let damage = damage.or_else(|| {
+            let is_damaged = self.broken_off.iter().any(|one| !one.is_torn);
+            is_damaged.then(|| self.broken_off.swap_remove(0))
+        });
         let path = files[0].clone();
         let mut end = self.content.end.take();
         if let Some(Damage {
             path,
             offset,
             reason,
+            ..
         }) = damage
         {
             if self.policy == OnDamage::Refuse || self.content.manifest.is_none() {
                 return Err(ReadError::Damaged {
                     path,
-                    offset: offset as u64,
+                    offset,
                     reason,
                 });
             }
@@ -253,10 +322,10 @@ impl Reader {
                 ),
             );
         }
-        self.session(path, end)
+        self.outline(path, end)
     }
 
-    fn session(mut self, path: PathBuf, end: Option<EndRecord>) -> Result<Session, ReadError> {
+    fn outline(mut self, path: PathBuf, end: Option<EndRecord>) -> Result<Outline, ReadError> {
         let Some(manifest) = self.content.manifest.take() else {
             return Err(ReadError::Damaged {
                 path,
@@ -264,40 +333,44 @@ impl Reader {
                 reason: NOT_BEGUN.into(),
             });
         };
-        let mut session = Session {
-            path,
-            manifest,
-            rows: self.content.rows,
-            entries: self.content.entries,
-            end,
-            notes: self.notes,
-        };
-        let last = session.last_time().seconds().0;
-        if let Some(imported) = &session.manifest.imported {
-            session.notes.extend(imported.notes());
+        let entries = std::mem::take(&mut self.content.entries);
+        let last = entries
+            .last()
+            .map_or(Nanos::ZERO, |entry| entry.now)
+            .max(self.last_sample)
+            .seconds()
+            .0;
+        let mut notes = self.notes;
+        if let Some(imported) = &manifest.imported {
+            notes.extend(imported.notes());
         }
         // Only a segment that others follow is finished without an end.
-        let goes_on = !self.is_folder && self.is_finished && session.end.is_none();
+        let goes_on = !self.is_folder && self.is_finished && end.is_none();
         if goes_on {
-            session.notes.push(format!(
+            notes.push(format!(
                 "no end record: this part of a recording goes to {last:.1} s; open the session's folder for what follows"
             ));
-        } else if session.end.is_none() {
-            session.notes.push(format!(
+        } else if end.is_none() {
+            notes.push(format!(
                 "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
             ));
         } else if !self.is_finished {
-            session
-                .notes
-                .push("the index at the end is missing; all samples and entries are there".into());
+            notes.push("the index at the end is missing; all samples and entries are there".into());
         }
         if self.content.is_later_part {
-            session.notes.push(
+            notes.push(
                 "this is a later part of a recording; open the session's folder for what came before"
                     .into(),
             );
         }
-        Ok(session)
+        Ok(Outline {
+            path,
+            manifest,
+            samples: self.content.samples,
+            entries,
+            end,
+            notes,
+        })
     }
 
     /// Reads one file. The outer error is of a kind that even recovery cannot pass.
@@ -307,76 +380,103 @@ impl Reader {
         is_first: bool,
         is_last: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
-        let damage = |offset: usize, reason: String| Damage {
+        let damage = |offset: u64, reason: &str| Damage {
             path: path.into(),
             offset,
-            reason,
+            reason: reason.into(),
+            is_torn: false,
         };
-        if !path.is_file() {
-            let reason = "this segment is missing, though a later one is there".to_owned();
-            return Ok(Err(damage(0, reason)));
-        }
-        let bytes = std::fs::read(path).map_err(|source| ReadError::Io {
+        let failed = |source| ReadError::Io {
             path: path.into(),
             source,
-        })?;
-        if is_first {
-            check_beginning(path, &bytes)?;
-        } else if self.content.end.is_some() {
-            let reason = "a segment follows the one that ended the recording".to_owned();
+        };
+        if !path.is_file() {
+            let reason = "this segment is missing, though a later one is there";
             return Ok(Err(damage(0, reason)));
-        } else if is_last && is_barely_begun(&bytes) {
-            return Ok(Ok(Outcome::Nothing));
-        } else if !bytes.starts_with(mcap::MAGIC) {
-            return Ok(Err(damage(0, "it does not begin like a segment".into())));
         }
+        let source = Source::open(path).map_err(failed)?;
+        let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
+        if is_first {
+            check_beginning(path, &source, is_ours)?;
+        } else if is_last && source.is_barely_begun().map_err(failed)? {
+            return Ok(Ok(Outcome::Nothing));
+        } else if !is_ours {
+            self.broken_off
+                .push(damage(0, "it does not begin like a segment"));
+            return Ok(Ok(Outcome::GoOn));
+        }
+        let had_end = self.content.end.is_some();
         self.content.begin_segment();
-        let (row_count, entry_count) = (self.content.rows.len(), self.content.entries.len());
-        let walked = walk(&bytes, &mut self.chunks, &mut self.content);
+        let walked = walk(&source, &mut self.chunks, &mut self.content).map_err(failed)?;
+        self.last_sample = self.last_sample.max(self.content.last_sample);
         if let Some(refusal) = self.content.refusal.take() {
             return Err(refused(path, refusal));
         }
-        let torn = match walked {
-            Err(stop) if !stop.is_torn => return Ok(Err(damage(stop.offset, stop.reason))),
-            Err(stop) => Some(stop),
-            Ok(()) => None,
-        };
-        // However a file ends: once there is an end record, all it counted must be there.
-        if let Err(reason) = self.content.check_totals() {
-            return Ok(Err(damage(bytes.len(), reason)));
+        let is_rewrite = self.content.is_rewrite;
+        if had_end && !is_rewrite {
+            let reason = "a segment follows the one that ended the recording";
+            return Ok(Err(damage(0, reason)));
         }
-        let is_finished = has_footer(&bytes);
-        if !self.content.has_manifest {
-            return Ok(if !is_first && is_last && !is_finished {
-                Ok(Outcome::Nothing)
+        let is_finished = source.has_footer().map_err(failed)?;
+        let stop = walked.err();
+        if stop.as_ref().is_none_or(|stop| stop.is_torn) {
+            if !self.content.has_manifest {
+                let here = damage(source.length(), NOT_BEGUN);
+                return Ok(if is_first || is_finished {
+                    Err(here)
+                } else if is_last {
+                    Ok(Outcome::Nothing)
+                } else {
+                    self.broken_off.push(here);
+                    Ok(Outcome::GoOn)
+                });
+            }
+            // However a file ends: once there is an end record, all it counted must be there.
+            if let Err(reason) = self.content.check_totals() {
+                return Ok(Err(damage(source.length(), &reason)));
+            }
+        }
+        let here = stop.map(|stop| Damage {
+            is_torn: stop.is_torn,
+            ..damage(stop.offset, &stop.reason)
+        });
+        let is_damaged = here.as_ref().is_some_and(|here| !here.is_torn);
+        // Messages that go on without a gap prove that nothing is missing. But what is damaged, and
+        // not only torn, is made good by nothing but a segment that was begun because of it.
+        let is_strange = self.broken_off.iter().any(|one| !one.is_torn);
+        if !self.broken_off.is_empty() && !is_rewrite && (is_damaged || is_strange) {
+            return Ok(Err(self.broken_off.swap_remove(0)));
+        }
+        if !is_damaged {
+            self.broken_off.clear();
+        }
+        self.broken_off.extend(here);
+        if let Some(name) = self.unfinished.take() {
+            self.notes.push(if is_rewrite {
+                let name_here = name_of(path);
+                format!("the disk failed while {name} was written; {name_here} holds what it may have lost")
             } else {
-                Err(damage(bytes.len(), NOT_BEGUN.into()))
+                format!("{name} was not finished; the next segment goes on where it stops")
             });
         }
-        if self.content.has_data {
-            if let Some(broken_off) = self.broken_off.take() {
-                self.content.rows.truncate(row_count);
-                self.content.entries.truncate(entry_count);
-                return Ok(Err(broken_off));
-            }
-            if let Some(name) = self.unfinished.take() {
-                self.notes.push(format!(
-                    "{name} was not finished; the next segment goes on where it stops"
-                ));
-            }
-        }
         self.is_finished = is_finished;
-        if !is_finished {
+        if !is_finished || is_damaged {
             self.unfinished = Some(name_of(path));
-        }
-        if let Some(stop) = torn.filter(|stop| may_hold_data(&bytes, stop.offset)) {
-            self.broken_off = Some(damage(stop.offset, stop.reason));
         }
         Ok(Ok(Outcome::GoOn))
     }
 }
 
-const NOT_BEGUN: &str = "the recording was interrupted before it began, or its beginning is lost";
+pub(crate) const NOT_BEGUN: &str =
+    "the recording was interrupted before it began, or its beginning is lost";
+
+pub(crate) fn damaged(path: &Path, offset: u64, reason: &str) -> ReadError {
+    ReadError::Damaged {
+        path: path.into(),
+        offset,
+        reason: reason.into(),
+    }
+}
 
 fn name_of(path: &Path) -> String {
     path.file_name()
@@ -385,10 +485,14 @@ fn name_of(path: &Path) -> String {
         .into_owned()
 }
 
-fn check_beginning(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
-    let reason = if bytes.is_empty() {
+pub(crate) fn check_beginning(
+    path: &Path,
+    source: &Source,
+    is_ours: bool,
+) -> Result<(), ReadError> {
+    let reason = if source.length() == 0 {
         "it is empty: nothing was ever recorded"
-    } else if !bytes.starts_with(mcap::MAGIC) {
+    } else if !is_ours {
         "it does not begin like one"
     } else {
         return Ok(());
@@ -399,7 +503,7 @@ fn check_beginning(path: &Path, bytes: &[u8]) -> Result<(), ReadError> {
     })
 }
 
-fn refused(path: &Path, refusal: Refusal) -> ReadError {
+pub(crate) fn refused(path: &Path, refusal: Refusal) -> ReadError {
     match refusal {
         Refusal::Foreign => ReadError::NotASession {
             path: path.into(),

@@ -1,6 +1,6 @@
 //! The one door to the disk: appending bytes and making them durable.
 
-use crate::folder::segment_file;
+use crate::folder::{SPARE_FILE, segment_file};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -24,12 +24,21 @@ pub trait SegmentSource: Send {
 
     /// Makes the segment. Its first `sync` must make its name durable too.
     fn create(&mut self, number: u32) -> io::Result<Self::Sink>;
+
+    /// Makes the segment in another place because its own cannot have it, and says where.
+    fn create_elsewhere(&mut self, number: u32) -> io::Result<(Self::Sink, String)> {
+        let path = self.path(number);
+        Err(io::Error::other(format!(
+            "there is no other place for {path}"
+        )))
+    }
 }
 
 /// Segments in a session folder: `000.mcap`, `001.mcap` and so on.
 #[derive(Debug)]
 pub struct FolderSegments {
     folder: PathBuf,
+    spare: Option<PathBuf>,
 }
 
 impl FolderSegments {
@@ -38,7 +47,24 @@ impl FolderSegments {
     pub fn new(folder: &Path) -> Self {
         Self {
             folder: folder.into(),
+            spare: None,
         }
+    }
+
+    /// Segments in this folder, or in one of the same name in `spare` when its disk fails. The
+    /// session's folder says so in its file [`SPARE_FILE`], so that a reader finds them.
+    pub fn with_spare(folder: &Path, spare: &Path) -> io::Result<Self> {
+        let spare = std::path::absolute(spare)?.join(folder.file_name().unwrap_or_default());
+        let text = spare
+            .to_str()
+            .ok_or_else(|| io::Error::other("the spare folder's name is not Unicode"))?;
+        let mut pointer = FileSink::create(&folder.join(SPARE_FILE))?;
+        pointer.append(text.as_bytes())?;
+        pointer.sync()?;
+        Ok(Self {
+            folder: folder.into(),
+            spare: Some(spare),
+        })
     }
 }
 
@@ -51,6 +77,15 @@ impl SegmentSource for FolderSegments {
 
     fn create(&mut self, number: u32) -> io::Result<FileSink> {
         FileSink::create(&self.folder.join(segment_file(number)))
+    }
+
+    fn create_elsewhere(&mut self, number: u32) -> io::Result<(FileSink, String)> {
+        let Some(spare) = &self.spare else {
+            return Err(io::Error::other("no spare folder was chosen"));
+        };
+        std::fs::create_dir_all(spare)?;
+        let path = spare.join(segment_file(number));
+        Ok((FileSink::create(&path)?, path.display().to_string()))
     }
 }
 

@@ -9,8 +9,9 @@ use super::sink::{FolderSegments, SegmentSource, Sink};
 use super::writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, check_order};
 use crate::folder::SessionFolder;
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry, Row};
+use crate::record::{EndRecord, Entry, EntryKind, Row};
 use palpate_model::Nanos;
+use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -26,6 +27,10 @@ const QUEUE_SECONDS: u64 = 30;
 const QUEUE: Nanos = Nanos::from_millis(QUEUE_SECONDS * 1000);
 /// Batches that fit in it: more than 30 s of batches, which slow samples make shorter.
 const QUEUE_BATCHES: usize = 4096;
+/// Samples that are kept in memory at most to be written again if the disk fails: 23 MB.
+const ROWS_SINCE_SYNC_MAX: usize = 1 << 18;
+/// New files begun at most because the disk failed. A disk that fails more often will not do.
+const MOVES_MAX: u32 = 4;
 /// Wall time between two synchronisations with the disk.
 const SYNC_EVERY: Duration = Duration::from_secs(1);
 
@@ -47,6 +52,55 @@ struct Batch {
     /// Session time it covers, a pause before it not counted.
     span: Nanos,
     end: Option<EndRecord>,
+    /// Whether it holds an event, which must survive a power cut at once.
+    has_event: bool,
+}
+
+/// What became of the log while it was written, for the screen.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Notice {
+    /// A write or a sync failed; the recording goes on in another file and lacks nothing.
+    Moved {
+        /// What failed.
+        reason: String,
+        /// The file that is written now.
+        path: String,
+        /// Whether it is the last place there is, so that the run should come to an end.
+        is_last: bool,
+    },
+    /// Half of the memory for unwritten samples is in use.
+    Slow,
+    /// Nine tenths of it are in use, so the run should come to an end while nothing is lost.
+    TooSlow,
+}
+
+impl Notice {
+    /// Whether a run should come to its end while all of it can still be saved.
+    #[must_use]
+    pub fn ends_the_run(&self) -> bool {
+        matches!(self, Self::Moved { is_last: true, .. } | Self::TooSlow)
+    }
+}
+
+impl std::fmt::Display for Notice {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Moved { reason, path, .. } => write!(
+                f,
+                "the disk failed ({reason}); the recording goes on in {path} and lacks nothing"
+            ),
+            Self::Slow => write!(
+                f,
+                "the disk is too slow: {} s of samples wait in memory",
+                QUEUE_SECONDS / 2
+            ),
+            Self::TooSlow => write!(
+                f,
+                "the disk is too slow: {} s of samples wait in memory, so the run ends while all can be saved",
+                QUEUE_SECONDS / 10 * 9
+            ),
+        }
+    }
 }
 
 /// What the writer thread tells the caller.
@@ -57,6 +111,7 @@ struct Shared {
     saved_through_ns: AtomicU64,
     /// Session time in batches that are not written yet.
     queued_ns: AtomicU64,
+    moves: Mutex<Vec<Notice>>,
 }
 
 impl Shared {
@@ -67,12 +122,28 @@ impl Shared {
         self.has_failed.store(true, Ordering::Release);
     }
 
+    fn take_moves(&self) -> Vec<Notice> {
+        let mut moves = self.moves.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut *moves)
+    }
+
     fn check(&self) -> Result<(), LogError> {
         if !self.has_failed.load(Ordering::Acquire) {
             return Ok(());
         }
         let failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         Err(failure.clone().unwrap_or(LogError::Closed))
+    }
+}
+
+/// News of a log that may be closed already.
+pub struct News(Arc<Shared>);
+
+impl News {
+    /// What happened since this was last asked.
+    #[must_use]
+    pub fn take(&self) -> Vec<Notice> {
+        self.0.take_moves()
     }
 }
 
@@ -90,14 +161,28 @@ pub struct SessionWriter {
     sender: Option<SyncSender<Batch>>,
     shared: Arc<Shared>,
     thread: Option<JoinHandle<()>>,
+    /// The worst that was told of a slow disk.
+    told_slow: Option<Notice>,
     // Held until the log is closed.
     _folder: Option<SessionFolder>,
 }
 
 impl SessionWriter {
     /// Starts a session in a folder. When this returns, the manifest survives a power cut.
-    pub fn start(folder: SessionFolder, manifest: &Manifest, pace: Pace) -> Result<Self, LogError> {
-        let source = FolderSegments::new(folder.path());
+    ///
+    /// Should the folder's disk fail, the recording goes on in a folder of the same name in
+    /// `spare`, best on another disk.
+    pub fn start(
+        folder: SessionFolder,
+        spare: Option<&Path>,
+        manifest: &Manifest,
+        pace: Pace,
+    ) -> Result<Self, LogError> {
+        let source = match spare {
+            None => FolderSegments::new(folder.path()),
+            Some(spare) => FolderSegments::with_spare(folder.path(), spare)
+                .map_err(|err| LogError::disk(&err, &folder.path().display().to_string()))?,
+        };
         let mut writer = Self::start_in_segments(source, BATCHES_PER_SEGMENT, manifest, pace)?;
         writer._folder = Some(folder);
         Ok(writer)
@@ -154,6 +239,7 @@ impl SessionWriter {
             sender: Some(sender),
             shared,
             thread: Some(thread),
+            told_slow: None,
             _folder: None,
         })
     }
@@ -177,8 +263,31 @@ impl SessionWriter {
         check_order(entry.order, self.last_order)?;
         self.make_room(entry.now)?;
         self.last_order = Some(entry.order);
+        self.batch.has_event |= entry.kind != EntryKind::Fit;
         self.batch.entries.push(entry);
         Ok(())
+    }
+
+    /// What becomes of the log after it was last asked, also once the writer is closed.
+    #[must_use]
+    pub fn news(&self) -> News {
+        News(Arc::clone(&self.shared))
+    }
+
+    /// News of the log since this was last asked.
+    pub fn take_notices(&mut self) -> Vec<Notice> {
+        let mut news = self.shared.take_moves();
+        let queued = self.shared.queued_ns.load(Ordering::Acquire);
+        let slow = match self.pace {
+            Pace::Real if queued >= QUEUE.0 / 10 * 9 => Some(Notice::TooSlow),
+            Pace::Real if queued >= QUEUE.0 / 2 => Some(Notice::Slow),
+            _ => None,
+        };
+        if slow.is_some() && slow != self.told_slow && self.told_slow != Some(Notice::TooSlow) {
+            self.told_slow.clone_from(&slow);
+            news.extend(slow);
+        }
+        news
     }
 
     /// Hands over a batch that is old enough, for callers that go without samples for long.
@@ -203,12 +312,6 @@ impl SessionWriter {
         Nanos(self.shared.saved_through_ns.load(Ordering::Acquire))
     }
 
-    /// Whether half of the queue is in use: the disk is slower than the session.
-    #[must_use]
-    pub fn is_falling_behind(&self) -> bool {
-        self.pace == Pace::Real && self.shared.queued_ns.load(Ordering::Acquire) >= QUEUE.0 / 2
-    }
-
     /// Writes the end record, waits until it is on the disk and ends the thread.
     pub fn close(mut self, end: EndRecord) -> Result<(), LogError> {
         let outcome = self.shared.check().and_then(|()| {
@@ -223,7 +326,9 @@ impl SessionWriter {
 
     fn is_due(&self, now: Nanos) -> bool {
         let is_old = |start| now.since(start).0 >= BATCH.0;
-        self.batch_start.is_some_and(is_old) || self.batch.rows.len() >= BATCH_ROWS_MAX
+        // With the wall clock, what belongs to one moment goes to the disk as soon as it is over.
+        let is_event = self.batch.has_event && self.pace == Pace::Real && now > self.batch.through;
+        self.batch_start.is_some_and(is_old) || is_event || self.batch.rows.len() >= BATCH_ROWS_MAX
     }
 
     fn make_room(&mut self, now: Nanos) -> Result<(), LogError> {
@@ -319,47 +424,126 @@ impl Drop for SessionWriter {
     }
 }
 
-/// The thread: writes batches until there are no more, syncing once per second of wall time.
-fn write_batches<S: Sink>(mut log: LogWriter<S>, receiver: &Receiver<Batch>, shared: &Shared) {
-    let mut last_sync = monotonic_now();
-    let mut is_dirty = false;
-    loop {
-        let batch = match receiver.recv_timeout(SYNC_EVERY) {
-            Ok(batch) => Some(batch),
-            Err(RecvTimeoutError::Timeout) => None,
-            Err(RecvTimeoutError::Disconnected) => break,
-        };
-        if let Some(batch) = batch {
-            let outcome = log.append(&batch.rows, &batch.entries);
-            shared.queued_ns.fetch_sub(batch.span.0, Ordering::AcqRel);
-            if let Err(err) = outcome {
-                return shared.fail(err);
-            }
-            is_dirty = true;
-            if let Some(end) = batch.end {
-                match log.finish(end) {
-                    Ok(()) => shared
-                        .saved_through_ns
-                        .store(batch.through.0, Ordering::Release),
-                    Err(err) => shared.fail(err),
+/// The thread's part: the log, and what must be written again if the disk fails.
+struct Scribe<'a, S: Sink> {
+    log: LogWriter<S>,
+    shared: &'a Shared,
+    since_sync: Vec<Batch>,
+    last_sync: Instant,
+    moves: u32,
+}
+
+/// The thread: writes batches until there are no more, syncing once per second of wall time and
+/// after events.
+fn write_batches<S: Sink>(log: LogWriter<S>, receiver: &Receiver<Batch>, shared: &Shared) {
+    let mut scribe = Scribe {
+        log,
+        shared,
+        since_sync: Vec::new(),
+        last_sync: monotonic_now(),
+        moves: 0,
+    };
+    if let Err(err) = scribe.run(receiver) {
+        shared.fail(err);
+    }
+}
+
+impl<S: Sink> Scribe<'_, S> {
+    fn run(&mut self, receiver: &Receiver<Batch>) -> Result<(), LogError> {
+        let mut carried = None;
+        let mut has_event = false;
+        loop {
+            let next = carried
+                .take()
+                .map_or_else(|| receiver.recv_timeout(SYNC_EVERY), Ok);
+            match next {
+                Ok(batch) => {
+                    has_event |= batch.has_event;
+                    if self.write(batch)? {
+                        return Ok(());
+                    }
                 }
-                return;
+                Err(RecvTimeoutError::Timeout) => {}
+                // No end record was asked for; what was written is still made durable.
+                Err(RecvTimeoutError::Disconnected) => return self.sync(),
             }
-            shared
-                .saved_through_ns
-                .store(batch.through.0, Ordering::Release);
-        }
-        if is_dirty && monotonic_now().duration_since(last_sync) >= SYNC_EVERY {
-            if let Err(err) = log.sync() {
-                return shared.fail(err);
+            let rows: usize = self.since_sync.iter().map(|batch| batch.rows.len()).sum();
+            let is_due = monotonic_now().duration_since(self.last_sync) >= SYNC_EVERY;
+            if has_event {
+                // One sync does for all events that wait.
+                carried = receiver.try_recv().ok();
             }
-            is_dirty = false;
-            last_sync = monotonic_now();
+            if is_due || rows >= ROWS_SINCE_SYNC_MAX || (has_event && carried.is_none()) {
+                self.sync()?;
+                has_event = false;
+            }
         }
     }
-    // No end record was asked for; what was written is still made durable.
-    if let Err(err) = log.sync() {
-        shared.fail(err);
+
+    /// Writes a batch; whether it was the last.
+    fn write(&mut self, mut batch: Batch) -> Result<bool, LogError> {
+        let end = batch.end.take();
+        let (span, through) = (batch.span, batch.through);
+        let outcome = self.log.append(&batch.rows, &batch.entries);
+        self.since_sync.push(batch);
+        let outcome = outcome.or_else(|err| self.go_on_elsewhere(&err));
+        self.shared.queued_ns.fetch_sub(span.0, Ordering::AcqRel);
+        outcome?;
+        if let Some(end) = &end {
+            while let Err(err) = self.log.finish(end.clone()) {
+                self.go_on_elsewhere(&err)?;
+            }
+        }
+        let saved = &self.shared.saved_through_ns;
+        saved.store(through.0, Ordering::Release);
+        Ok(end.is_some())
+    }
+
+    fn sync(&mut self) -> Result<(), LogError> {
+        if !self.since_sync.is_empty() {
+            if let Err(err) = self.log.sync() {
+                // What is written again is synced, too.
+                self.go_on_elsewhere(&err)?;
+            }
+            self.since_sync.clear();
+        }
+        self.last_sync = monotonic_now();
+        Ok(())
+    }
+
+    /// After the disk has failed: a new segment, with everything that may be lost of the old one.
+    fn go_on_elsewhere(&mut self, err: &LogError) -> Result<(), LogError> {
+        let LogError::Disk { reason, .. } = err else {
+            return Err(err.clone());
+        };
+        let again: Vec<(&[Row], &[Entry])> = self
+            .since_sync
+            .iter()
+            .map(|batch| (&*batch.rows, &*batch.entries))
+            .collect();
+        let (path, is_elsewhere) = loop {
+            if self.moves >= MOVES_MAX {
+                return Err(err.clone());
+            }
+            self.moves += 1;
+            if let Ok(place) = self.log.write_again(&again) {
+                break place;
+            }
+        };
+        self.since_sync.clear();
+        self.last_sync = monotonic_now();
+        let notice = Notice::Moved {
+            reason: reason.clone(),
+            path,
+            is_last: is_elsewhere || self.moves == MOVES_MAX,
+        };
+        let mut moves = self
+            .shared
+            .moves
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner);
+        moves.push(notice);
+        Ok(())
     }
 }
 

@@ -1,124 +1,133 @@
 //! Goes through one file of a log and verifies every checksum on the way.
 
 use super::content::Content;
-use super::frames::{
-    ChunkReader, FOOTER_BYTES, Fields, Frame, FrameError, frame_at, has_chunk_after,
-};
+use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
+use super::source::{NoFrame, Source};
 use mcap::records::op;
+use std::io;
 
 /// Why the walk ended before the end of the data.
 pub(crate) struct Stop {
-    pub offset: usize,
+    pub offset: u64,
     pub reason: String,
     /// Whether this is how an interrupted write looks, and not damage.
     pub is_torn: bool,
 }
 
-/// Everything behind the last byte that is not zero may never have reached the disk.
-fn written_length(bytes: &[u8]) -> usize {
-    bytes
-        .iter()
-        .rposition(|&byte| byte != 0)
-        .map_or(0, |last| last + 1)
-}
-
-/// Whether the file was made but not even its first bytes reached the disk.
-pub(crate) fn is_barely_begun(bytes: &[u8]) -> bool {
-    let written = &bytes[..written_length(bytes)];
-    written.len() < mcap::MAGIC.len() && mcap::MAGIC.starts_with(written)
-}
-
-/// Whether the record that starts at `offset` can hold samples or entries.
-pub(crate) fn may_hold_data(bytes: &[u8], offset: usize) -> bool {
-    !matches!(bytes.get(offset), Some(&(op::MESSAGE_INDEX | op::DATA_END)))
-}
-
-/// Whether the file claims to be finished: a footer and the closing magic are in their place.
-pub(crate) fn has_footer(bytes: &[u8]) -> bool {
-    bytes.len() >= mcap::MAGIC.len() + FOOTER_BYTES
-        && bytes.ends_with(mcap::MAGIC)
-        && bytes[bytes.len() - FOOTER_BYTES] == op::FOOTER
-}
-
 /// Goes through all frames of the data section.
 pub(crate) fn walk(
-    bytes: &[u8],
+    source: &Source,
     chunks: &mut ChunkReader,
-    content: &mut Content,
-) -> Result<(), Stop> {
-    let is_finished = has_footer(bytes);
-    let written = written_length(bytes);
-    let mut offset = mcap::MAGIC.len();
-    while offset < bytes.len() {
-        let damage = |reason: String, frame_end: usize| Stop {
-            offset,
-            reason,
-            // Zeros from within this frame to the end of the file are what a power cut leaves.
-            is_torn: !is_finished && written <= frame_end && written < bytes.len(),
+    content: &mut Content<'_>,
+) -> io::Result<Result<(), Stop>> {
+    let is_finished = source.has_footer()?;
+    let mut bytes = Vec::new();
+    let mut offset = mcap::MAGIC.len() as u64;
+    // Of everything before `offset`.
+    let mut sum = crc32fast::Hasher::new();
+    sum.update(mcap::MAGIC);
+    while offset < source.length() {
+        let damage = |reason: String, is_torn: bool| {
+            Ok(Err(Stop {
+                offset,
+                reason,
+                is_torn,
+            }))
         };
-        let frame = match frame_at(bytes, offset) {
+        // Zeros from within a frame to the end of the file are what a power cut leaves.
+        let is_zeroed = |frame_end: u64| -> io::Result<bool> {
+            let written = source.written_length()?;
+            Ok(!is_finished && written <= frame_end && written < source.length())
+        };
+        let frame = match source.frame_at(offset, &mut bytes)? {
             Ok(frame) => frame,
-            Err(FrameError::TooLong) => {
-                return Err(damage("a record is longer than 64 MiB".into(), offset));
+            Err(NoFrame::TooLong) => {
+                let is_torn = is_zeroed(offset)?;
+                return damage(
+                    "a record is longer than any that is written".into(),
+                    is_torn,
+                );
             }
-            Err(FrameError::PastEnd) => {
-                return Err(Stop {
-                    offset,
-                    reason: "a record runs past the end of the file".into(),
-                    is_torn: !is_finished && !has_chunk_after(bytes, offset, chunks),
-                });
+            Err(NoFrame::PastEnd) => {
+                let is_torn = !is_finished && !has_chunk_after(source, offset, chunks)?;
+                return damage("a record runs past the end of the file".into(), is_torn);
             }
         };
+        let body = &bytes[FRAME_HEADER_BYTES..];
         match frame.opcode {
-            op::HEADER => content.take_header(frame.body),
+            op::HEADER => content.take_header(body),
             op::MESSAGE_INDEX => {}
-            op::CHUNK => {
-                let records = chunks
-                    .open(frame.body)
-                    .map_err(|reason| damage(reason, frame.next))?;
-                content.take_chunk(records).map_err(|reason| Stop {
-                    offset,
-                    reason,
-                    is_torn: false,
-                })?;
+            op::CHUNK => match chunks.open(body) {
+                Ok(records) => {
+                    if let Err(reason) = content.take_chunk(records) {
+                        return damage(reason, false);
+                    }
+                }
+                Err(reason) => {
+                    let is_torn = is_zeroed(frame.next)?;
+                    return damage(reason, is_torn);
+                }
+            },
+            op::DATA_END => {
+                if Fields(body).u32() != Some(sum.finalize()) {
+                    return damage("the checksum over all samples is wrong".into(), false);
+                }
+                return check_index(source, frame.next, is_finished);
             }
-            op::DATA_END => return check_end(bytes, offset, frame),
             // Other tools may add these to a finished file, whose checksums prove them.
             op::ATTACHMENT | op::METADATA | 0x80.. if is_finished => {}
             _ => {
-                return Err(damage(
-                    "a record is of an unexpected kind".into(),
-                    frame.next,
-                ));
+                let is_torn = is_zeroed(frame.next)?;
+                return damage("a record is of an unexpected kind".into(), is_torn);
             }
         }
         if content.refusal.is_some() {
-            return Ok(());
+            return Ok(Ok(()));
         }
+        sum.update(&bytes);
         offset = frame.next;
     }
-    Ok(())
+    Ok(Ok(()))
 }
 
-/// Checks the checksums of the data and of the index.
-fn check_end(bytes: &[u8], offset: usize, data_end: Frame<'_>) -> Result<(), Stop> {
-    let stop = |offset: usize, reason: &str| Stop {
-        offset,
-        reason: reason.into(),
-        is_torn: false,
-    };
-    if Fields(data_end.body).u32() != Some(crc32fast::hash(&bytes[..offset])) {
-        return Err(stop(offset, "the checksum over all samples is wrong"));
-    }
-    if has_footer(bytes) {
-        let footer = bytes.len() - FOOTER_BYTES;
-        let checksum = bytes.len() - mcap::MAGIC.len() - 4;
-        // The footer's own first two fields are part of the sum.
-        let summed = bytes.get(data_end.next..checksum).map(crc32fast::hash);
-        let is_right = summed.is_some() && Fields(&bytes[checksum..]).u32() == summed;
-        if !is_right {
-            return Err(stop(footer, "the checksum of the index is wrong"));
+/// Checks the checksum of what is behind the data. The footer's own first two fields are in it.
+fn check_index(source: &Source, start: u64, is_finished: bool) -> io::Result<Result<(), Stop>> {
+    if is_finished {
+        let (stored, summed) = source.index_checksums(start)?;
+        if stored != summed {
+            return Ok(Err(Stop {
+                offset: start,
+                reason: "the checksum of the index is wrong".into(),
+                is_torn: false,
+            }));
         }
     }
-    Ok(())
+    Ok(Ok(()))
+}
+
+/// Whether a whole, undamaged chunk lies anywhere after `offset`.
+///
+/// Tells a torn end, after which there is nothing, from damage in the middle.
+fn has_chunk_after(source: &Source, offset: u64, chunks: &mut ChunkReader) -> io::Result<bool> {
+    Ok(next_chunk(source, offset, chunks)?.is_some())
+}
+
+/// The place of the next whole, undamaged chunk after `offset`.
+pub(crate) fn next_chunk(
+    source: &Source,
+    offset: u64,
+    chunks: &mut ChunkReader,
+) -> io::Result<Option<u64>> {
+    let mut bytes = Vec::new();
+    let mut search = offset;
+    while let Some(place) = source.next_chunk_mark(search)? {
+        if let Ok(frame) = source.frame_at(place, &mut bytes)?
+            && frame.opcode == op::CHUNK
+            && chunks.open(&bytes[FRAME_HEADER_BYTES..]).is_ok()
+        {
+            return Ok(Some(place));
+        }
+        search = place;
+    }
+    Ok(None)
 }

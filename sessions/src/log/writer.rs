@@ -13,7 +13,7 @@
 use super::segment::Segment;
 use super::sink::{SegmentSource, Sink};
 use crate::manifest::Manifest;
-use crate::record::{EndRecord, Entry, EntryMessageRef, Row, block_slices, blocks_from_rows};
+use crate::record::{EndRecord, Entry, EntryMessageRef, Row, View, block_slices, blocks_from_rows};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use palpate_model::Nanos;
@@ -91,6 +91,23 @@ impl LogError {
     }
 }
 
+/// Session time between two samples of the thinned channel: a plot of 50 points a second shows
+/// every step of a run, and its messages, each with an index entry of 16 bytes, stay below a tenth
+/// of a log at 1 kHz.
+const VIEW_EVERY: Nanos = Nanos::from_millis(20);
+
+/// How far a log has come: what a segment that is written again begins with.
+#[derive(Clone, Default)]
+struct Counters {
+    sequences: [u32; Channel::ALL.len()],
+    controller_ns: u64,
+    samples: u64,
+    entries: u64,
+    last_order: Option<u64>,
+    /// Session time from which the next sample is shown in the thinned channel.
+    next_view: Nanos,
+}
+
 /// Where the next segments come from and when.
 struct Rotation<S: Sink> {
     source: Box<dyn SegmentSource<Sink = S>>,
@@ -109,14 +126,12 @@ pub struct LogWriter<S: Sink> {
     /// What every segment begins with.
     manifest_json: Vec<u8>,
     library: String,
-    sequences: [u32; Channel::ALL.len()],
     started_ns: u64,
     /// `None` in an imported session, whose ticks are picoseconds.
     tick_nanos: Option<u64>,
-    controller_ns: u64,
-    samples: u64,
-    entries: u64,
-    last_order: Option<u64>,
+    at: Counters,
+    /// Where `at` stood when everything before was known to survive a power cut.
+    synced: Counters,
     failure: Option<LogError>,
 }
 
@@ -134,16 +149,14 @@ impl<S: Sink> LogWriter<S> {
             batches: 0,
             manifest_json: readable_json("manifest", manifest)?,
             library,
-            sequences: [0; Channel::ALL.len()],
             started_ns: u64::try_from(started_ns).unwrap_or(0),
             tick_nanos: manifest.rig.as_ref().map(|rig| rig.tick_nanos),
-            controller_ns: 0,
-            samples: 0,
-            entries: 0,
-            last_order: None,
+            at: Counters::default(),
+            synced: Counters::default(),
             failure: None,
         };
         writer.put_manifest()?;
+        writer.sync()?;
         Ok(writer)
     }
 
@@ -188,19 +201,18 @@ impl<S: Sink> LogWriter<S> {
         let mut former = std::mem::replace(&mut self.segment, next);
         (self.number, self.batches) = (number, 0);
         self.put_manifest()?;
-        let outcome = former.finish();
+        let outcome = self.segment.sync().and_then(|()| former.finish());
         self.noted(outcome)
     }
 
-    /// Begins the segment with the manifest and makes it durable.
+    /// Begins the segment with the manifest.
     fn put_manifest(&mut self) -> Result<(), LogError> {
         let json = std::mem::take(&mut self.manifest_json);
         // Timed at the session's start in every segment: it is the same manifest.
         let outcome = self.put(Channel::Manifest, Nanos::ZERO, &json);
         self.manifest_json = json;
         outcome?;
-        self.flush()?;
-        self.sync()
+        self.flush()
     }
 
     /// Adds rows and entries and hands everything so far to the sink.
@@ -211,39 +223,133 @@ impl<S: Sink> LogWriter<S> {
         self.check_input(rows, entries)?;
         if !rows.is_empty() || !entries.is_empty() {
             self.rotate_if_full()?;
-            self.batches += 1;
         }
+        self.put_batch(rows, entries)?;
+        self.flush()
+    }
+
+    fn put_batch(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
+        self.batches += u32::from(!rows.is_empty() || !entries.is_empty());
         for slice in block_slices(rows) {
             let Some(last) = slice.last() else { continue };
-            let (daq, derived) = blocks_from_rows(self.samples, slice);
-            self.controller_ns = match self.tick_nanos {
+            let (daq, derived) = blocks_from_rows(self.at.samples, slice);
+            self.at.controller_ns = match self.tick_nanos {
                 Some(nanos) => last.tick.saturating_mul(nanos),
                 None => last.tick / 1000,
             };
             self.put(Channel::Daq, last.host, &daq.encode_to_vec())?;
             self.put(Channel::Derived, last.host, &derived.encode_to_vec())?;
-            self.samples += slice.len() as u64;
+            self.put_view(slice)?;
+            self.at.samples += slice.len() as u64;
         }
         for entry in entries {
             let json = entry_json(entry)?;
             self.put(Channel::of_entry(entry.kind), entry.now, &json)?;
-            self.entries += 1;
-            self.last_order = Some(entry.order);
+            self.at.entries += 1;
+            self.at.last_order = Some(entry.order);
         }
-        self.flush()
+        Ok(())
     }
 
     /// Makes everything handed to the sink survive a power cut.
     pub fn sync(&mut self) -> Result<(), LogError> {
         self.check_alive()?;
         let outcome = self.segment.sync();
-        self.noted(outcome)
+        self.noted(outcome)?;
+        self.synced = self.at.clone();
+        Ok(())
+    }
+
+    /// Goes on in a new segment after the disk failed, and writes again what the old one may have
+    /// lost: `since_sync`, the batches appended since the last [`sync`](Self::sync) that
+    /// succeeded, in order, the one that failed at their end. The old file is not touched again.
+    ///
+    /// When this returns, all of it survives a power cut. Returns the new segment's path, and
+    /// whether it is in the other place.
+    pub fn write_again(
+        &mut self,
+        since_sync: &[(&[Row], &[Entry])],
+    ) -> Result<(String, bool), LogError> {
+        let Some(cause) = self.failure.take() else {
+            return Err(LogError::Closed);
+        };
+        for is_elsewhere in [false, true] {
+            if let Ok(path) = self.try_write_again(&cause, since_sync, is_elsewhere) {
+                return Ok((path, is_elsewhere));
+            }
+        }
+        // What cannot be helped keeps its first cause.
+        self.failure = Some(cause.clone());
+        Err(cause)
+    }
+
+    fn try_write_again(
+        &mut self,
+        cause: &LogError,
+        since_sync: &[(&[Row], &[Entry])],
+        is_elsewhere: bool,
+    ) -> Result<String, LogError> {
+        let Some(rotation) = &mut self.rotation else {
+            return Err(cause.clone());
+        };
+        let number = self.number + 1;
+        let own = rotation.source.path(number);
+        let (sink, path) = if is_elsewhere {
+            rotation.source.create_elsewhere(number)
+        } else {
+            rotation
+                .source
+                .create(number)
+                .map(|sink| (sink, own.clone()))
+        }
+        .map_err(|err| LogError::disk(&err, &own))?;
+        self.failure = None;
+        self.number = number;
+        self.batches = 0;
+        self.at = self.synced.clone();
+        self.segment = Segment::begin(sink, path.clone(), &self.library)?;
+        let rewrite = serde_json::json!({
+            "reason": cause.to_string(),
+            "samples": self.at.samples,
+            "entries": self.at.entries,
+        });
+        self.put_manifest()?;
+        self.put(
+            Channel::Rewrite,
+            Nanos::ZERO,
+            rewrite.to_string().as_bytes(),
+        )?;
+        for (rows, entries) in since_sync {
+            self.put_batch(rows, entries)?;
+        }
+        self.flush()?;
+        self.sync()?;
+        Ok(path)
+    }
+
+    /// Adds a thinned copy of rows.
+    fn put_view(&mut self, rows: &[Row]) -> Result<(), LogError> {
+        for row in rows {
+            if row.host < self.at.next_view {
+                continue;
+            }
+            self.at.next_view = row.host + VIEW_EVERY;
+            let view = View {
+                t_s: row.host.seconds().0,
+                signal_v: row.volts,
+                force_n: row.force,
+                depth_mm: row.depth,
+                cycle: row.cycle,
+            };
+            self.put(Channel::View, row.host, &view.encode_to_vec())?;
+        }
+        Ok(())
     }
 
     /// Writes the end record and the index and makes them durable.
     ///
     /// `samples` and `entries` of the record are replaced by what was really written.
-    pub fn finish(mut self, end: EndRecord) -> Result<(), LogError> {
+    pub fn finish(&mut self, end: EndRecord) -> Result<(), LogError> {
         self.check_alive()?;
         if let Some((name, _)) = end.time_use.iter().find(|(_, secs)| !secs.is_finite()) {
             return Err(LogError::NotFinite {
@@ -251,19 +357,20 @@ impl<S: Sink> LogWriter<S> {
             });
         }
         let end = EndRecord {
-            samples: self.samples,
-            entries: self.entries,
+            samples: self.at.samples,
+            entries: self.at.entries,
             ..end
         };
         let json = readable_json("end record", &end)?;
         self.put(Channel::End, end.ended_at, &json)?;
-        self.segment.finish()
+        let outcome = self.segment.finish();
+        self.noted(outcome)
     }
 
     /// Samples written so far.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        self.samples
+        self.at.samples
     }
 
     fn check_alive(&self) -> Result<(), LogError> {
@@ -273,7 +380,7 @@ impl<S: Sink> LogWriter<S> {
     /// Refuses what a reader would refuse, before any of it is written.
     fn check_input(&self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
         check_rows(rows)?;
-        let mut previous = self.last_order;
+        let mut previous = self.at.last_order;
         for entry in entries {
             check_order(entry.order, previous)?;
             previous = Some(entry.order);
@@ -294,12 +401,12 @@ impl<S: Sink> LogWriter<S> {
         let index = channel as usize;
         let header = MessageHeader {
             channel_id: 0,
-            sequence: self.sequences[index],
+            sequence: self.at.sequences[index],
             log_time: self.started_ns.saturating_add(at.0),
-            publish_time: self.controller_ns,
+            publish_time: self.at.controller_ns,
         };
         // A gap in the sequence shows a reader that a message is missing.
-        self.sequences[index] = self.sequences[index].wrapping_add(1);
+        self.at.sequences[index] = self.at.sequences[index].wrapping_add(1);
         self.segment.put(channel, header, data)
     }
 

@@ -102,7 +102,7 @@ fn a_folder_that_cannot_be_written_refuses_the_start() {
     let folder = SessionFolder::create(parent.path()).unwrap();
     // Somebody puts a log in the locked folder: it is not overwritten.
     std::fs::write(parent.path().join("000.mcap"), "precious").unwrap();
-    let refusal = SessionWriter::start(folder, &manifest(), Pace::Virtual);
+    let refusal = SessionWriter::start(folder, None, &manifest(), Pace::Virtual);
     let text = refusal.err().unwrap().to_string();
     assert!(text.contains("File exists"), "{text}");
     let kept = std::fs::read(parent.path().join("000.mcap")).unwrap();

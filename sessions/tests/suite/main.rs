@@ -18,3 +18,4 @@ mod round_trip;
 mod segments;
 #[cfg(test)]
 mod support;
+mod written_again;

@@ -1,6 +1,6 @@
 use crate::support::{MemorySink, end, entries, manifest, open_bytes, rows, same_bits};
 use palpate_model::Nanos;
-use palpate_sessions::{LogError, Pace, SessionWriter, Sink};
+use palpate_sessions::{LogError, Notice, Pace, SessionWriter, Sink};
 use std::io;
 use std::sync::{Arc, Mutex};
 
@@ -84,13 +84,13 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
     let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
     let rows = rows(40_000, 33);
     let stuck = gate.lock().unwrap();
-    let mut behind_at = None;
+    let mut told = Vec::new();
     let mut failed_at = None;
     for row in &rows {
         // Were any push to wait for the disk, this test would never end.
         let outcome = writer.push_row(*row);
-        if behind_at.is_none() && writer.is_falling_behind() {
-            behind_at = Some(row.host.seconds().0);
+        for notice in writer.take_notices() {
+            told.push((notice, row.host.seconds().0));
         }
         if let Err(err) = outcome {
             assert!(
@@ -101,8 +101,13 @@ fn at_real_pace_a_stuck_disk_is_noticed_and_never_waited_for() {
             break;
         }
     }
-    let (behind_at, failed_at) = (behind_at.unwrap(), failed_at.unwrap());
-    assert!((14.0..16.5).contains(&behind_at), "{behind_at}");
+    let failed_at = failed_at.unwrap();
+    // Once each, and the second while there is still room for the end of the run.
+    let [(Notice::Slow, slow_at), (Notice::TooSlow, too_slow_at)] = told[..] else {
+        panic!("{told:?}");
+    };
+    assert!((14.0..16.5).contains(&slow_at), "{slow_at}");
+    assert!((26.0..28.5).contains(&too_slow_at), "{too_slow_at}");
     assert!((30.0..31.0).contains(&failed_at), "{failed_at}");
     drop(stuck);
     assert!(writer.close(end(Nanos::ZERO)).is_err());

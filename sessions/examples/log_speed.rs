@@ -1,0 +1,140 @@
+//! How fast a session log is written and read back, and how large it is.
+//!
+//! `cargo run --release -p palpate-sessions --example log_speed -- [SAMPLES] [FOLDER]`
+
+use chrono::{TimeZone, Utc};
+use palpate_model::rig::{Limits, Phase, RigDescription};
+use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
+use palpate_sessions::{
+    About, EndRecord, Manifest, Pace, RECORD_VERSION, Row, Session, SessionFolder, SessionWriter,
+    Summary, new_session_id,
+};
+use std::time::Instant;
+
+/// A session of the simulated rig's kind at 20 kHz: noise in every digit of the signal.
+fn row(index: u64, random: &mut u64) -> Row {
+    *random = random
+        .wrapping_mul(6_364_136_223_846_793_005)
+        .wrapping_add(1_442_695_040_888_963_407);
+    let noise = (*random >> 11) as f64 / (1u64 << 53) as f64 - 0.5;
+    let depth = 0.015 * (index / 500 % 500) as f64;
+    let volts = 0.5 + 0.1 * depth + 1e-3 * noise;
+    Row {
+        tick: index,
+        host: Nanos(index * 50_000),
+        counts: None,
+        volts: Some(volts),
+        pulses: Some((index / 500 % 500) as i64),
+        status: 0,
+        force: Some(volts * 3.7 - 1.85),
+        depth: Some(depth),
+        phase: Phase::Hold,
+        cycle: 1,
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "this program measures time")]
+fn timed<T>(what: &str, samples: u64, body: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = body();
+    let seconds = start.elapsed().as_secs_f64();
+    println!(
+        "{what}: {seconds:.3} s, {:.2} million samples/s",
+        samples as f64 / seconds / 1e6
+    );
+    done
+}
+
+fn manifest() -> Manifest {
+    let started_at = Utc.timestamp_nanos(1_772_720_107_000_000_000);
+    let travel = Position(150.0);
+    Manifest {
+        record_version: RECORD_VERSION,
+        session_id: new_session_id(started_at),
+        software_version: env!("CARGO_PKG_VERSION").into(),
+        engine_version: 1,
+        started_at,
+        operator: "none".into(),
+        specimen: "none".into(),
+        indenter: "none".into(),
+        about: About::default(),
+        signal: None,
+        imported: None,
+        rig: Some(RigDescription {
+            name: "speed".into(),
+            identity: "no rig".into(),
+            settings: [].into(),
+            mm_per_pulse: 0.015,
+            travel,
+            tick_nanos: 50_000,
+            speed_quantum: MmPerS(0.03),
+            speed_max: MmPerS(5.0),
+            acceleration: MmPerS2(15.36),
+            adc: None,
+            noise_expected: Volts(1e-3),
+        }),
+        limits: Some(Limits::for_travel(travel)),
+        calibration: serde_json::Value::Null,
+        plan: serde_json::Value::Null,
+        settings: serde_json::Value::Null,
+        acknowledgements: Vec::new(),
+    }
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut words = std::env::args().skip(1);
+    let samples: u64 = words.next().map_or(Ok(10_000_000), |word| word.parse())?;
+    let folder = words.next().unwrap_or_else(|| "target/log_speed".into());
+    let manifest = manifest();
+    let path = std::path::Path::new(&folder).join(&manifest.session_id);
+    let mut random = 1;
+    timed(
+        "write",
+        samples,
+        || -> Result<(), Box<dyn std::error::Error>> {
+            let mut writer = SessionWriter::start(
+                SessionFolder::create(&path)?,
+                None,
+                &manifest,
+                Pace::Virtual,
+            )?;
+            for index in 0..samples {
+                writer.push_row(row(index, &mut random))?;
+            }
+            let end = EndRecord {
+                outcome: "finished".into(),
+                reason: "done".into(),
+                samples: 0,
+                entries: 0,
+                ended_at: Nanos(samples * 50_000),
+                time_use: Vec::new(),
+            };
+            Ok(writer.close(end)?)
+        },
+    )?;
+    let mut bytes = 0;
+    for item in std::fs::read_dir(&path)? {
+        bytes += item?.metadata()?.len();
+    }
+    println!("{:.2} bytes a sample", bytes as f64 / samples as f64);
+    for _ in 0..3 {
+        let summary = timed("summary", samples, || Summary::read(&path))?;
+        assert_eq!(summary.samples, samples);
+        let mut sum = 0.0;
+        let outline = timed("scan of all channels", samples, || {
+            Session::scan(&path, &mut |block| {
+                sum += block.force().iter().sum::<f64>();
+            })
+        })?;
+        assert_eq!(outline.samples, samples);
+        std::hint::black_box(sum);
+
+        if std::env::var_os("PALPATE_SCAN_ONLY").is_some() {
+            continue;
+        }
+        let session = timed("read", samples, || Session::open(&path))?;
+        assert_eq!(session.rows.len() as u64, samples);
+    }
+    std::fs::remove_dir_all(&path)?;
+    Ok(())
+}
