@@ -432,8 +432,8 @@ mod tests {
             tick,
             host: Nanos(u64::MAX - tick),
             counts,
-            volts: (tick != 12).then_some(0.1 + tick as f64 * 1e-17),
-            pulses: (tick != 13).then_some(i64::MIN.wrapping_add(tick as i64)),
+            volts: Some(0.1 + tick as f64 * 1e-17),
+            pulses: Some(i64::MIN.wrapping_add(tick as i64)),
             status: u32::MAX,
             force: tick.is_multiple_of(2).then_some(-0.0),
             depth: tick.is_multiple_of(3).then_some(f64::MIN_POSITIVE),
@@ -448,8 +448,14 @@ mod tests {
             row(u64::MAX, None),
             row(0, None),
             row(7, Some(i32::MIN)),
-            row(12, Some(0)),
-            row(13, Some(1)),
+            Row {
+                volts: None,
+                ..row(12, Some(0))
+            },
+            Row {
+                pulses: None,
+                ..row(13, Some(1))
+            },
             row(14, Some(2)),
         ];
         let mut back = Vec::new();

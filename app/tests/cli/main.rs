@@ -5,6 +5,7 @@ mod calibration;
 mod disk;
 mod extremes;
 mod fit;
+mod import;
 mod plan;
 mod programme;
 mod protocol;
