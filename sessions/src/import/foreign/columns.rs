@@ -266,7 +266,7 @@ fn column(
             "column {} '{name}' in {unit}{assumed}{turned}{from}",
             index + 1
         ),
-        choice.is_some() || told_unit.is_some(),
+        choice.is_some() || told_unit.is_some() || zero != Zero::AsItIs,
         &format!("--column {what}=NAME --unit {what}=UNIT"),
     );
     Ok(Some(Column {
