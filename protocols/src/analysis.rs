@@ -89,7 +89,7 @@ fn lift_off(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
     Some(last + 1 - LIFT_OFF_RUN)
 }
 
-/// Nothing to fit could be read.
+/// Nothing to fit or to analyse could be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
     /// The session cannot be read.
@@ -122,6 +122,11 @@ pub enum SourceError {
         "the session has no ramp and hold with known force and depth, so there is nothing to fit"
     )]
     Empty,
+    /// The session ended before there was anything to analyse.
+    #[error(
+        "the session has no way in and no sine with known force and depth, so there are no cycles to analyse; 'palpate report' tells what happened in it"
+    )]
+    NoCycles,
     /// A recorded decision is not what this version knows.
     #[error(
         "a recorded decision cannot be understood ({detail}); read the session with the version that wrote it, or replay it to find the entry"

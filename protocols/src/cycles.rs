@@ -113,7 +113,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     if source.samples.iter().any(|one| one.phase == Phase::Ramp) || !source.sines.is_empty() {
         Ok(source)
     } else {
-        Err(SourceError::Empty)
+        Err(SourceError::NoCycles)
     }
 }
 

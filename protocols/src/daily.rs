@@ -13,6 +13,8 @@ use std::time::SystemTime;
 
 /// Name of the built-in protocol.
 pub const DAILY_CHECK: &str = "daily-check";
+/// Protocols that jog between two homings: the check itself, and the one that looks for what it found.
+const HOMING_CHECKS: [&str; 2] = [DAILY_CHECK, "check-home"];
 /// The empty cell may read so much of the greatest calibrated force: the 1 % that ASTM E4 allows a force.
 const ZERO_SHARE: f64 = 0.01;
 /// Two homings may differ by so many pulses: the switch closes between two of them.
@@ -147,7 +149,7 @@ pub enum Gate {
 }
 
 impl Gate {
-    /// What to tell before the run of a plan on a rig. Plans that touch no tissue, such as a calibration or
+    /// What to tell before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
     pub fn of(
         plan: &Plan,
@@ -156,7 +158,9 @@ impl Gate {
         is_virtual: bool,
         now: SystemTime,
     ) -> Result<Self, CheckFileError> {
-        let is_touching = |step: &Step| matches!(step, Step::FindContact(_));
+        let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
+        let is_touching =
+            |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog { .. }));
         if !plan.steps.iter().any(|planned| is_touching(&planned.step)) {
             return Ok(Self::Open);
         }
@@ -290,6 +294,26 @@ mod tests {
             Gate::of(&calibration, at, "bench", false, now).unwrap(),
             Gate::Open
         );
+        // Of the built-in protocols, those that cannot touch stay open.
+        let built_in = |name: &str, values: &[(&str, &str)]| {
+            let protocol = crate::file::built_in(name).unwrap().unwrap();
+            let own = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
+            protocol.plan(&values.iter().map(own).collect()).unwrap()
+        };
+        let is_open = |plan: &Plan| {
+            let gate = Gate::of(plan, at, "bench", false, now).unwrap();
+            gate == Gate::Open
+        };
+        let names = crate::file::BUILT_IN.iter().map(|(name, _)| *name);
+        let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
+        assert_eq!(open, ["daily-check", "load-cell-calibration", "check-home"]);
+        assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));
+        // Nor does the name of the check open what it does not do.
+        let plan = Plan {
+            name: DAILY_CHECK.into(),
+            ..RampHold::default().plan()
+        };
+        assert!(!is_open(&plan));
         check.is_passed = true;
         add_check(library.path(), &check).unwrap();
         assert_eq!(gate(false), Gate::Open);

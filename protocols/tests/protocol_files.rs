@@ -182,7 +182,11 @@ fn values_that_are_typed_are_checked_by_name() {
             [("until", "tau")],
             "'hold': 'tau' does not say how well",
         ),
-        ("preconditioning", [("cycles", "0")], "give 1"),
+        (
+            "preconditioning",
+            [("cycles", "0")],
+            "0 is too small; give 1 or more",
+        ),
         ("preconditioning", [("cycles", "2.5")], "not a whole number"),
         (
             "validation-series",

@@ -1,6 +1,7 @@
 //! How fast a session log is written and read back, and how large it is.
 //!
 //! `cargo run --release -p palpate-sessions --example log_speed -- [SAMPLES] [FOLDER]`
+#![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
 use palpate_model::rig::{Limits, Phase, RigDescription};
@@ -78,6 +79,7 @@ fn manifest() -> Manifest {
         plan: serde_json::Value::Null,
         settings: serde_json::Value::Null,
         acknowledgements: Vec::new(),
+        recovered: None,
     }
 }
 

@@ -161,6 +161,13 @@ pub fn key(name: &str) -> Result<&'static Key, AboutError> {
         })
 }
 
+/// Key and value of a `KEY=VALUE`, not yet checked.
+pub fn pair_of(pair: &str) -> Result<(&str, &str), AboutError> {
+    pair.split_once('=').ok_or_else(|| AboutError::NotAPair {
+        text: pair.to_owned(),
+    })
+}
+
 impl Key {
     /// The value of a text, or what is wrong with it.
     pub fn parse(&self, value: &str) -> Result<Value, AboutError> {
@@ -268,9 +275,7 @@ impl Labels {
 
     /// Tells what a `KEY=VALUE` says.
     pub fn tell_pair(&mut self, pair: &str) -> Result<(), AboutError> {
-        let (name, value) = pair.split_once('=').ok_or_else(|| AboutError::NotAPair {
-            text: pair.to_owned(),
-        })?;
+        let (name, value) = pair_of(pair)?;
         self.tell(name, value)
     }
 

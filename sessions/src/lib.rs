@@ -25,6 +25,7 @@ pub mod log;
 pub mod manifest;
 mod packed;
 pub mod record;
+pub mod recover;
 mod schema;
 pub mod text;
 pub mod trade;

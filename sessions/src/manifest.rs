@@ -2,6 +2,7 @@
 
 use crate::about::About;
 use crate::imported::Imported;
+use crate::recover::Recovered;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use palpate_model::units::Seconds;
@@ -62,6 +63,9 @@ pub struct Manifest {
     pub settings: serde_json::Value,
     /// Warnings the operator read and accepted before the start.
     pub acknowledgements: Vec<String>,
+    /// Set if this is what could be kept of another session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub recovered: Option<Recovered>,
 }
 
 impl Manifest {

@@ -36,7 +36,6 @@ fn carry_out(text: &str, folder: &Path) -> Result<Done, RunError> {
         calibration,
         folder,
         answers: Answers::Confirm,
-        indenter: String::new(),
         gate: &|_| Ok(Vec::new()),
     };
     let mut begun = 0;
@@ -207,4 +206,176 @@ fn the_day_in_the_laboratory_is_a_programme() {
     let text = std::fs::read_to_string(workspace().join("examples/day-in-the-lab.toml")).unwrap();
     assert!(Programme::is_meant(&text));
     assert_eq!(programme(&text).session_count(), 10);
+    assert_eq!(programme(&text).questions(), []);
+}
+
+const TOLD: &str = r#"
+palpate-programme = 1
+name = "told"
+title = "Told"
+purpose = "A test."
+
+[about]
+operator = "Ada"
+specimen = "stomach 7"
+specimen-source = "x"
+
+[specimen.2]
+name = "stomach 8, fundus"
+thickness_mm = 11
+
+[[task]]
+name = "weights"
+protocol = "load-cell-calibration"
+calibrates = true
+
+[[task]]
+name = "there"
+protocol = "zeroing"
+
+[[task]]
+name = "first"
+protocol = "creep"
+specimen = 1
+
+[[task]]
+name = "second"
+protocol = "creep"
+specimen = 2
+repeats = 3
+
+[[task]]
+name = "again"
+protocol = "sine"
+"#;
+
+#[test]
+fn what_a_programme_tells_is_told_of_the_right_sessions_and_what_is_missing_is_asked() {
+    let text = TOLD.replace("specimen-source = \"x\"\n", "");
+    let mut whole = programme(&text);
+    // Without a source the two protocols that ask for it say so, each at its line.
+    let asked: Vec<String> = whole.questions().iter().map(ToString::to_string).collect();
+    assert_eq!(asked.len(), 3, "{asked:?}");
+    assert!(
+        asked[0].starts_with("line 24: warning: task 'first' asks for specimen.source (animal"),
+        "{asked:?}"
+    );
+    assert!(
+        asked[1].ends_with("task 'second' asks for specimen.source"),
+        "{asked:?}"
+    );
+    whole.tell("specimen.source", "pig").unwrap();
+    assert_eq!(whole.questions(), []);
+    let labels = |task, repeat| whole.labels(task, repeat).unwrap();
+    // The scale has weights on it; then there is the specimen that is there, then each by its number.
+    let names: Vec<String> = (0..5).map(|task| labels(task, 1).specimen).collect();
+    let wanted = [
+        "",
+        "stomach 7",
+        "stomach 7, specimen 1",
+        "stomach 8, fundus",
+        "stomach 8, fundus",
+    ];
+    assert_eq!(names, wanted);
+    let (first, second) = (labels(2, 1), labels(3, 2));
+    assert_eq!(
+        (first.operator.as_str(), second.operator.as_str()),
+        ("Ada", "Ada")
+    );
+    assert_eq!(first.about.get("specimen.thickness_mm"), None);
+    assert_eq!(
+        second.about.get("specimen.thickness_mm"),
+        Some(&11.0.into())
+    );
+    assert_eq!(second.about.get("specimen.source"), Some(&"pig".into()));
+    assert_eq!(second.about.get("series.repeat"), Some(&2.into()));
+    assert_eq!(second.about.get("series.id"), Some(&"told/second".into()));
+    // The command line holds over the file, and two specimens stay two.
+    whole.tell("operator", "Grace").unwrap();
+    whole.tell("specimen", "rabbit").unwrap();
+    let (first, second) = (whole.labels(2, 1).unwrap(), whole.labels(3, 1).unwrap());
+    assert_eq!(first.operator, "Grace");
+    assert_eq!(
+        (first.specimen.as_str(), second.specimen.as_str()),
+        ("rabbit, specimen 1", "rabbit, specimen 2")
+    );
+    for (key, value, words) in [
+        ("series.repeat", "2", "counts its series itself"),
+        ("specimen.colour", "red", "nothing is called"),
+    ] {
+        let refusal = whole.tell(key, value).unwrap_err();
+        assert!(refusal.contains(words), "{refusal}");
+    }
+}
+
+#[test]
+fn what_cannot_be_told_is_refused_with_its_line() {
+    let wrong = |from: &str, to: &str| {
+        let text = TOLD.replace(from, to);
+        let refusal = Programme::read(&text, &|name| Err(format!("no protocol '{name}'")));
+        refusal.unwrap_err().to_string()
+    };
+    for (from, to, words) in [
+        ("", "", "line 10: nothing is called 'specimen-source'"),
+        (
+            "specimen-source",
+            "series.repeat",
+            "line 10: a programme counts its series itself",
+        ),
+        (
+            "specimen-source = \"x\"",
+            "indenter.diameter_mm = 0",
+            "line 10: indenter.diameter_mm cannot be '0'",
+        ),
+        ("specimen-source = \"x\"", "\"operator\" = \"x\"", "line 10"),
+        (
+            "specimen-source = \"x\"",
+            "signal = [1]",
+            "line 10: signal is a list",
+        ),
+        (
+            "specimen-source = \"x\"\n\n[specimen.2]",
+            "[specimen.two]",
+            "line 10: 'two' is no table of a specimen",
+        ),
+        (
+            "specimen-source = \"x\"\n\n[specimen.2]",
+            "[specimen.9]",
+            "line 10: [specimen.9] tells of a specimen that no task clips in",
+        ),
+        (
+            "purpose",
+            "operator = \"Bo\"\npurpose",
+            "operator is told twice",
+        ),
+        (
+            "\n[about]\noperator = \"Ada\"\nspecimen = \"stomach 7\"\nspecimen-source = \"x\"\n",
+            "about = \"For a test.\"\n",
+            "line 6: [about] is a table",
+        ),
+    ] {
+        let told = wrong(from, to);
+        assert!(told.contains(words), "{to}: {told}");
+    }
+}
+
+#[test]
+fn the_programme_of_the_guide_is_one() {
+    let page = std::fs::read_to_string(workspace().join("docs/guide/programmes.md")).unwrap();
+    let text = page
+        .split("```toml")
+        .nth(1)
+        .unwrap()
+        .split("```")
+        .next()
+        .unwrap();
+    let told = programme(text);
+    let labels = |task| told.labels(task, 1).unwrap();
+    let (first, second) = (labels(0), labels(1));
+    assert_eq!(
+        (first.operator.as_str(), first.specimen.as_str()),
+        ("Ada", "specimen 1")
+    );
+    assert_eq!(second.specimen, "stomach 8, fundus");
+    assert!(second.is_told("specimen.source") && second.is_told("specimen.thickness_mm"));
 }

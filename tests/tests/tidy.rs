@@ -232,3 +232,27 @@ fn no_test_is_ignored_and_no_page_is_unsafe() {
         }
     }
 }
+
+#[test]
+fn the_soak_script_names_its_parts() {
+    let script = workspace().join("scripts/soak");
+    let help = std::process::Command::new("python3")
+        .arg(&script)
+        .arg("--help")
+        .output();
+    let help = match help {
+        Ok(help) => help,
+        Err(err) => {
+            println!("skipped: there is no python3 here ({err})");
+            return;
+        }
+    };
+    let told = String::from_utf8_lossy(&help.stdout);
+    assert!(help.status.success(), "{told}");
+    for part in [
+        "bodies", "select", "coverage", "extremes", "runs", "contact",
+    ] {
+        let is_named = told.lines().any(|line| line.trim_start().starts_with(part));
+        assert!(is_named, "{part}: {told}");
+    }
+}

@@ -147,7 +147,7 @@ pub fn main() -> ExitCode {
     let (output, result) = match cli.command {
         None => (Output::text(), rig::window(&rig::RigArgs::default())),
         Some(Command::Window(args)) => (Output::text(), rig::window(&args)),
-        Some(Command::Run(args)) => with(args.is_json(), |out| run::run(&args, out)),
+        Some(Command::Run(args)) => with(args.json, |out| run::run(&args, out)),
         Some(Command::Protocol(command)) => match command {
             ProtocolCommand::List(args) => with(args.json, protocol::list),
             ProtocolCommand::Check(args) => with(args.json, |out| protocol::run_check(&args, out)),
@@ -212,6 +212,7 @@ fn source_failure(err: SourceError) -> Failure {
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty
+        | SourceError::NoCycles
         | SourceError::Calibration { .. }
         | SourceError::Decision { .. } => Failure::failed(err),
     }

@@ -5,12 +5,11 @@ use super::output::Output;
 use super::programme;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
-use clap::{Args, Subcommand};
+use clap::Args;
 use palpate_drivers::Rig;
-use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::daily::Gate;
 use palpate_protocols::engine::{EndingKind, Operator};
-use palpate_protocols::plans::{HoldUntil, Plan, RampHold};
+use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
@@ -18,53 +17,79 @@ use palpate_protocols::runner::{
 };
 use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
+/// Probe that is written down where nobody says which.
+pub(super) const USUAL_INDENTER: &str = "blunt 12 mm probe";
+
 /// Arguments of `palpate run`.
 #[derive(Debug, Args)]
-#[command(args_conflicts_with_subcommands = true)]
 pub struct RunArgs {
-    #[command(subcommand)]
-    command: Option<RunCommand>,
-    #[command(flatten)]
-    protocol: ProtocolArgs,
-}
-
-impl RunArgs {
-    /// Whether one JSON object is wanted.
-    #[must_use]
-    pub fn is_json(&self) -> bool {
-        match &self.command {
-            Some(RunCommand::RampHold(args)) => args.json,
-            None => self.protocol.json,
-        }
-    }
-}
-
-/// Protocols with arguments of their own.
-#[derive(Debug, Subcommand)]
-pub enum RunCommand {
-    /// Find the tissue, indent at constant speed, hold while the force relaxes
-    RampHold(RampHoldArgs),
-}
-
-/// Arguments of `palpate run NAME|FILE`.
-#[derive(Debug, Args)]
-pub struct ProtocolArgs {
     /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
     #[arg(value_name = "NAME|FILE")]
     protocol: Option<String>,
     #[command(flatten)]
     values: ValueArgs,
     #[command(flatten)]
+    short: ShortArgs,
+    #[command(flatten)]
     how: HowArgs,
     /// Print one JSON object
     #[arg(long)]
-    json: bool,
+    pub json: bool,
+}
+
+/// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
+#[derive(Debug, Args)]
+#[command(
+    next_help_heading = "Short for --set, of ramp-hold and every protocol with such a parameter"
+)]
+struct ShortArgs {
+    /// Indentation speed in mm/s
+    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    speed: Option<f64>,
+    /// Depth from contact in mm
+    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    depth: Option<f64>,
+    /// Time at depth in s
+    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    hold: Option<f64>,
+    /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
+    #[arg(long, value_name = "PARAMETER=SHARE")]
+    hold_until: Option<String>,
+    /// After the hold come back to the surface at this speed in mm/s, recorded for a fit of unloading
+    #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
+    unload: Option<f64>,
+}
+
+impl RunArgs {
+    /// Values of parameters by name, from --set and from what is short for it.
+    fn values(&self) -> Result<BTreeMap<String, String>, Failure> {
+        let with = |value: Option<f64>, unit| value.map(|value| format!("{value} {unit}"));
+        let short = &self.short;
+        let shorts = [
+            ("speed", "speed", with(short.speed, "mm/s")),
+            ("depth", "depth", with(short.depth, "mm")),
+            ("hold", "hold", with(short.hold, "s")),
+            ("hold-until", "until", short.hold_until.clone()),
+            ("unload", "unload", with(short.unload, "mm/s")),
+        ];
+        let mut values = self.values.values();
+        for (flag, name, value) in shorts {
+            let Some(value) = value else { continue };
+            if values.insert(name.to_owned(), value).is_some() {
+                return Err(Failure::usage(format!(
+                    "--{flag} is short for --set {name}=...; give one of them"
+                )));
+            }
+        }
+        Ok(values)
+    }
 }
 
 /// On which rig, into which folder, by whom.
@@ -80,44 +105,19 @@ pub(super) struct HowArgs {
     pub(super) operator: String,
     /// What is indented
     #[arg(long, default_value = "")]
-    specimen: String,
-    /// With which probe
-    #[arg(long, default_value = "blunt 12 mm probe")]
-    pub(super) indenter: String,
+    pub(super) specimen: String,
+    /// With which probe; without it the blunt 12 mm probe
+    #[arg(long)]
+    pub(super) indenter: Option<String>,
     /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
-    about: Vec<String>,
+    pub(super) about: Vec<String>,
     /// Accept what the preview asks to acknowledge; it is recorded
     #[arg(long)]
     pub(super) acknowledge: bool,
     /// Only tell what would happen
     #[arg(long)]
     pub(super) preview: bool,
-}
-
-/// Arguments of `palpate run ramp-hold`.
-#[derive(Debug, Args)]
-pub struct RampHoldArgs {
-    /// Indentation speed in mm/s
-    #[arg(long, default_value = "0.75", value_parser = number, allow_negative_numbers = true)]
-    speed: f64,
-    /// Depth from contact in mm
-    #[arg(long, default_value = "30", value_parser = number, allow_negative_numbers = true)]
-    depth: f64,
-    /// Time at depth in s
-    #[arg(long, default_value = "50", value_parser = number, allow_negative_numbers = true)]
-    hold: f64,
-    /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
-    #[arg(long, value_name = "PARAMETER=SHARE", value_parser = HoldUntil::parse)]
-    hold_until: Option<HoldUntil>,
-    /// After the hold come back to the surface at this speed in mm/s, recorded for a fit of unloading
-    #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
-    unload: Option<f64>,
-    #[command(flatten)]
-    how: HowArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// A finite number, or one sentence.
@@ -145,40 +145,19 @@ struct RunReport {
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
-pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
-    match &args.command {
-        Some(RunCommand::RampHold(args)) => run_ramp_hold(args, output),
-        None => run_protocol(&args.protocol, output),
-    }
-}
-
-fn run_ramp_hold(args: &RampHoldArgs, output: &Output) -> Result<(), Failure> {
-    let params = RampHold {
-        speed: MmPerS(args.speed),
-        depth: Depth(args.depth),
-        hold: Seconds(args.hold),
-        until: args.hold_until,
-        unload: args.unload.map(MmPerS),
-    };
-    let bench = super::rig::open(&args.how.rig)?;
-    let labels = labels(&args.how)?;
-    carry_out(params.plan(), bench, &args.how, labels, output)
-}
-
 /// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
-fn run_protocol(args: &ProtocolArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let Some(name) = &args.protocol else {
         return Err(Failure::usage(
             "name a protocol; 'palpate protocol list' tells which there are",
         ));
     };
-    let how = &args.how;
+    let (how, values) = (&args.how, args.values()?);
     if programme::is_one(name) {
-        return programme::run(Path::new(name), how, &args.values.values(), output);
+        return programme::run(Path::new(name), how, &values, output);
     }
     let bench = super::rig::open(&how.rig)?;
-    let (protocol, written, _) =
-        super::protocol::sound(name, &args.values.values(), &bench, output)?;
+    let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
     let labels = labels(how)?;
     if !how.preview {
         protocol.check_labels(&labels).map_err(|reason| {
@@ -296,7 +275,10 @@ fn labels(args: &HowArgs) -> Result<Labels, Failure> {
     let mut labels = Labels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
-        indenter: args.indenter.clone(),
+        indenter: args
+            .indenter
+            .clone()
+            .unwrap_or_else(|| USUAL_INDENTER.to_owned()),
         about: About::default(),
     };
     for pair in &args.about {

@@ -12,7 +12,7 @@ use palpate_protocols::analysis::{self, Stretch};
 use palpate_protocols::cycles::of_session;
 use palpate_protocols::edited;
 use palpate_protocols::programme::{Programme, Progress, Task, calibration_of};
-use palpate_sessions::{Session, Verdict};
+use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::Path;
 
@@ -29,12 +29,53 @@ pub struct RunLine {
     pub session: String,
     /// How it ended; none if it broke off.
     pub ending: Option<String>,
+    /// Who ran it, as its session says.
+    pub operator: String,
+    /// What was indented, as its session says.
+    pub specimen: String,
     /// What it is worth, with the reason where it is not valid; none if nobody said.
     pub verdict: Option<String>,
     /// Session time in s.
     pub duration_s: f64,
     /// Highest force in N, where force was known.
     pub force_peak_n: Option<f64>,
+}
+
+/// What sessions tell of one specimen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpecimenPart {
+    /// Its name.
+    pub specimen: String,
+    /// With which probe it was indented.
+    pub indenter: String,
+    /// What else is told of it, by key; not its place in the series.
+    pub told: Vec<(String, String)>,
+}
+
+impl SpecimenPart {
+    fn of(manifest: &Manifest) -> Self {
+        let lines = manifest.about.lines().into_iter();
+        Self {
+            specimen: manifest.specimen.clone(),
+            indenter: manifest.indenter.clone(),
+            told: lines
+                .filter(|(key, _)| !key.starts_with("series."))
+                .map(|(key, value)| (key.to_owned(), value))
+                .collect(),
+        }
+    }
+
+    fn text(&self) -> String {
+        let told = self.told.iter();
+        let told: Vec<String> = told
+            .map(|(key, value)| format!("  {key}: {value}"))
+            .collect();
+        let probe = match self.indenter.as_str() {
+            "" => String::new(),
+            indenter => format!(", with the {indenter}"),
+        };
+        format!("{}{probe}\n{}", self.specimen, told.join("\n"))
+    }
 }
 
 /// What one task told.
@@ -89,9 +130,11 @@ pub struct Page {
     /// The programme in words.
     pub title: String,
     /// What it is for.
-    pub about: String,
+    pub purpose: String,
     /// Every run.
     pub runs: Vec<RunLine>,
+    /// Every specimen, in the order in which it was met.
+    pub specimens: Vec<SpecimenPart>,
     /// Every task.
     pub tasks: Vec<TaskPart>,
 }
@@ -106,8 +149,9 @@ impl Page {
     ) -> Self {
         let mut page = Self {
             title: programme.title.clone(),
-            about: programme.about.clone(),
+            purpose: programme.purpose.clone(),
             runs: Vec::new(),
+            specimens: Vec::new(),
             tasks: Vec::new(),
         };
         let mut bodies: Vec<(String, ModifiedKelvin)> = Vec::new();
@@ -135,12 +179,22 @@ impl Page {
                 let forces = opened.iter().flat_map(|session| &session.rows);
                 let peak = forces.filter_map(|row| row.force).reduce(f64::max);
                 let end = opened.as_ref().ok().and_then(|session| session.rows.last());
+                let manifest = opened.as_ref().ok().map(|session| &session.manifest);
+                let told = manifest.map(SpecimenPart::of);
+                let told = told.filter(|one| !one.specimen.is_empty());
+                page.specimens
+                    .extend(told.filter(|one| !page.specimens.contains(one)));
+                let word = |of: fn(&Manifest) -> &String| {
+                    manifest.map_or(String::new(), |one| of(one).clone())
+                };
                 page.runs.push(RunLine {
                     task: task.name.clone(),
                     repeat: place.repeat,
                     attempt: place.attempt,
                     session: name.clone(),
                     ending: ending.clone(),
+                    operator: word(|manifest| &manifest.operator),
+                    specimen: word(|manifest| &manifest.specimen),
                     verdict,
                     duration_s: end.map_or(0.0, |row| row.host.seconds().0),
                     force_peak_n: peak,
@@ -164,7 +218,8 @@ impl Page {
     #[must_use]
     pub fn table(&self) -> String {
         let head = [
-            "task", "repeat", "ended by", "s", "peak N", "session", "verdict",
+            "task", "repeat", "ended by", "s", "peak N", "session", "operator", "specimen",
+            "verdict",
         ];
         let mut lines = vec![head.map(str::to_owned).to_vec()];
         lines.extend(self.runs.iter().map(|run| {
@@ -180,6 +235,8 @@ impl Page {
                 run.force_peak_n
                     .map_or("-".into(), |peak| format!("{peak:.3}")),
                 run.session.clone(),
+                run.operator.clone(),
+                run.specimen.clone(),
                 run.verdict.clone().unwrap_or_default(),
             ]
         }));
@@ -192,9 +249,16 @@ impl Page {
         let mut body = format!(
             "<h1>{}</h1>\n<p>{}</p>\n<h2>Sessions</h2>\n<pre>{}</pre>\n",
             escape(&self.title),
-            escape(&self.about),
+            escape(&self.purpose),
             escape(&self.table())
         );
+        if !self.specimens.is_empty() {
+            let specimens: Vec<String> = self.specimens.iter().map(SpecimenPart::text).collect();
+            body += &format!(
+                "<h2>Specimens</h2>\n<pre>{}</pre>\n",
+                escape(&specimens.join("\n"))
+            );
+        }
         for part in &self.tasks {
             body += &format!(
                 "<h2>{}: {}</h2>\n<pre>{}</pre>\n{}\n",
@@ -331,8 +395,9 @@ mod tests {
     fn what_people_wrote_is_text_and_no_markup() {
         let page = Page {
             title: "a <b> & c".into(),
-            about: String::new(),
+            purpose: String::new(),
             runs: Vec::new(),
+            specimens: Vec::new(),
             tasks: Vec::new(),
         };
         assert!(page.html().contains("<h1>a &lt;b&gt; &amp; c</h1>"));

@@ -205,7 +205,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
     };
     let cases: &[(Vec<&str>, &str)] = &[
         (run(&["--depth", "200", "--out", "x"]), "beyond the travel"),
-        (run(&["--depth", "-3", "--out", "x"]), "above 0 mm"),
+        (run(&["--depth", "-3", "--out", "x"]), "give more than 0"),
         (
             run(&["--depth", "nan", "--out", "x"]),
             "not a finite number",
@@ -222,7 +222,7 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
             run(&["--speed", "0.76", "--out", "x"]),
             "the nearest are 0.7500 and 0.7800 mm/s",
         ),
-        (run(&["--hold", "-1", "--out", "x"]), "is not possible"),
+        (run(&["--hold", "-1", "--out", "x"]), "give 0 s or more"),
         (
             vec!["run", "ramp-hold", "--time-scale", "fast"],
             "is not a time scale",

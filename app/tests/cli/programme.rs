@@ -1,5 +1,6 @@
 //! Programmes and the calibration they measure, as a user meets them.
 
+use super::protocol::with_mine;
 use super::{json, palpate, stderr, stdout, succeeded};
 use std::fs;
 
@@ -116,4 +117,199 @@ fn weights_read_on_the_rig_become_a_document() {
     let shown = palpate(at, &["calibration", "show", "bench"]);
     succeeded(&shown);
     assert!(stdout(&shown).contains("840.0"), "{}", stdout(&shown));
+}
+
+const ASKING: &str = r#"palpate-programme = 1
+name = "asking"
+title = "Two tasks that ask"
+
+[[task]]
+name = "press"
+protocol = "mine.toml"
+specimen = 2
+
+[[task]]
+name = "press-again"
+protocol = "mine.toml"
+set = { depth = "DEPTH" }
+"#;
+
+#[test]
+fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_session() {
+    let folder = with_mine();
+    let at = folder.path();
+    let write = |name: &str, text: String| fs::write(at.join(name), text).unwrap();
+    write("asking.toml", ASKING.replace("DEPTH", "5 mm"));
+    let run = |more: &[&str]| {
+        let run = ["run", "asking.toml", "--out", "day", "--time-scale", "max"];
+        palpate(at, &[&run, more].concat())
+    };
+    // Every task with every word, and nothing has moved.
+    for (more, first) in [
+        (
+            &[][..],
+            "line 5: task 'press' asks for operator (who runs it), specimen.storage (how",
+        ),
+        (
+            &["--operator", "Ada"][..],
+            "line 5: task 'press' asks for specimen.storage (how",
+        ),
+    ] {
+        let refused = run(more);
+        assert_eq!(refused.status.code(), Some(2));
+        let told = stderr(&refused);
+        assert!(
+            told.contains(first) && told.contains("; line 10: task 'press-again' asks for"),
+            "{told}"
+        );
+        assert!(
+            told.contains("[about]") && told.trim_end().lines().count() == 1,
+            "{told}"
+        );
+        assert!(!at.join("day").exists(), "something ran");
+    }
+    let check = palpate(at, &["protocol", "check", "asking.toml"]);
+    succeeded(&check);
+    assert!(
+        stdout(&check).contains("asking.toml, line 5: warning: task 'press' asks for operator"),
+        "{}",
+        stdout(&check)
+    );
+
+    let about = "[about]\noperator = \"Ada\"\nspecimen.storage = \"saline\"\nspecimen.temperature_c = 21\n\n[[task]]";
+    write(
+        "asking.toml",
+        ASKING
+            .replace("DEPTH", "5 mm")
+            .replacen("[[task]]", about, 1),
+    );
+    let done = run(&[
+        "--specimen",
+        "<stomach>",
+        "--about",
+        "specimen.temperature_c=4",
+        "--json",
+    ]);
+    succeeded(&done);
+    let report = json(&done);
+    for i in 0..2 {
+        assert_eq!(report["runs"][i]["operator"], "Ada");
+        assert_eq!(report["runs"][i]["specimen"], "<stomach>, specimen 2");
+    }
+    for session in ["day/press/01", "day/press-again/01"] {
+        let session = palpate_sessions::log::Session::open(&at.join(session)).unwrap();
+        let (manifest, about) = (&session.manifest, &session.manifest.about);
+        assert_eq!(manifest.operator, "Ada");
+        assert_eq!(manifest.indenter, "blunt 12 mm probe");
+        assert_eq!(about.get("specimen.storage"), Some(&"saline".into()));
+        assert_eq!(about.get("specimen.temperature_c"), Some(&4.0.into()));
+    }
+    let page = fs::read_to_string(at.join("day/summary.html")).unwrap();
+    for words in [
+        "operator",
+        "&lt;stomach&gt;, specimen 2, with the blunt",
+        "specimen.storage: saline",
+    ] {
+        assert!(page.contains(words), "{words}: {page}");
+    }
+}
+
+#[test]
+fn check_looks_at_a_programme_whole() {
+    let folder = with_mine();
+    let at = folder.path();
+    let check = |text: String| {
+        fs::write(at.join("asking.toml"), text).unwrap();
+        palpate(at, &["protocol", "check", "asking.toml"])
+    };
+    let about = "[about]\noperator = \"Ada\"\nspecimen.storage = \"saline\"\n\n[[task]]";
+    let told = ASKING.replacen("[[task]]", about, 1);
+    let sound = check(told.replace("DEPTH", "5 mm"));
+    succeeded(&sound);
+    assert!(
+        stdout(&sound).contains("asking.toml: sound, about"),
+        "{}",
+        stdout(&sound)
+    );
+    let shown = palpate(at, &["protocol", "preview", "asking.toml"]);
+    assert_eq!(shown.status.code(), Some(2));
+    assert!(
+        stderr(&shown).contains("'palpate run asking.toml --preview'"),
+        "{}",
+        stderr(&shown)
+    );
+    // What a run would refuse, line by line.
+    for (text, words) in [
+        (
+            told.replace("DEPTH", "12 mm"),
+            "line 14: parameter 'depth': 12 mm is too large",
+        ),
+        (
+            told.replace("DEPTH", "5 mm")
+                .replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
+            "line 14: 'theirs.toml' is neither",
+        ),
+        (
+            told.replace("mine.toml", "ramp-hold")
+                .replace("DEPTH", "200 mm"),
+            "line 14: task 'press-again': step 5, ramp: a depth of 200 mm is beyond the travel",
+        ),
+        (
+            told.replace("DEPTH", "5 mm")
+                .replace("palpate-programme = 1\n", ""),
+            "palpate-programme",
+        ),
+    ] {
+        let refused = check(text);
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(
+            stdout(&refused).contains(words),
+            "{words}: {}",
+            stdout(&refused)
+        );
+        let run = palpate(at, &["run", "asking.toml", "--out", "day"]);
+        assert_eq!(run.status.code(), Some(2));
+        assert!(stderr(&run).contains(words), "{words}: {}", stderr(&run));
+    }
+    let deep = told
+        .replace("mine.toml", "ramp-hold")
+        .replace("DEPTH", "45 mm");
+    let warned = check(deep);
+    succeeded(&warned);
+    assert!(
+        stdout(&warned).contains("line 14: warning: task 'press-again': forces of")
+            && stdout(&warned).contains("acknowledge = true"),
+        "{}",
+        stdout(&warned)
+    );
+}
+
+#[test]
+fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let failed = [
+        "daily-check",
+        "--time-scale",
+        "max",
+        "--operator",
+        "Ada",
+        "--profile",
+        "ideal",
+        "--calibration",
+        "thesis",
+    ];
+    assert_eq!(palpate(at, &failed).status.code(), Some(1));
+    fs::write(at.join("two.toml"), TWO.replace("DEPTH", "10 mm")).unwrap();
+    let refused = palpate(
+        at,
+        &["run", "two.toml", "--out", "day", "--time-scale", "max"],
+    );
+    assert_eq!(refused.status.code(), Some(2));
+    let told = stderr(&refused);
+    assert!(
+        told.contains("line 6: task 'look'") && told.contains("failed its daily check today"),
+        "{told}"
+    );
+    assert!(!at.join("day").exists(), "something ran");
 }

@@ -31,7 +31,7 @@ steps = [
 ]
 "#;
 
-fn with_mine() -> tempfile::TempDir {
+pub fn with_mine() -> tempfile::TempDir {
     let folder = tempfile::tempdir().expect("a folder");
     std::fs::write(folder.path().join("mine.toml"), MINE).expect("a file that can be written");
     folder
@@ -219,5 +219,72 @@ fn the_pages_of_the_guide_are_those_of_the_protocols() {
     match check {
         Ok(output) => assert!(output.status.success(), "{}", stderr(&output)),
         Err(err) => println!("skipped: there is no python3 here ({err})"),
+    }
+}
+
+#[test]
+fn every_protocol_takes_its_settings_in_the_same_ways() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let total = |more: &[&str]| {
+        let seen = palpate(at, &[&["run"], more, &["--preview", "--json"]].concat());
+        succeeded(&seen);
+        json(&seen)["expected"].as_f64().unwrap()
+    };
+    let usual = total(&["ramp-hold"]);
+    let longer = total(&["ramp-hold", "--set", "hold=70 s"]);
+    assert!((longer - usual - 20.0).abs() < 1e-6, "{usual} {longer}");
+    assert_eq!(total(&["ramp-hold", "--hold", "70"]), longer);
+    // 15 mm less at 0.75 mm/s in and 6 mm/s out. --set goes with what is short for it, and every protocol with such a parameter takes both.
+    let both = total(&["ramp-hold", "--depth", "15", "--set", "hold=70 s"]);
+    assert!((both - longer + 22.5).abs() < 0.01, "{both} {longer}");
+    let cycles = total(&["preconditioning", "--set", "depth=15 mm"]);
+    assert_eq!(total(&["preconditioning", "--depth", "15"]), cycles);
+    for (more, words) in [
+        (
+            &["ramp-hold", "--hold", "5", "--set", "hold=6 s"][..],
+            "--hold is short for --set hold",
+        ),
+        (&["ramp-hold", "--set", "hold=5"], "5 has no unit"),
+        (
+            &["ramp-hold", "--hold-until", "tau"],
+            "'tau' does not say how well",
+        ),
+        (
+            &["load-cell-calibration", "--depth", "5"],
+            "has no parameter 'depth'",
+        ),
+        (&["--hold", "5"], "name a protocol"),
+    ] {
+        let refused = palpate(at, &[&["run"], more].concat());
+        assert_eq!(refused.status.code(), Some(2));
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+}
+
+#[test]
+fn a_limit_that_changes_nothing_is_told_where_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    for (force, is_told) in [("6 N", false), ("9 N", true), ("12 N", true)] {
+        let limited = MINE.replace(
+            "[procedure]",
+            &format!("[limits]\nforce_max = \"{force}\"\n\n[procedure]"),
+        );
+        std::fs::write(at.join("mine.toml"), limited).unwrap();
+        let check = palpate(at, &["protocol", "check", "mine.toml"]);
+        succeeded(&check);
+        let told = stdout(&check);
+        let words = format!("line 12: warning: force_max = {force}");
+        assert_eq!(told.contains(&words), is_told, "{told}");
+        assert_eq!(told.contains("the rig stops at 9 N"), is_told, "{told}");
+        let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
+        succeeded(&preview);
+        let said = stdout(&preview) + &stderr(&preview);
+        assert_eq!(
+            said.matches("changes nothing").count(),
+            usize::from(is_told),
+            "{said}"
+        );
     }
 }

@@ -330,3 +330,23 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let kept = fs::read_to_string(at.join("library/checks/sim.jsonl")).unwrap();
     assert_eq!(kept.lines().count(), 3);
 }
+
+#[test]
+fn a_jog_is_motion_and_has_no_cycles() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let jog = ["run", "free-jog", "--time-scale", "max", "--out", "jog"];
+    succeeded(&palpate(at, &jog));
+    let report = palpate(at, &["report", "jog", "--json"]);
+    succeeded(&report);
+    // 5 mm at 3 mm/s behind a self-test of half a second.
+    let motion = json(&report)["time_use"]["motion_s"].as_f64().unwrap();
+    assert!((motion - 5.0 / 3.0).abs() < 0.1, "{motion}");
+    let nothing = palpate(at, &["analyse", "jog"]);
+    assert_eq!(nothing.status.code(), Some(1));
+    let told = stderr(&nothing);
+    assert!(
+        told.contains("no cycles to analyse") && !told.contains("fit"),
+        "{told}"
+    );
+}

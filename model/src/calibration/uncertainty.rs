@@ -132,9 +132,10 @@ impl ForceUncertainty {
             return None;
         }
         let own = self.components.iter().filter(|one| one.term == term);
-        let square = own
-            .map(|one| self.between(&one.shifts, force.0).powi(2))
-            .sum::<f64>();
+        // A term without errors is 0; an empty sum would be -0.
+        let square = own.fold(0.0, |sum, one| {
+            sum + self.between(&one.shifts, force.0).powi(2)
+        });
         Some(Newtons(square.sqrt()))
     }
 

@@ -228,3 +228,26 @@ fn interpolation_is_bounded_by_the_weights_around() {
         }
     }
 }
+
+#[test]
+fn a_term_without_errors_is_zero_and_not_minus_zero() {
+    let mut sampled = Calibration::thesis();
+    let step = |step: WeightStep| SeriesStep {
+        mass_g: step.mass_g,
+        volts: step.volts,
+        noise: Some(Volts(1e-3)),
+        samples: Some(1000),
+        ..SeriesStep::default()
+    };
+    sampled.series = vec![Series {
+        direction: Direction::Loading,
+        repeat: 1,
+        steps: sampled.steps.drain(..).map(step).collect(),
+    }];
+    sampled.resolution = None;
+    let uncertainty = ForceUncertainty::of(&sampled).unwrap();
+    let digits = uncertainty
+        .term_sigma(Term::Resolution, Newtons(1.0))
+        .unwrap();
+    assert!(digits.0.to_bits() == 0, "{digits:?}");
+}

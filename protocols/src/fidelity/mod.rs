@@ -50,9 +50,9 @@ pub struct Achieved {
 /// What a session's time went to, in s.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct TimeUse {
-    /// Self-test, homing, tare, finding contact, moving by hand.
+    /// Self-test, homing, tare, finding contact.
     pub set_up_s: f64,
-    /// Ramps, unloading, sines, retracts.
+    /// Ramps, unloading, sines, retracts, jogs.
     pub motion_s: f64,
     /// At constant depth or force, and under a weight.
     pub hold_s: f64,
@@ -68,9 +68,10 @@ impl TimeUse {
             | Phase::Home
             | Phase::CheckHome
             | Phase::Tare
-            | Phase::Contact
-            | Phase::Jog => &mut self.set_up_s,
-            Phase::Ramp | Phase::Unload | Phase::Sine | Phase::Retract => &mut self.motion_s,
+            | Phase::Contact => &mut self.set_up_s,
+            Phase::Ramp | Phase::Unload | Phase::Sine | Phase::Retract | Phase::Jog => {
+                &mut self.motion_s
+            }
             Phase::Hold | Phase::Creep | Phase::Weigh => &mut self.hold_s,
             Phase::Rest | Phase::Prompt | Phase::Paused | Phase::Stopped | Phase::Ended => {
                 &mut self.waiting_s

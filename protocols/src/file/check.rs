@@ -58,6 +58,9 @@ pub fn check(
             }
         }
     }
+    if let Some(reason) = written.plan.limits.unused(limits) {
+        problems.push(Problem::warning(protocol.limits_line(), reason));
+    }
     problems.sort_by_key(|problem| problem.line);
     Checked {
         plan: Some((protocol, written, preview)),

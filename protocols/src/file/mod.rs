@@ -14,7 +14,7 @@ mod procedure;
 mod quantity;
 mod reference;
 mod scope;
-mod tree;
+pub(crate) mod tree;
 mod watch;
 mod words;
 
@@ -172,13 +172,25 @@ impl Protocol {
         (plan, lines)
     }
 
-    /// Whether everything it asks for was told; else what to tell.
-    pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
+    /// The line where its limits begin; 0 without any.
+    fn limits_line(&self) -> u32 {
+        self.limits.as_ref().map_or(0, |node| node.line)
+    }
+
+    /// What it asks for and was not told, in the order of [`KEYS`].
+    #[must_use]
+    pub fn open_questions(&self, labels: &Labels) -> Vec<&'static Key> {
         let is_open = |key: &&Key| {
             self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
         };
-        let open = KEYS.iter().filter(is_open);
+        KEYS.iter().filter(is_open).collect()
+    }
+
+    /// Whether everything it asks for was told; else what to tell.
+    pub fn check_labels(&self, labels: &Labels) -> Result<(), String> {
+        let open = self.open_questions(labels);
         let open: Vec<String> = open
+            .iter()
             .map(|key| format!("{} ({})", key.name, key.meaning))
             .collect();
         if open.is_empty() {

@@ -59,15 +59,18 @@ impl Parameter {
             Kind::Text | Kind::Flag => Err(given.is_not(self.kind)),
             kind => {
                 let number = given.number(kind)?;
-                let unit = kind.unit();
+                // A count has no unit.
+                let amount = |bound: f64| format!("{bound} {}", kind.unit()).trim_end().to_owned();
                 match (self.min, self.max) {
                     (Some(min), _) if number < min => Err(format!(
-                        "{} is too small; give {min} {unit} or more",
-                        given.text
+                        "{} is too small; give {} or more",
+                        given.text,
+                        amount(min)
                     )),
                     (_, Some(max)) if number > max => Err(format!(
-                        "{} is too large; give {max} {unit} or less",
-                        given.text
+                        "{} is too large; give {} or less",
+                        given.text,
+                        amount(max)
                     )),
                     _ => Ok(()),
                 }

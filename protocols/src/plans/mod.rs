@@ -95,6 +95,16 @@ impl PlanLimits {
         self.force_max.is_none()
     }
 
+    /// Why a limit stands here for nothing, if one does: it can only tighten what the rig allows.
+    #[must_use]
+    pub fn unused(&self, rig: &Limits) -> Option<String> {
+        let own = self.force_max.filter(|own| *own >= rig.force_max)?;
+        Some(format!(
+            "force_max = {own} in [limits] changes nothing, because the rig stops at {} in any case and a protocol's limits can only be tighter; give less, or leave it out",
+            rig.force_max
+        ))
+    }
+
     /// The rig's limits, made tighter where this plan asks for it.
     #[must_use]
     pub fn tighten(&self, mut limits: Limits) -> Limits {

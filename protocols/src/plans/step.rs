@@ -332,6 +332,30 @@ impl Step {
         )
     }
 
+    /// Whether the step may move the probe towards the tissue, where it can touch. Homing and leaving cannot.
+    #[must_use]
+    pub fn may_touch(&self) -> bool {
+        match self {
+            Self::Jog { distance_mm, .. } => *distance_mm > 0.0,
+            Self::FindContact(_)
+            | Self::FindBase(_)
+            | Self::Ramp { .. }
+            | Self::LoadTo(_)
+            | Self::HoldForce(_)
+            | Self::Sine(_) => true,
+            Self::SelfTest { .. }
+            | Self::Home { .. }
+            | Self::CheckHome { .. }
+            | Self::Tare { .. }
+            | Self::Hold { .. }
+            | Self::Rest { .. }
+            | Self::Prompt(_)
+            | Self::Weigh(_)
+            | Self::Unload { .. }
+            | Self::Retract { .. } => false,
+        }
+    }
+
     /// Whether the step moves the probe by a known position, which needs a homed axis.
     #[must_use]
     pub fn needs_homed_axis(&self) -> bool {

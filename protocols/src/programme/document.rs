@@ -1,10 +1,13 @@
 //! The file of a programme.
 
-use crate::file::{Protocol, built_in};
+use super::told::Told;
+use crate::file::{Problem, Protocol, built_in};
 use crate::plans::{OnTimeout, Plan, Prompt, Step};
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
+use palpate_sessions::Labels;
 use serde::Deserialize;
+use serde::de::IgnoredAny;
 use std::collections::BTreeMap;
 use thiserror::Error;
 use toml::{Spanned, Value};
@@ -26,15 +29,16 @@ pub struct Programme {
     /// In a few words.
     pub title: String,
     /// What it is for.
-    pub about: String,
-    /// Who runs it, unless told otherwise.
-    pub operator: String,
+    pub purpose: String,
+    /// What holds for every session where nothing else is told.
+    pub usual: Labels,
     /// Whether what previews ask to acknowledge is acknowledged; it is recorded in every session.
     pub is_acknowledged: bool,
     /// Settings of the simulated rig that differ from the usual ones.
     pub simulated: BTreeMap<String, String>,
     /// The tasks.
     pub tasks: Vec<Task>,
+    pub(super) told: Told,
 }
 
 /// One protocol of a programme.
@@ -57,7 +61,7 @@ pub struct Task {
     /// Which task's model its sessions are compared with.
     pub validates: Option<Validates>,
     /// Line of the file it begins on.
-    pub line: usize,
+    pub line: u32,
 }
 
 /// A prediction to be compared.
@@ -67,10 +71,10 @@ pub struct Validates {
     pub task: String,
 }
 
-/// A programme that is none; prints as one sentence a problem.
+/// A programme that cannot be carried out, with every reason; prints as a sentence for each.
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[error("{}", .0.join("\n"))]
-pub struct ProgrammeError(pub Vec<String>);
+#[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("\n"))]
+pub struct ProgrammeError(pub Vec<Problem>);
 
 #[derive(Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -80,9 +84,14 @@ struct Text {
     name: String,
     title: String,
     #[serde(default)]
-    about: String,
+    purpose: String,
     #[serde(default)]
     operator: String,
+    // These two are read with their lines by `Told`.
+    #[serde(default, rename = "about")]
+    _about: IgnoredAny,
+    #[serde(default, rename = "specimen")]
+    _specimen: IgnoredAny,
     #[serde(default)]
     acknowledge: bool,
     #[serde(default)]
@@ -116,8 +125,11 @@ impl Programme {
     /// Whether a text is meant as a programme rather than a protocol.
     #[must_use]
     pub fn is_meant(text: &str) -> bool {
-        text.lines()
-            .any(|line| line.trim_start().starts_with("palpate-programme"))
+        let is_own = |line: &str| {
+            let line = line.trim_start();
+            line.starts_with("palpate-programme") || line.starts_with("[[task]]")
+        };
+        text.lines().any(is_own)
     }
 
     /// Reads a programme. `other` gives the text of a protocol that is not built in, by the name the programme calls
@@ -128,23 +140,26 @@ impl Programme {
     ) -> Result<Self, ProgrammeError> {
         let whole: Text = toml::from_str(text).map_err(|err| {
             let line = err.span().map_or(1, |span| line_of(text, span.start));
-            ProgrammeError(vec![format!("line {line}: {}", err.message())])
+            ProgrammeError(vec![Problem::error(
+                line,
+                err.message().replace('\n', ", "),
+            )])
         })?;
         let mut problems = Vec::new();
         if whole.language != LANGUAGE {
-            problems.push(format!(
+            problems.push(Problem::error(0, format!(
                 "this is written in version {} of the language and this palpate reads {LANGUAGE}; use a newer palpate",
                 whole.language
-            ));
+            )));
         }
         if !is_plain(&whole.name) {
-            problems.push(format!(
+            problems.push(Problem::error(0, format!(
                 "a programme cannot be called '{}'; use letters, digits and hyphens, since its folder is called so",
                 whole.name
-            ));
+            )));
         }
         if whole.task.is_empty() {
-            problems.push("a programme needs at least one [[task]]".into());
+            problems.push(Problem::error(0, "a programme needs at least one [[task]]"));
         }
         let mut tasks: Vec<Task> = Vec::new();
         for task in whole.task {
@@ -152,24 +167,36 @@ impl Programme {
             match read_task(task.into_inner(), line, &tasks, other) {
                 Ok(task) => tasks.push(task),
                 Err(own) => {
-                    problems.extend(
-                        own.into_iter()
-                            .map(|problem| format!("line {line}: {problem}")),
-                    );
+                    let own = own.into_iter();
+                    problems.extend(own.map(|message| Problem::error(line, message)));
                 }
             }
         }
+        let told = Told::read(text, &whole.operator, &mut problems);
+        // Tasks with mistakes are not there to be counted.
+        if problems.is_empty() {
+            let is_used = |number| tasks.iter().any(|task| task.specimen == Some(number));
+            let unused = told.specimens().filter(|(number, _)| !is_used(*number));
+            problems.extend(unused.map(|(number, line)| {
+                let message = format!(
+                    "[specimen.{number}] tells of a specimen that no task clips in; add specimen = {number} to the task that does, or take it out"
+                );
+                Problem::error(line, message)
+            }));
+        }
+        problems.sort_by_key(|problem| problem.line);
         if !problems.is_empty() {
             return Err(ProgrammeError(problems));
         }
         Ok(Self {
             name: whole.name,
             title: whole.title,
-            about: whole.about,
-            operator: whole.operator,
+            purpose: whole.purpose,
+            usual: Labels::default(),
             is_acknowledged: whole.acknowledge,
             simulated: texts(whole.simulated),
             tasks,
+            told,
         })
     }
 
@@ -215,7 +242,7 @@ impl Task {
 
 fn read_task(
     text: TaskText,
-    line: usize,
+    line: u32,
     before: &[Task],
     other: &dyn Fn(&str) -> Result<String, String>,
 ) -> Result<Task, Vec<String>> {
@@ -314,6 +341,7 @@ fn as_text(value: &Value) -> String {
     }
 }
 
-fn line_of(text: &str, at: usize) -> usize {
-    1 + text[..at.min(text.len())].matches('\n').count()
+fn line_of(text: &str, at: usize) -> u32 {
+    let before = text[..at.min(text.len())].matches('\n').count();
+    u32::try_from(before + 1).unwrap_or(u32::MAX)
 }

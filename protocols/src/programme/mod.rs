@@ -3,10 +3,13 @@
 
 mod calibrating;
 mod document;
+mod foreseen;
 mod progress;
 mod run;
+mod told;
 
 pub use calibrating::{CalibratingError, calibration_of};
 pub use document::{Programme, ProgrammeError, Task, Validates};
+pub use foreseen::{Foreseen, ForeseenTask, foresee};
 pub use progress::{Entry, Place, Progress, ProgressError};
 pub use run::{Done, Event, Laboratory, RunError, run};

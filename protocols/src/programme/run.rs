@@ -7,13 +7,13 @@ use crate::engine::{EndingKind, PLAN_COMPLETE};
 use crate::plans::Plan;
 use crate::preview::preview;
 use crate::runner::{
-    AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, StartError, wall_now,
+    AfterStop, Answers, Request, RunRequest, RunView, Runner, StartError, wall_now,
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
-use palpate_sessions::{About, AboutError, HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session};
+use palpate_sessions::{HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session};
 use std::path::{Path, PathBuf};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
@@ -38,8 +38,6 @@ pub struct Laboratory<'a> {
     pub folder: &'a Path,
     /// Who answers prompts.
     pub answers: Answers,
-    /// With which probe.
-    pub indenter: String,
     /// What must be acknowledged before a plan is run, such as a daily check that failed; or why that cannot be told.
     pub gate: &'a dyn Fn(&Plan) -> Result<Vec<String>, String>,
 }
@@ -212,8 +210,8 @@ impl Work<'_> {
             calibration: self.laboratory.calibration.clone(),
             limits: self.laboratory.limits,
             out: Some(folder.clone()),
-            labels: self
-                .labels(&place, specimen)
+            labels: programme
+                .labels(place.task, place.repeat)
                 .map_err(|err| refused(err.to_string()))?,
             is_acknowledged: programme.is_acknowledged,
             to_acknowledge,
@@ -272,26 +270,6 @@ impl Work<'_> {
         }
         (self.tell)(Event::Finished(&place, &folder));
         self.calibrate(place.task, &folder)
-    }
-
-    /// Who and what a run is about, with its place in the programme.
-    fn labels(&self, place: &Place, specimen: Option<u64>) -> Result<Labels, AboutError> {
-        let task = &self.programme.tasks[place.task];
-        let mut labels = Labels {
-            operator: self.programme.operator.clone(),
-            specimen: specimen.map_or(String::new(), |number| format!("specimen {number}")),
-            indenter: self.laboratory.indenter.clone(),
-            about: About::default(),
-        };
-        let series = format!("{}/{}", self.programme.name, task.name);
-        labels.tell("series.id", &series)?;
-        // The simulated rig counts its own specimen as 0.
-        if let Some(number) = specimen.filter(|number| *number > 0) {
-            labels.tell("series.specimen", &number.to_string())?;
-        }
-        labels.tell("series.repeat", &place.repeat.to_string())?;
-        labels.tell("series.repeats", &task.repeats.to_string())?;
-        Ok(labels)
     }
 
     /// Waits until the run in a folder has ended and its log is closed.

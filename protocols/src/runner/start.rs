@@ -149,6 +149,7 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         plan: json("plan", serde_json::to_value(&request.plan))?,
         settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
         acknowledgements,
+        recovered: None,
     };
     let pace = if bench.is_virtual {
         Pace::Virtual

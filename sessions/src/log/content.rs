@@ -43,6 +43,10 @@ pub(crate) struct Content<'v> {
     pub refusal: Option<Refusal>,
     pub entries: Vec<Entry>,
     pub end: Option<EndRecord>,
+    /// Whether what is missing is counted instead of refused.
+    allows_gaps: bool,
+    /// Messages with entries that are missing.
+    pub lost_entries: u64,
 }
 
 impl<'v> Content<'v> {
@@ -68,7 +72,14 @@ impl<'v> Content<'v> {
             refusal: None,
             entries: Vec::new(),
             end: None,
+            allows_gaps: false,
+            lost_entries: 0,
         }
+    }
+
+    /// Counts what is missing instead of refusing it. Blocks still come in order, each once.
+    pub fn allow_gaps(&mut self) {
+        self.allows_gaps = true;
     }
 
     /// Goes on with another file: everything counted goes on, its channels are named anew.
@@ -147,19 +158,26 @@ impl<'v> Content<'v> {
         let next = &mut self.sequences[channel as usize];
         let expected = next.unwrap_or(sequence);
         let is_bookkeeping = matches!(channel, Channel::Manifest | Channel::Rewrite);
-        let is_again = sequence < expected && (self.is_rewrite || is_bookkeeping);
+        let may_repeat = self.is_rewrite || is_bookkeeping || self.allows_gaps;
+        let is_again = sequence < expected && may_repeat;
         if is_again && !is_bookkeeping {
             // It was read, and verified, where it was first written.
             return Ok(());
         }
-        if sequence != expected && !is_again {
+        if sequence > expected && self.allows_gaps {
+            let is_entry = matches!(channel, Channel::Input | Channel::Decision | Channel::Fit);
+            self.lost_entries += u64::from(sequence - expected) * u64::from(is_entry);
+            if matches!(channel, Channel::Daq | Channel::Derived) {
+                self.has_raw &= channel == Channel::Derived;
+            }
+        } else if sequence != expected && !is_again {
             return Err(format!(
                 "message {expected} of {} is missing",
                 channel.topic()
             ));
         }
         if !is_again {
-            *next = Some(expected.wrapping_add(1));
+            *next = Some(sequence.wrapping_add(1));
         }
         if self.end.is_some() && !is_bookkeeping {
             return Err("something was recorded after the end".into());
@@ -224,14 +242,16 @@ impl<'v> Content<'v> {
     }
 
     fn take_raw(&mut self, data: &[u8]) -> Result<(), String> {
-        if self.has_raw {
+        if self.has_raw && !self.allows_gaps {
             return Err("a block of raw samples has no derived ones".into());
         }
         self.block.take_raw(data)?;
         let raw = self.block.first_sample();
         let first = *self.first_sample.get_or_insert(raw);
         let expected = first.saturating_add(self.samples);
-        if raw != expected {
+        if raw > expected && self.allows_gaps {
+            self.samples = raw - first;
+        } else if raw != expected {
             return Err(format!(
                 "sample {expected} is missing: the next block begins with sample {raw}"
             ));
@@ -242,6 +262,9 @@ impl<'v> Content<'v> {
 
     fn take_derived(&mut self, data: &[u8]) -> Result<(), String> {
         if !std::mem::take(&mut self.has_raw) {
+            if self.allows_gaps {
+                return Ok(());
+            }
             return Err("a block of derived samples has no raw ones".into());
         }
         self.block.take_derived(data)?;

@@ -1,14 +1,14 @@
 //! The session log: an append-only writer, its thread, and a strict reader.
 
-mod content;
-mod frames;
+pub(crate) mod content;
+pub(crate) mod frames;
 pub mod reader;
 mod segment;
 pub mod sink;
-mod source;
+pub(crate) mod source;
 mod summary;
 pub mod thread;
-mod walk;
+pub(crate) mod walk;
 pub mod writer;
 
 pub use reader::{Outline, ReadError, Session};

@@ -52,7 +52,7 @@ pub enum ReadError {
     },
     /// The session is not as it was written.
     #[error(
-        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or recover the part before the damage", path.display()
+        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or keep what is whole with palpate recover", path.display()
     )]
     Damaged {
         /// The log.
@@ -89,13 +89,6 @@ pub struct Session {
     pub notes: Vec<String>,
 }
 
-/// What to do about damage.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum OnDamage {
-    Refuse,
-    StopBefore,
-}
-
 /// A recorded session without its samples.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Outline {
@@ -119,24 +112,9 @@ impl Session {
     /// A log that was never ended opens with everything in its whole chunks; one that is damaged
     /// anywhere else is refused.
     pub fn open(path: &Path) -> Result<Self, ReadError> {
-        Self::collect(path, OnDamage::Refuse)
-    }
-
-    /// Opens what stands before the first damage, with a note that says where it is.
-    pub fn recover(path: &Path) -> Result<Self, ReadError> {
-        Self::collect(path, OnDamage::StopBefore)
-    }
-
-    /// Goes through the samples of a session block by block, so that no more than one block is in
-    /// memory. Nothing of it counts before this has returned without an error.
-    pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
-        Reader::new(path, OnDamage::Refuse, visit)?.read()
-    }
-
-    fn collect(path: &Path, policy: OnDamage) -> Result<Self, ReadError> {
         let mut rows = Vec::new();
         let mut visit = |block: &Block| rows.extend(block.rows());
-        let outline = Reader::new(path, policy, &mut visit)?.read()?;
+        let outline = Self::scan(path, &mut visit)?;
         Ok(Self {
             path: outline.path,
             manifest: outline.manifest,
@@ -147,6 +125,12 @@ impl Session {
         })
     }
 
+    /// Goes through the samples of a session block by block, so that no more than one block is in
+    /// memory. Nothing of it counts before this has returned without an error.
+    pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
+        Reader::new(path, visit)?.read()
+    }
+
     /// Session time of the newest sample or entry.
     #[must_use]
     pub fn last_time(&self) -> Nanos {
@@ -155,6 +139,10 @@ impl Session {
         row.max(entry).unwrap_or(Nanos::ZERO)
     }
 }
+
+/// With more missing segments than that, what is behind them is not looked at: a name alone must not
+/// ask for endless work.
+const MISSING_MAX: usize = 1000;
 
 /// The files to read.
 pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
@@ -186,14 +174,11 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
             add(&spare).map_err(failed)?;
         }
     }
-    let whole = (0..).zip(found.keys()).take_while(|(i, n)| i == *n).count();
-    // With a gap, the first missing file is listed too: it will be looked for and not found.
-    let count = if whole < found.len() {
-        whole + 1
-    } else {
-        whole
-    };
-    Ok((0..count.max(1) as u32)
+    // A missing one is listed too: it will be looked for and not found.
+    let last = found.last_key_value().map_or(0, |(number, _)| *number);
+    let many = last as usize > found.len() + MISSING_MAX;
+    let last = if many { found.len() as u32 } else { last };
+    Ok((0..=last)
         .map(|number| {
             let own = || path.join(segment_file(number));
             found.remove(&number).unwrap_or_else(own)
@@ -222,7 +207,6 @@ struct Damage {
 struct Reader<'v> {
     files: Vec<PathBuf>,
     is_folder: bool,
-    policy: OnDamage,
     chunks: ChunkReader,
     content: Content<'v>,
     /// Session time of the newest sample.
@@ -237,11 +221,7 @@ struct Reader<'v> {
 }
 
 impl<'v> Reader<'v> {
-    fn new(
-        path: &Path,
-        policy: OnDamage,
-        visit: &'v mut dyn FnMut(&Block),
-    ) -> Result<Self, ReadError> {
+    fn new(path: &Path, visit: &'v mut dyn FnMut(&Block)) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let is_folder = path.is_dir();
         let first = &files[0];
@@ -258,7 +238,6 @@ impl<'v> Reader<'v> {
         Ok(Self {
             files,
             is_folder,
-            policy,
             chunks,
             content: Content::new(!is_folder, visit),
             last_sample: Nanos::ZERO,
@@ -294,34 +273,10 @@ impl<'v> Reader<'v> {
             is_damaged.then(|| self.broken_off.swap_remove(0))
         });
         let path = files[0].clone();
-        let mut end = self.content.end.take();
-        if let Some(Damage {
-            path,
-            offset,
-            reason,
-            ..
-        }) = damage
-        {
-            if self.policy == OnDamage::Refuse || self.content.manifest.is_none() {
-                return Err(ReadError::Damaged {
-                    path,
-                    offset,
-                    reason,
-                });
-            }
-            end = None;
-            let place = if files.len() > 1 {
-                format!("byte {offset} of {}", name_of(&path))
-            } else {
-                format!("byte {offset}")
-            };
-            self.notes.insert(
-                0,
-                format!(
-                    "the recording is damaged at {place} ({reason}); everything after that place was left out"
-                ),
-            );
+        if let Some(damage) = damage {
+            return Err(damaged(&damage.path, damage.offset, &damage.reason));
         }
+        let end = self.content.end.take();
         self.outline(path, end)
     }
 
@@ -343,6 +298,15 @@ impl<'v> Reader<'v> {
         let mut notes = self.notes;
         if let Some(imported) = &manifest.imported {
             notes.extend(imported.notes());
+        }
+        if let Some(recovered) = &manifest.recovered {
+            let lost = recovered.missing.sentences();
+            let lost = if lost.is_empty() {
+                "nothing is missing".into()
+            } else {
+                lost.join("; ")
+            };
+            notes.push(format!("recovered from {}: {lost}", recovered.from));
         }
         // Only a segment that others follow is finished without an end.
         let goes_on = !self.is_folder && self.is_finished && end.is_none();
@@ -478,7 +442,7 @@ pub(crate) fn damaged(path: &Path, offset: u64, reason: &str) -> ReadError {
     }
 }
 
-fn name_of(path: &Path) -> String {
+pub(crate) fn name_of(path: &Path) -> String {
     path.file_name()
         .unwrap_or(path.as_os_str())
         .to_string_lossy()

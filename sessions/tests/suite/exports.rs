@@ -84,7 +84,7 @@ fn parquet_holds_the_same_with_units() {
     assert_eq!(units, expected);
     assert_eq!(value("palpate.session"), session.manifest.session_id);
     assert_eq!(value("palpate.software"), "0.1.0");
-    assert_eq!(value("palpate.record_version"), "1");
+    assert_eq!(value("palpate.record_version"), "2");
 
     let frame = reader.finish().unwrap();
     let column = |name: &str| frame.column(name).unwrap().clone();

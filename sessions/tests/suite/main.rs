@@ -13,9 +13,12 @@ mod foreign_damage;
 #[cfg(test)]
 mod pace;
 #[cfg(test)]
+mod recovery;
+#[cfg(test)]
 mod round_trip;
 #[cfg(test)]
 mod segments;
 #[cfg(test)]
 mod support;
+#[cfg(test)]
 mod written_again;

@@ -2,6 +2,7 @@
 
 use crate::support::{MemorySink, end, entries, manifest, rows, same_bits};
 use palpate_model::Nanos;
+use palpate_sessions::recover::{Salvage, salvage};
 use palpate_sessions::{
     Entry, FolderSegments, LogError, LogWriter, Pace, ReadError, Row, SegmentSource, Session,
     SessionWriter, Sink, segment_file,
@@ -151,6 +152,12 @@ fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
     (folder, rows, entries)
 }
 
+fn salvaged(folder: &Path) -> (Salvage, Vec<Row>) {
+    let mut rows = Vec::new();
+    let left = salvage(folder, &mut |block| rows.extend(block.rows())).unwrap();
+    (left, rows)
+}
+
 fn cut(path: &Path, length: usize) {
     let bytes = fs::read(path).unwrap();
     fs::write(path, &bytes[..length]).unwrap();
@@ -180,7 +187,8 @@ fn a_session_in_segments_comes_back_bit_for_bit() {
         assert_eq!(session.notes, Vec::<String>::new());
         let ending = session.end.clone().unwrap();
         assert_eq!((ending.samples, ending.entries), (3000, 99));
-        assert_eq!(Session::recover(folder.path()).unwrap(), session);
+        let left = salvage(folder.path(), &mut |_| {}).unwrap();
+        assert_eq!((left.samples, left.missing.sentences()), (3000, Vec::new()));
         // Thirty batches, four to a segment; each a valid file with a bounded index. With the wall
         // clock entries end batches early.
         let present = |number: &u32| folder.path().join(segment_file(*number)).exists();
@@ -310,9 +318,15 @@ fn a_missing_segment_is_refused_and_can_be_recovered_from() {
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
     assert!(refusal.to_string().contains("001.mcap"), "{refusal}");
-    let session = Session::recover(folder.path()).unwrap();
-    assert!(same_bits(&session.rows, &rows[..2 * BATCH]));
-    assert!(session.end.is_none() && session.notes[0].contains("001.mcap"));
+    // What came before and after it can be kept; what is between is told.
+    let (left, kept) = salvaged(folder.path());
+    assert!(same_bits(&kept[..2 * BATCH], &rows[..2 * BATCH]));
+    assert!(same_bits(&kept[2 * BATCH..], &rows[4 * BATCH..]));
+    let told = left.missing.sentences().join("; ");
+    assert!(
+        told.contains("001.mcap") && told.contains("80 samples between"),
+        "{told}"
+    );
     // Another segment does not pass for it, nor for the first one.
     fs::rename(
         folder.path().join("002.mcap"),
@@ -345,9 +359,14 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     cut(&middle, data);
     let refusal = Session::open(folder.path()).unwrap_err();
     assert!(matches!(refusal, ReadError::Damaged { .. }), "{refusal}");
-    let recovered = Session::recover(folder.path()).unwrap();
-    assert!(same_bits(&recovered.rows, &rows[..recovered.rows.len()]));
-    assert!(recovered.rows.len() < 4 * BATCH && recovered.end.is_none());
+    let (left, kept) = salvaged(folder.path());
+    let gap = &left.missing.gaps[0];
+    let (before, after) = (
+        gap.after_sample as usize,
+        (gap.after_sample + gap.samples) as usize,
+    );
+    assert!(same_bits(&kept[..before], &rows[..before]));
+    assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
 }
 
 #[test]

@@ -84,6 +84,7 @@ pub fn manifest() -> Manifest {
         plan: serde_json::json!({"kind": "ramp-and-hold", "depth_mm": 30.0}),
         settings: serde_json::json!(null),
         acknowledgements: vec!["depth beyond the calibrated force".into()],
+        recovered: None,
     }
 }
 

@@ -4,7 +4,7 @@ mod text;
 
 use super::output::Output;
 use super::rig::{OpenRig, RigArgs};
-use super::{Failure, new_file};
+use super::{Failure, new_file, programme};
 use crate::report::plan_picture;
 use clap::{Args, Subcommand};
 use palpate_protocols::file::{
@@ -23,7 +23,7 @@ use std::path::{Path, PathBuf};
 pub enum ProtocolCommand {
     /// Name the built-in protocols
     List(ListArgs),
-    /// Find every mistake in protocol files, each with its line
+    /// Find every mistake in files of protocols and programmes, each with its line
     Check(CheckArgs),
     /// Print a protocol's file, to read or to copy
     Show(ShowArgs),
@@ -44,7 +44,7 @@ pub struct ListArgs {
 /// Arguments of `palpate protocol check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
-    /// Protocol files, or names of built-in protocols
+    /// Protocol files, programme files, or names of built-in protocols
     #[arg(required = true, value_name = "NAME|FILE")]
     files: Vec<String>,
     #[command(flatten)]
@@ -135,6 +135,16 @@ pub(super) fn text_of(name: &str) -> Result<String, Failure> {
     }
 }
 
+/// The same, unless it is a programme.
+fn protocol_text(name: &str) -> Result<String, Failure> {
+    if programme::is_one(name) {
+        return Err(Failure::usage(format!(
+            "{name} is a programme, not a protocol; 'palpate run {name} --preview' tells what it will do"
+        )));
+    }
+    text_of(name)
+}
+
 /// A protocol written out for a rig, or its first error in a sentence; warnings become notes.
 pub(super) fn sound(
     name: &str,
@@ -142,7 +152,7 @@ pub(super) fn sound(
     bench: &OpenRig,
     output: &Output,
 ) -> Result<(Protocol, palpate_protocols::file::Written, Preview), Failure> {
-    let text = text_of(name)?;
+    let text = protocol_text(name)?;
     let Checked { plan, problems } = check_on(&text, values, bench)?;
     let errors: Vec<&Problem> = problems
         .iter()
@@ -158,7 +168,12 @@ pub(super) fn sound(
         };
         return Err(Failure::usage(format!("{name}, {first}{more}")));
     }
+    let notes = plan.as_ref().map(|(_, _, preview)| &preview.notes);
     for problem in &problems {
+        // The preview tells it too, to those who look at it.
+        if notes.is_some_and(|notes| notes.contains(&problem.message)) {
+            continue;
+        }
         output.note(&format!("{name}, {problem}"));
     }
     plan.ok_or_else(|| Failure::failed(format!("{name} could not be written out")))
@@ -215,13 +230,14 @@ fn read(name: &str, text: &str) -> Result<Protocol, Failure> {
     Protocol::read(text).map_err(|problems| Failure::usage(text::sentences(name, &problems)))
 }
 
+/// What was found in one file of a protocol or a programme.
 #[derive(Serialize)]
-struct FileReport {
-    file: String,
+pub(super) struct FileReport {
+    pub(super) file: String,
     /// Name in the file; none if it cannot be read.
-    name: Option<String>,
-    problems: Vec<Problem>,
-    expected_s: Option<f64>,
+    pub(super) name: Option<String>,
+    pub(super) problems: Vec<Problem>,
+    pub(super) expected_s: Option<f64>,
 }
 
 pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
@@ -232,6 +248,12 @@ pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure
     let mut files = Vec::new();
     let mut wrong = 0;
     for file in &args.files {
+        if programme::is_one(file) {
+            let report = programme::check(file, &bench)?;
+            wrong += usize::from(report.problems.iter().any(Problem::is_error));
+            files.push(report);
+            continue;
+        }
         let text = text_of(file)?;
         let checked = check(
             &text,
@@ -261,10 +283,10 @@ pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure
     match wrong {
         0 => Ok(()),
         1 => Err(Failure::usage(
-            "one protocol cannot run as it is; correct what is listed",
+            "one file cannot run as it is; correct what is listed",
         )),
         _ => Err(Failure::usage(format!(
-            "{wrong} protocols cannot run as they are; correct what is listed"
+            "{wrong} files cannot run as they are; correct what is listed"
         ))),
     }
 }
@@ -283,7 +305,7 @@ pub(super) fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
         output.result(&object, || file.trim_end().to_owned());
         return Ok(());
     }
-    let protocol = read(&args.protocol, &file)?;
+    let protocol = read(&args.protocol, &protocol_text(&args.protocol)?)?;
     let written = protocol
         .write_out(&values)
         .map_err(|problems| Failure::usage(text::sentences(&args.protocol, &problems)))?;

@@ -84,6 +84,7 @@ pub fn keep(part: &ForeignPart, kept: Kept<'_>) -> Result<(), KeepError> {
         about: kept.labels.about,
         signal: None,
         imported: Some(part.imported.clone()),
+        recovered: None,
         rig: None,
         limits: None,
         calibration: Value::Null,

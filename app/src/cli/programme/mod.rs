@@ -1,0 +1,210 @@
+//! `palpate run FILE` for a programme: every task on one rig, a journal to continue from, a page of what it told.
+
+mod before;
+
+pub(super) use before::check;
+
+use super::Failure;
+use super::output::Output;
+use super::run::HowArgs;
+use crate::report::programme::Page;
+use before::{Ahead, ask, contents, look_ahead, parse, refusal, refuse, tell, with_settings};
+use palpate_protocols::file::Problem;
+use palpate_protocols::plans::Plan;
+use palpate_protocols::programme::{
+    Done, Event, Laboratory, Programme, RunError, run as carry_out,
+};
+use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
+use palpate_sessions::text::{checksum, read};
+use palpate_sessions::{library_folder, new_programme_folder};
+use serde::Serialize;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::sync_channel;
+
+/// Name of the page in the programme's folder.
+const PAGE_FILE: &str = "summary.html";
+
+/// Name of the calibration in force at the end.
+const CALIBRATION_FILE: &str = "calibration.json";
+
+/// Whether a name is the file of a programme.
+pub(super) fn is_one(name: &str) -> bool {
+    read(Path::new(name)).is_ok_and(|text| Programme::is_meant(&text))
+}
+
+#[derive(Serialize)]
+struct Report<'a> {
+    command: &'static str,
+    programme: &'a str,
+    folder: PathBuf,
+    was_continued: bool,
+    page: PathBuf,
+    calibration: Option<PathBuf>,
+    #[serde(flatten)]
+    told: &'a Page,
+}
+
+pub(super) fn run(
+    file: &Path,
+    how: &HowArgs,
+    values: &BTreeMap<String, String>,
+    output: &Output,
+) -> Result<(), Failure> {
+    if !values.is_empty() {
+        return Err(Failure::usage(
+            "a programme sets its values itself; change them in its file",
+        ));
+    }
+    let text = read(file).map_err(Failure::usage)?;
+    let mut programme = parse(file, &text).map_err(|err| refusal(file, &err))?;
+    programme.is_acknowledged |= how.acknowledge;
+    tell(&mut programme, how)?;
+    let rig_args = with_settings(&how.rig, &programme.simulated)?;
+    let bench = super::rig::open(&rig_args)?;
+    let planned = look_ahead(&programme, &bench)?.map_err(|err| refusal(file, &err))?;
+    for note in &planned.notes {
+        output.note(&format!("{}, {note}", file.display()));
+    }
+    if let Some(first) = planned.to_acknowledge.first() {
+        return Err(refuse(file, first));
+    }
+    if how.preview {
+        let report = Ahead::of(&programme, &planned);
+        output.result(&report, || contents(&programme, &report));
+        return Ok(());
+    }
+    ask(file, &programme)?;
+    let description = bench.rig.description().clone();
+    let is_virtual = bench.rig.is_virtual();
+    let gate = |plan: &Plan| {
+        let gate = super::run::gate_of(plan, &description.name, is_virtual)?;
+        match gate.to_acknowledge() {
+            // What the file accepts are forces, not a rig that failed.
+            reasons if how.acknowledge => Ok(reasons),
+            reasons => match reasons.first() {
+                Some(reason) => Err(format!(
+                    "{reason}; or add --acknowledge to run all the same, which is recorded"
+                )),
+                None => Ok(reasons),
+            },
+        }
+    };
+    for task in &programme.tasks {
+        if let Some(plan) = task.plan(1, None) {
+            gate(&plan).map_err(|reason| {
+                let message = format!("task '{}': {reason}", task.name);
+                refuse(file, &Problem::error(task.line, message))
+            })?;
+        }
+    }
+    let folder = match &how.out {
+        Some(folder) => folder.clone(),
+        None => {
+            let library = library_folder().map_err(Failure::usage)?;
+            new_programme_folder(&library, &programme.name, wall_now().into())
+        }
+    };
+    bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let answers = if is_virtual {
+        Answers::Confirm
+    } else {
+        Answers::Operator
+    };
+    let (wake, woken) = sync_channel(1);
+    let runner = Runner::start(bench.rig, rig_args.time_scale, None, move || {
+        // A full channel already says what this would say.
+        let _ = wake.try_send(());
+    })
+    .map_err(Failure::failed)?;
+    super::run::stop_on_signals(&runner)?;
+    let laboratory = Laboratory {
+        runner: &runner,
+        woken: &woken,
+        rig: &description,
+        limits: bench.limits,
+        calibration: bench.calibration,
+        folder: &folder,
+        answers,
+        gate: &gate,
+    };
+    let done = watch(&programme, &checksum(&text), laboratory, output)?;
+    drop(runner);
+    leave(&programme, &folder, &done, output)
+}
+
+/// Carries the programme out with a line of progress.
+fn watch(
+    programme: &Programme,
+    crc32: &str,
+    laboratory: Laboratory<'_>,
+    output: &Output,
+) -> Result<Done, Failure> {
+    let bar = output.bar(1000);
+    let mut so_far = String::new();
+    let result = carry_out(programme, crc32, laboratory, &mut |event| match event {
+        Event::Begun { place, count } => {
+            let task = &programme.tasks[place.task].name;
+            so_far = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
+            bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
+        }
+        Event::Running(view, left) => bar.set_message(format!("{so_far}  {}", going(view, left.0))),
+        Event::Finished(..) | Event::Calibrated(_) => {}
+    });
+    bar.finish_and_clear();
+    result.map_err(|err| match err {
+        RunError::Folder(_) | RunError::Progress(_) | RunError::Refused { .. } => {
+            Failure::usage(err)
+        }
+        err => Failure::failed(err),
+    })
+}
+
+fn going(view: &RunView, left: f64) -> String {
+    let left = left.round() as u64;
+    format!(
+        "{}  {}:{:02}:{:02} of session time left",
+        view.phase,
+        left / 3600,
+        left / 60 % 60,
+        left % 60
+    )
+}
+
+/// Writes the page and the calibration and tells where they are.
+fn leave(
+    programme: &Programme,
+    folder: &Path,
+    done: &Done,
+    output: &Output,
+) -> Result<(), Failure> {
+    let bar = output.count_bar(programme.tasks.len() as u64);
+    let page = Page::of(programme, folder, &done.progress, &mut |task| {
+        bar.inc(1);
+        bar.set_message(task.to_owned());
+    });
+    bar.finish_and_clear();
+    let path = folder.join(PAGE_FILE);
+    palpate_sessions::text::write(&path, &page.html()).map_err(Failure::failed)?;
+    let has_calibrated = programme.tasks.iter().any(|task| task.calibrates);
+    let calibration = has_calibrated.then(|| folder.join(CALIBRATION_FILE));
+    if let Some(path) = &calibration {
+        let text = serde_json::to_string_pretty(&done.calibration).map_err(Failure::failed)?;
+        palpate_sessions::text::write(path, &text).map_err(Failure::failed)?;
+    }
+    let report = Report {
+        command: "run",
+        programme: &programme.name,
+        folder: folder.to_path_buf(),
+        was_continued: done.was_continued,
+        page: path.clone(),
+        calibration: calibration.clone(),
+        told: &page,
+    };
+    output.result(&report, || {
+        let mut lines = vec![page.table(), format!("page: {}", path.display())];
+        lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
+        lines.join("\n")
+    });
+    Ok(())
+}

@@ -1,0 +1,103 @@
+//! What a programme will do, task by task, before anything moves.
+
+use super::document::{Programme, ProgrammeError};
+use crate::file::Problem;
+use crate::preview::preview;
+use palpate_model::calibration::Curve;
+use palpate_model::rig::{Limits, RigDescription};
+use palpate_model::units::{Newtons, Seconds};
+
+/// One task as it is expected to go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ForeseenTask {
+    /// Its name.
+    pub task: String,
+    /// Expected duration of all its repeats.
+    pub expected: Seconds,
+    /// Longest duration of all its repeats.
+    pub longest: Seconds,
+    /// Lowest and highest peak force expected over specimens.
+    pub force_band: [Newtons; 2],
+}
+
+/// A programme as it is expected to go.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Foreseen {
+    /// Every task.
+    pub tasks: Vec<ForeseenTask>,
+    /// What to look at before the start: nothing that forbids it.
+    pub notes: Vec<Problem>,
+    /// What must be acknowledged and is not yet.
+    pub to_acknowledge: Vec<Problem>,
+}
+
+impl Foreseen {
+    /// Expected duration of everything.
+    #[must_use]
+    pub fn expected(&self) -> Seconds {
+        Seconds(self.tasks.iter().map(|task| task.expected.0).sum())
+    }
+}
+
+/// Previews every task on a rig; every reason why one cannot run, with its line.
+pub fn foresee(
+    programme: &Programme,
+    rig: &RigDescription,
+    limits: &Limits,
+    curve: &Curve,
+) -> Result<Foreseen, ProgrammeError> {
+    let mut refusals = Vec::new();
+    let (mut notes, mut to_acknowledge) = (Vec::new(), Vec::new());
+    let mut tasks = Vec::new();
+    for task in &programme.tasks {
+        let told = |reason: &String| format!("task '{}': {reason}", task.name);
+        let mut ahead = ForeseenTask {
+            task: task.name.clone(),
+            expected: Seconds(0.0),
+            longest: Seconds(0.0),
+            force_band: [Newtons(0.0); 2],
+        };
+        let mut count = |repeat: u32, times: u32| {
+            // The protocol was written out with these values when the programme was read.
+            let Some(plan) = task.plan(repeat, None) else {
+                return;
+            };
+            let own = preview(&plan, rig, limits, curve, false);
+            let refused = own.refusals.iter().map(told);
+            let refused = refused.map(|reason| Problem::error(task.line, reason));
+            refusals.extend(refused);
+            let warned = |reason| Problem::warning(task.line, told(reason));
+            notes.extend(plan.limits.unused(limits).iter().map(warned));
+            if !programme.is_acknowledged {
+                to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
+                    let message = format!(
+                        "{}; write acknowledge = true into the file, or add --acknowledge",
+                        told(reason)
+                    );
+                    Problem::warning(task.line, message)
+                }));
+            }
+            ahead.expected.0 += own.expected.0 * f64::from(times);
+            ahead.longest.0 += own.longest.0 * f64::from(times);
+            ahead.force_band = own.force_band;
+        };
+        // Every repeat but the first is the same.
+        count(1, 1);
+        if task.repeats > 1 {
+            count(2, task.repeats - 1);
+        }
+        tasks.push(ahead);
+    }
+    for list in [&mut refusals, &mut notes, &mut to_acknowledge] {
+        list.dedup();
+    }
+    if refusals.is_empty() {
+        Ok(Foreseen {
+            tasks,
+            notes,
+            to_acknowledge,
+        })
+    } else {
+        Err(ProgrammeError(refusals))
+    }
+}

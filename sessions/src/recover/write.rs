@@ -1,0 +1,208 @@
+//! Writes what is left of a session as a session of its own, beside the original.
+
+use super::{Missing, Salvage, salvage};
+use crate::folder::{FolderError, SessionFolder};
+use crate::log::{FileSink, LogError, LogWriter, ReadError};
+use crate::manifest::Manifest;
+use crate::record::{Block, EndRecord, Entry, Row};
+use chrono::{DateTime, Utc};
+use palpate_model::Nanos;
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// What a recovered session says of the one it comes from.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Recovered {
+    /// Name of the session it was recovered from.
+    pub from: String,
+    /// When.
+    pub at: DateTime<Utc>,
+    /// The program that did it.
+    pub software_version: String,
+    /// What is not in it.
+    pub missing: Missing,
+}
+
+/// A session was not recovered.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum RecoverError {
+    /// Nothing of it can be used.
+    #[error(transparent)]
+    Read(#[from] ReadError),
+    /// It lacks nothing.
+    #[error("{} is whole; there is nothing to recover", path.display())]
+    Whole {
+        /// The session.
+        path: PathBuf,
+    },
+    /// It is being written.
+    #[error("{} is being recorded; wait for the run to end", path.display())]
+    InUse {
+        /// The session.
+        path: PathBuf,
+    },
+    /// It was done before.
+    #[error("{} was recovered before, into {}; use that", path.display(), folder.display())]
+    Before {
+        /// The session.
+        path: PathBuf,
+        /// What was recovered.
+        folder: PathBuf,
+    },
+    /// The new folder cannot be had.
+    #[error(transparent)]
+    Folder(#[from] FolderError),
+    /// The new session cannot be written.
+    #[error(transparent)]
+    Write(#[from] LogError),
+}
+
+/// A recovered session and what is missing of it.
+#[derive(Clone, Debug)]
+pub struct Recovery {
+    /// Its folder.
+    pub folder: PathBuf,
+    /// Its name.
+    pub session_id: String,
+    /// What is in it and what is not.
+    pub salvage: Salvage,
+}
+
+/// Where a session is recovered to: beside it, with its name and an ending.
+#[must_use]
+pub fn recovered_folder(path: &Path) -> PathBuf {
+    // A file stands for the folder it is in.
+    let folder = if path.is_file() {
+        path.parent().unwrap_or(path)
+    } else {
+        path
+    };
+    let name = folder.file_name().unwrap_or_default().to_string_lossy();
+    folder.with_file_name(format!("{name}.recovered"))
+}
+
+/// Whether a session's folder is locked by whoever records it. The lock is only looked at.
+pub(super) fn is_in_use(path: &Path) -> bool {
+    let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
+    lock.is_ok_and(|file| {
+        matches!(
+            file.try_lock_shared(),
+            Err(std::fs::TryLockError::WouldBlock)
+        )
+    })
+}
+
+/// Recovers an interrupted or damaged session into a folder beside it. The original is only read.
+///
+/// Samples are numbered anew without gaps; their times are the recorded ones, and the manifest
+/// says what is missing between them.
+pub fn recover(
+    path: &Path,
+    software_version: &str,
+    at: DateTime<Utc>,
+) -> Result<Recovery, RecoverError> {
+    if is_in_use(path) {
+        return Err(RecoverError::InUse { path: path.into() });
+    }
+    let folder = recovered_folder(path);
+    // A finished one is not made anew; an unfinished one is what a crash left of another attempt.
+    if crate::log::Summary::read(&folder).is_ok_and(|summary| summary.end.is_some()) {
+        return Err(RecoverError::Before {
+            path: path.into(),
+            folder,
+        });
+    }
+    let left = salvage(path, &mut |_| {})?;
+    if !left.missing.is_lossy() && !left.missing.is_end_lost {
+        return Err(RecoverError::Whole { path: path.into() });
+    }
+    let unfinished = folder.with_extension("recovering");
+    clear(&unfinished)?;
+    let session_id = format!("{}-recovered", left.manifest.session_id);
+    let manifest = Manifest {
+        session_id: session_id.clone(),
+        recovered: Some(Recovered {
+            from: left.manifest.session_id.clone(),
+            at,
+            software_version: software_version.into(),
+            missing: left.missing.clone(),
+        }),
+        ..left.manifest.clone()
+    };
+    {
+        let held = SessionFolder::create(&unfinished)?;
+        let log_path = held.log_path();
+        let shown = log_path.display().to_string();
+        let sink = FileSink::create(&log_path).map_err(|err| LogError::disk(&err, &shown))?;
+        let mut log = LogWriter::begin(sink, &shown, &manifest)?;
+        copy(path, &left, &mut log)?;
+    }
+    // Either all of it is there, or nothing is.
+    std::fs::rename(&unfinished, &folder).map_err(|source| FolderError::Io {
+        path: folder.clone(),
+        source,
+    })?;
+    Ok(Recovery {
+        folder,
+        session_id,
+        salvage: left,
+    })
+}
+
+/// Takes away what an attempt that died left behind. It holds nothing that the original does not.
+fn clear(folder: &Path) -> Result<(), RecoverError> {
+    if folder.exists() {
+        std::fs::remove_dir_all(folder).map_err(|source| FolderError::Io {
+            path: folder.into(),
+            source,
+        })?;
+    }
+    Ok(())
+}
+
+fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<(), RecoverError> {
+    let mut pending = left.entries.iter().peekable();
+    let mut outcome = Ok(());
+    let (mut kept, mut last) = (0u64, Nanos::ZERO);
+    let mut visit = |block: &Block| {
+        if outcome.is_err() {
+            return;
+        }
+        let rows: Vec<Row> = block.rows().collect();
+        let end = block.first_sample() + rows.len() as u64;
+        let mut entries = Vec::new();
+        while let Some(entry) = pending.next_if(|entry| entry.after_sample < end) {
+            // Between the samples that are left it comes where it came.
+            let seen = entry.after_sample.saturating_sub(block.first_sample());
+            entries.push(Entry {
+                after_sample: kept + seen,
+                ..entry.clone()
+            });
+        }
+        kept += rows.len() as u64;
+        last = block.last_time().unwrap_or(last);
+        outcome = log.append(&rows, &entries);
+    };
+    salvage(path, &mut visit)?;
+    outcome?;
+    let rest: Vec<Entry> = pending
+        .map(|entry| Entry {
+            after_sample: kept,
+            ..entry.clone()
+        })
+        .collect();
+    log.append(&[], &rest)?;
+    let ended_at = rest.last().map_or(last, |entry| entry.now.max(last));
+    let end = left.end.clone().unwrap_or(EndRecord {
+        outcome: "interrupted".into(),
+        reason: "the recording was interrupted; this is what was left of it".into(),
+        samples: 0,
+        entries: 0,
+        ended_at,
+        time_use: Vec::new(),
+    });
+    log.finish(end)?;
+    Ok(())
+}

@@ -1,0 +1,192 @@
+//! Sessions that broke off or were damaged, recovered beside the original.
+
+use crate::support::{Random, end, entries, log_bytes, manifest, rows, same_bits};
+use chrono::{TimeZone, Utc};
+use palpate_model::Nanos;
+use palpate_sessions::recover::{
+    Health, RecoverError, examine, examine_library, recover, recovered_folder,
+};
+use palpate_sessions::{LOG_FILE, Pace, Session, SessionFolder, SessionWriter};
+use std::collections::BTreeMap;
+use std::fs;
+use std::path::Path;
+
+fn at() -> chrono::DateTime<Utc> {
+    Utc.with_ymd_and_hms(2026, 3, 6, 9, 0, 0).unwrap()
+}
+
+/// Every file below a folder with its bytes.
+fn contents(folder: &Path) -> BTreeMap<std::path::PathBuf, Vec<u8>> {
+    let files = fs::read_dir(folder)
+        .unwrap()
+        .map(|item| item.unwrap().path());
+    files
+        .map(|path| (path.clone(), fs::read(path).unwrap()))
+        .collect()
+}
+
+/// A session folder in a library, with bytes as its log.
+fn session_with(library: &Path, name: &str, bytes: &[u8]) -> std::path::PathBuf {
+    let folder = library.join("sessions").join(name);
+    fs::create_dir_all(&folder).unwrap();
+    fs::write(folder.join(LOG_FILE), bytes).unwrap();
+    folder
+}
+
+#[test]
+fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
+    let library = tempfile::tempdir().unwrap();
+    let rows = rows(2000, 71);
+    let entries = entries(&rows, 60);
+    let whole = log_bytes(&rows, &entries, None);
+    let folder = session_with(library.path(), "a", &whole[..whole.len() - 77]);
+    session_with(
+        library.path(),
+        "b",
+        &log_bytes(&rows, &entries, Some(end(Nanos::ZERO))),
+    );
+    let before = contents(&folder);
+    assert_eq!(
+        examine_library(library.path()).unwrap(),
+        std::slice::from_ref(&folder)
+    );
+
+    let recovery = recover(&folder, "1.2.3", at()).unwrap();
+    assert_eq!(contents(&folder), before, "the original was touched");
+    assert_eq!(recovery.folder, recovered_folder(&folder));
+    let session = Session::open(&recovery.folder).unwrap();
+    let original = Session::open(&folder).unwrap();
+    assert!(same_bits(&session.rows, &original.rows));
+    assert_eq!(session.entries, original.entries);
+    assert_eq!(session.end.as_ref().unwrap().outcome, "interrupted");
+    assert!(
+        session.notes[0].contains("recovered from")
+            && session.notes[0].contains("the end is missing"),
+        "{:?}",
+        session.notes
+    );
+    let mut told = session.manifest.clone();
+    let recovered = told.recovered.take().unwrap();
+    assert_eq!(recovered.from, manifest().session_id);
+    assert_eq!(
+        (recovered.at, recovered.software_version.as_str()),
+        (at(), "1.2.3")
+    );
+    told.session_id = manifest().session_id;
+    assert_eq!(told, manifest());
+    // Found no more, and not made twice.
+    assert_eq!(
+        examine_library(library.path()).unwrap(),
+        Vec::<std::path::PathBuf>::new()
+    );
+    assert!(matches!(
+        recover(&folder, "1.2.3", at()),
+        Err(RecoverError::Before { .. })
+    ));
+}
+
+#[test]
+fn entries_stay_between_the_samples_they_came_between() {
+    let rows = rows(3000, 72);
+    let entries = entries(&rows, 40);
+    let mut random = Random(72);
+    for case in 0..60 {
+        let library = tempfile::tempdir().unwrap();
+        let mut bytes = log_bytes(&rows, &entries, Some(end(Nanos::from_millis(3000))));
+        for _ in 0..1 + case % 4 {
+            let place = random.below(bytes.len());
+            bytes[place] ^= 1 << random.below(8);
+        }
+        let folder = session_with(library.path(), "a", &bytes);
+        let Ok(recovery) = recover(&folder, "1.2.3", at()) else {
+            continue;
+        };
+        let session = Session::open(&recovery.folder).unwrap();
+        // Samples are known by their time, which differs between any two.
+        let number =
+            |row: &palpate_sessions::Row| rows.iter().position(|one| one.host == row.host).unwrap();
+        let numbers: Vec<usize> = session.rows.iter().map(number).collect();
+        assert!(numbers.is_sorted());
+        for (row, number) in session.rows.iter().zip(&numbers) {
+            assert!(same_bits(&[*row], &[rows[*number]]));
+        }
+        for entry in &session.entries {
+            let old = entries.iter().find(|one| one.order == entry.order).unwrap();
+            assert_eq!(old.body, entry.body);
+            let before = numbers
+                .iter()
+                .filter(|n| (**n as u64) < old.after_sample)
+                .count();
+            assert_eq!(
+                entry.after_sample, before as u64,
+                "case {case}, entry {}",
+                entry.order
+            );
+        }
+    }
+}
+
+#[test]
+fn the_doctor_says_what_each_file_is() {
+    let library = tempfile::tempdir().unwrap();
+    let rows = rows(1500, 73);
+    let ending = || Some(end(Nanos::from_millis(1500)));
+    let whole = log_bytes(&rows, &[], ending());
+    let open = log_bytes(&rows, &[], None);
+    let mut hurt = whole.clone();
+    let middle = hurt.len() / 2;
+    hurt[middle] ^= 4;
+    let health = |name: &str, bytes: &[u8]| examine(&session_with(library.path(), name, bytes));
+
+    let patient = health("whole", &whole);
+    assert_eq!((patient.health, patient.samples), (Health::Healthy, 1500));
+    let patient = health("open", &open);
+    assert_eq!(
+        (patient.health, patient.samples),
+        (Health::Interrupted, 1500)
+    );
+    assert!(
+        patient.findings[0].contains("interrupted at 1.5 s"),
+        "{:?}",
+        patient.findings
+    );
+    let patient = health("hurt", &hurt);
+    let Health::Damaged { missing } = &patient.health else {
+        panic!("{patient:?}")
+    };
+    assert_eq!(missing.gaps[0].samples + patient.samples, 1500);
+    assert!(
+        patient
+            .findings
+            .iter()
+            .any(|one| one.contains("000.mcap is damaged at byte"))
+    );
+    assert_eq!(
+        health("foreign", b"PK\x03\x04 a spreadsheet").health,
+        Health::Foreign
+    );
+    assert_eq!(health("empty", b"").health, Health::Foreign);
+    assert_eq!(health("begun", &whole[..60]).health, Health::Lost);
+    assert_eq!(
+        examine(&library.path().join("nothing")).health,
+        Health::Foreign
+    );
+
+    // Somebody records it: it is left alone.
+    let path = library.path().join("sessions/live");
+    let held = SessionFolder::create(&path).unwrap();
+    let mut writer = SessionWriter::start(held, None, &manifest(), Pace::Virtual).unwrap();
+    rows.iter().for_each(|row| writer.push_row(*row).unwrap());
+    assert_eq!(examine(&path).health, Health::BeingRecorded);
+    assert!(matches!(
+        recover(&path, "1", at()),
+        Err(RecoverError::InUse { .. })
+    ));
+    assert!(!examine_library(library.path()).unwrap().contains(&path));
+    writer.close(end(Nanos::from_millis(1500))).unwrap();
+    assert_eq!(examine(&path).health, Health::Healthy);
+    assert!(matches!(
+        recover(&path, "1", at()),
+        Err(RecoverError::Whole { .. })
+    ));
+}
