@@ -5,7 +5,7 @@ use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 use palpate_sessions::edits::EditError;
-use palpate_sessions::import::{ColumnNames, TableError, read_table};
+use palpate_sessions::import::{ColumnNames, Table, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
 use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
@@ -112,6 +112,14 @@ pub enum SourceError {
     /// The table cannot be read.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// The session was made from another program's file.
+    #[error(
+        "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report; 'palpate info' tells what it holds"
+    )]
+    Imported {
+        /// The file it was made from.
+        file: String,
+    },
     /// The session ended before there was anything to fit.
     #[error(
         "the session has no ramp and hold with known force and depth, so there is nothing to fit"
@@ -192,6 +200,9 @@ pub fn read_stretch(
         });
     }
     let session = edited.session;
+    if session.manifest.imported.is_some() {
+        return Ok(source_of_imported(session, stretch));
+    }
     let samples = samples_of(&session, stretch)?;
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
@@ -211,6 +222,38 @@ pub fn read_stretch(
         notes,
         calibration,
     })
+}
+
+/// What a fit takes of an imported session: as of a table, for nobody knows the noise of its forces.
+fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
+    let table = table_of_imported(&session);
+    let specimen = session.manifest.specimen.trim();
+    FitSource {
+        samples: samples_of_table(&table, stretch),
+        start: Seconds(0.0),
+        specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
+        notes: session.notes,
+        calibration: None,
+    }
+}
+
+/// The samples of an imported session, its time from the first one.
+pub(crate) fn table_of_imported(session: &Session) -> Table {
+    let mut table = Table::default();
+    for row in &session.rows {
+        let is_taken = matches!(
+            row.phase,
+            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
+        );
+        let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else {
+            continue;
+        };
+        table.t.push(session.manifest.time_of(row.tick as i64).0);
+        table.depth.push(depth);
+        table.force.push(force);
+        table.is_unload.push(row.phase == Phase::Unload);
+    }
+    table
 }
 
 /// The calibration in a session's manifest.
@@ -238,7 +281,7 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
     let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
-    let tick_secs = session.manifest.rig.tick().0;
+    let tick_secs = session.manifest.tick().0;
     let trusted = trusted_samples(&decisions);
     let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
@@ -285,7 +328,7 @@ fn is_fitted(row: &Row, stretch: Stretch) -> bool {
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
 pub(crate) fn is_saturated(session: &Session, row: &Row) -> bool {
-    let ends = session.manifest.rig.adc;
+    let ends = session.manifest.rig.as_ref().and_then(|rig| rig.adc);
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
@@ -332,7 +375,7 @@ pub(crate) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
 }
 
 /// A table knows nothing of its noise: every sample counts alike.
-fn samples_of_table(table: &palpate_sessions::import::Table, stretch: Stretch) -> Vec<FitSample> {
+fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
     (0..table.t.len())
         .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])
         .map(|i| FitSample {
@@ -361,7 +404,7 @@ mod tests {
         let options = FitOptions::default();
         let whole = fit(&samples_of(&session, Stretch::RampHold).unwrap(), &options).unwrap();
         assert_eq!(whole.censored, 0);
-        let adc = session.manifest.rig.adc.unwrap();
+        let adc = session.manifest.rig.as_ref().unwrap().adc.unwrap();
         let hold = session
             .rows
             .iter_mut()

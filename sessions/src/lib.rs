@@ -19,6 +19,7 @@ pub mod edits;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod imported;
 pub mod journal;
 mod lock;
 pub mod log;
@@ -42,6 +43,7 @@ pub use folder::{
     spare_folder,
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
+pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
     BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace,
     ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,

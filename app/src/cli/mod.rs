@@ -8,6 +8,7 @@ mod doctor;
 mod export;
 mod extremes;
 mod fit;
+mod import;
 mod info;
 mod last_fit;
 mod new_file;
@@ -74,6 +75,8 @@ enum Command {
     Recover(doctor::RecoverArgs),
     /// Find how far a rig gives way, from a session of stiff-surface
     Compliance(compliance::ComplianceArgs),
+    /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
+    Import(Box<import::ImportArgs>),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Tell what a session contains
@@ -174,6 +177,7 @@ pub fn main() -> ExitCode {
         Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
         Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
         Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
+        Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
@@ -213,7 +217,10 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } | SourceError::Correction(_) => {
+        SourceError::Table(_)
+        | SourceError::Rejected { .. }
+        | SourceError::Correction(_)
+        | SourceError::Imported { .. } => {
             Failure::usage(err)
         }
         SourceError::Edits(_)

@@ -6,6 +6,7 @@ pub mod calibration_plot;
 pub mod cycles;
 pub mod extremes;
 pub mod family;
+pub(crate) mod imported;
 pub mod picture;
 pub mod plan_picture;
 pub mod programme;

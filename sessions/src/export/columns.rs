@@ -25,21 +25,24 @@ pub struct Beside {
 }
 
 /// The samples as a frame: `t_s` is controller time since the first sample in true seconds, depth
-/// is null before contact is known, force before tare, counts on a rig without a converter.
+/// is null before contact is known, force before tare, counts on a rig without a converter,
+/// signal and pulses in an imported session.
 pub(super) fn frame(session: &Session, beside: &Beside) -> PolarsResult<DataFrame> {
     let rows = &session.rows;
     let first_tick = rows.first().map_or(0, |row| row.tick);
-    let tick_secs = session.manifest.rig.tick().0;
     // A controller that restarted counts from zero again: its time is negative, not a failure.
     let t: Vec<f64> = rows
         .iter()
-        .map(|row| row.tick.wrapping_sub(first_tick) as i64 as f64 * tick_secs)
+        .map(|row| {
+            let ticks = row.tick.wrapping_sub(first_tick) as i64;
+            session.manifest.time_of(ticks).0
+        })
         .collect();
     let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
     let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();
-    let signal: Vec<f64> = rows.iter().map(|row| row.volts).collect();
+    let signal: Vec<Option<f64>> = rows.iter().map(|row| row.volts).collect();
     let counts: Vec<Option<i32>> = rows.iter().map(|row| row.counts).collect();
-    let pulses: Vec<i64> = rows.iter().map(|row| row.pulses).collect();
+    let pulses: Vec<Option<i64>> = rows.iter().map(|row| row.pulses).collect();
     let phase: Vec<&str> = rows.iter().map(|row| row.phase.name()).collect();
     let cycle: Vec<u32> = rows.iter().map(|row| row.cycle).collect();
     let [

@@ -309,6 +309,9 @@ impl<'v> Reader<'v> {
             .seconds()
             .0;
         let mut notes = self.notes;
+        if let Some(imported) = &manifest.imported {
+            notes.extend(imported.notes());
+        }
         if let Some(recovered) = &manifest.recovered {
             let lost = recovered.missing.sentences();
             let lost = if lost.is_empty() {

@@ -10,12 +10,12 @@ use std::process::Command;
 fn session() -> Session {
     let mut rows = rows(3000, 41);
     rows[5].counts = None;
-    rows[6].volts = 1e-300;
+    rows[6].volts = Some(1e-300);
     open_bytes(&log_bytes(&rows, &[], Some(end(Nanos::ZERO)))).unwrap()
 }
 
 fn time_of(session: &Session, i: usize) -> f64 {
-    (session.rows[i].tick - session.rows[0].tick) as f64 * session.manifest.rig.tick().0
+    (session.rows[i].tick - session.rows[0].tick) as f64 * session.manifest.tick().0
 }
 
 #[test]
@@ -37,9 +37,9 @@ fn csv_holds_every_digit_and_reads_back() {
         assert_eq!(number(cells[0]), Some(time_of(&session, i)));
         assert_eq!(number(cells[1]), row.depth);
         assert_eq!(number(cells[2]), row.force);
-        assert_eq!(number(cells[3]), Some(row.volts));
+        assert_eq!(number(cells[3]), row.volts);
         assert_eq!(number(cells[4]), row.counts.map(f64::from));
-        assert_eq!(cells[5], row.pulses.to_string());
+        assert_eq!(cells[5], row.pulses.unwrap().to_string());
         assert_eq!(cells[6], row.phase.name());
         assert_eq!(cells[7], row.cycle.to_string());
     }
@@ -85,7 +85,7 @@ fn parquet_holds_the_same_with_units() {
     assert_eq!(units, expected);
     assert_eq!(value("palpate.session"), session.manifest.session_id);
     assert_eq!(value("palpate.software"), "0.1.0");
-    assert_eq!(value("palpate.record_version"), "1");
+    assert_eq!(value("palpate.record_version"), "2");
 
     let frame = reader.finish().unwrap();
     let column = |name: &str| frame.column(name).unwrap().clone();
@@ -103,7 +103,7 @@ fn parquet_holds_the_same_with_units() {
         assert_eq!(t.f64().unwrap().get(i), Some(time_of(&session, i)));
         assert_eq!(depth.f64().unwrap().get(i), row.depth);
         assert_eq!(force.f64().unwrap().get(i), row.force);
-        assert_eq!(signal.f64().unwrap().get(i), Some(row.volts));
+        assert_eq!(signal.f64().unwrap().get(i), row.volts);
         assert_eq!(counts.i32().unwrap().get(i), row.counts);
         assert_eq!(phase.str().unwrap().get(i), Some(row.phase.name()));
     }
