@@ -215,7 +215,7 @@ pub fn read_stretch(
     }
     let specimen = session.manifest.specimen.trim();
     Ok(FitSource {
-        rig: Some(session.manifest.rig.name),
+        rig: session.manifest.rig.map(|rig| rig.name),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
         samples,
         start,
@@ -229,6 +229,7 @@ fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
     let table = table_of_imported(&session);
     let specimen = session.manifest.specimen.trim();
     FitSource {
+        rig: None,
         samples: samples_of_table(&table, stretch),
         start: Seconds(0.0),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),

@@ -60,7 +60,10 @@ pub fn measured(
     let seating = seating.unwrap_or(Newtons(SEATED_SHARE * highest));
     let manifest = &session.manifest;
     Ok(RigCompliance {
-        rig: manifest.rig.name.clone(),
+        rig: manifest
+            .rig
+            .as_ref()
+            .map_or_else(String::new, |rig| rig.name.clone()),
         taken_at: manifest.started_at_text(),
         operator: manifest.operator.clone(),
         session_id: manifest.session_id.clone(),

@@ -120,7 +120,7 @@ fn source(session: &Session) -> FitSource {
         start: Seconds(0.0),
         notes: Vec::new(),
         specimen: None,
-        rig: Some(session.manifest.rig.name.clone()),
+        rig: session.manifest.rig.as_ref().map(|rig| rig.name.clone()),
         calibration: None,
     }
 }

@@ -79,7 +79,8 @@ fn beside(args: &ExportArgs, session: &Session) -> Result<(Option<String>, Besid
         return Ok((None, Beside::default()));
     };
     let corrections = compliance::corrections(Some(name))?;
-    let kept = corrections.of_rig(Some(&session.manifest.rig.name));
+    let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
+    let kept = corrections.of_rig(rig);
     let kept = kept.map_err(|err| super::source_failure(err.into()))?;
     let Some((kept, _)) = kept else {
         return Ok((None, Beside::default()));

@@ -220,9 +220,7 @@ fn source_failure(err: SourceError) -> Failure {
         SourceError::Table(_)
         | SourceError::Rejected { .. }
         | SourceError::Correction(_)
-        | SourceError::Imported { .. } => {
-            Failure::usage(err)
-        }
+        | SourceError::Imported { .. } => Failure::usage(err),
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

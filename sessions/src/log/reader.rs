@@ -132,8 +132,8 @@ impl Session {
         let mut hasher = crc32fast::Hasher::new();
         for row in &self.rows {
             hasher.update(&row.tick.to_le_bytes());
-            hasher.update(&row.volts.to_le_bytes());
-            hasher.update(&row.pulses.to_le_bytes());
+            hasher.update(&row.volts.unwrap_or(f64::NAN).to_le_bytes());
+            hasher.update(&row.pulses.unwrap_or(i64::MIN).to_le_bytes());
         }
         hasher.finalize()
     }
