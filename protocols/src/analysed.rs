@@ -8,7 +8,7 @@ use crate::edited::{self, Edited};
 use crate::engine::{ENGINE_VERSION, Effect, Record};
 use crate::runner::wall_now;
 use palpate_model::calibration::Calibration;
-use palpate_model::units::Volts;
+use palpate_model::units::{Seconds, Volts};
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };
@@ -98,7 +98,7 @@ impl Opened {
         let times: Vec<f64> = session
             .rows
             .iter()
-            .map(|row| seconds_since(session, &first, row))
+            .map(|row| time_between(session, &first, row).0)
             .collect();
         for (row, at) in session.rows.iter_mut().zip(times) {
             let is_in = |[from, to]: &[f64; 2]| (*from..=*to).contains(&at);
@@ -112,7 +112,9 @@ impl Opened {
     pub fn inputs(&self, path: &Path, based_on: Option<&str>) -> Result<Vec<Input>, AnalysisError> {
         let mut inputs = inputs_of(path)?;
         let calibration = &self.edited.session.manifest.calibration;
-        inputs.push(document_input("calibration", calibration));
+        if !calibration.is_null() {
+            inputs.push(document_input("calibration", calibration));
+        }
         if let Some(name) = based_on {
             let record = serde_json::to_value(self.analyses.get(name)?).unwrap_or_default();
             inputs.push(document_input(&format!("analysis {name}"), &record));
@@ -127,9 +129,12 @@ fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
     }
 }
 
-/// Controller time in s from one sample to another.
-pub(crate) fn seconds_since(session: &Session, first: &Row, row: &Row) -> f64 {
-    row.tick.saturating_sub(first.tick) as f64 * session.manifest.rig.tick().0
+/// Controller time from one sample to a later one.
+pub(crate) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds {
+    let ticks = row.tick.saturating_sub(first.tick);
+    session
+        .manifest
+        .time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
 
 /// Makes every force of a session anew from its raw signal with a calibration, which takes the place of its
@@ -151,10 +156,10 @@ pub fn recalibrate(
         while let Some((_, volts)) = tares.next_if(|(after, _)| *after <= index as u64) {
             tare = Some(volts);
         }
-        let Some(force) = &mut row.force else {
+        let (Some(force), Some(volts)) = (&mut row.force, row.volts) else {
             continue;
         };
-        let anew = curve.newtons_above(Volts(row.volts), tare).0;
+        let anew = curve.newtons_above(Volts(volts), tare).0;
         change.samples += 1;
         squares += (anew - *force).powi(2);
         change.max_n = change.max_n.max((anew - *force).abs());
@@ -175,6 +180,11 @@ pub fn recalibration(
     calibration: &Calibration,
 ) -> Result<(Opened, Vec<Input>, Analysed, ForceChange), SourceError> {
     let mut opened = open(path, None)?;
+    if let Some(imported) = &opened.edited.session.manifest.imported {
+        return Err(SourceError::NoSignal {
+            file: imported.file.clone(),
+        });
+    }
     // That the session's own can be read tells that its forces came from one.
     calibration_of(&opened.edited.session)?;
     let change = recalibrate(&mut opened.edited.session, calibration)?;

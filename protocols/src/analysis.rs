@@ -1,18 +1,19 @@
 //! From what is on disk to what a fit takes: sessions and foreign tables alike.
 
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
 use palpate_sessions::analyses::AnalysisError;
 use palpate_sessions::edits::EditError;
-use palpate_sessions::import::{ColumnNames, TableError, read_table};
+use palpate_sessions::import::{ColumnNames, Table, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
 use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
 use crate::analysed::{self, Opened};
+use crate::compliance::CorrectionError;
 use crate::engine::{Effect, Record};
 
 /// Samples for a fit, and what a reader should know about them.
@@ -26,6 +27,8 @@ pub struct FitSource {
     pub notes: Vec<String>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
+    /// Name of the rig it was recorded on; `None` for a table.
+    pub rig: Option<String>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
 }
@@ -119,6 +122,22 @@ pub enum SourceError {
     /// The table cannot be read.
     #[error(transparent)]
     Table(#[from] TableError),
+    /// The session was made from another program's file.
+    #[error(
+        "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report; 'palpate info' tells what it holds"
+    )]
+    Imported {
+        /// The file it was made from.
+        file: String,
+    },
+    /// Without a raw signal there is nothing to make forces of.
+    #[error(
+        "the session was imported from {file} and has no raw signal, so its forces cannot be made anew; import the file again with other units if they are wrong"
+    )]
+    NoSignal {
+        /// The file it was made from.
+        file: String,
+    },
     /// The session ended before there was anything to fit.
     #[error(
         "the session has no ramp and hold with known force and depth, so there is nothing to fit"
@@ -145,6 +164,9 @@ pub enum SourceError {
         /// The parser's words.
         detail: String,
     },
+    /// Depths cannot be corrected as asked.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration {
@@ -200,6 +222,7 @@ pub fn read_analysed(
             start: Seconds(0.0),
             notes: table.notes,
             specimen: None,
+            rig: None,
             calibration: None,
         });
     }
@@ -212,8 +235,13 @@ pub fn read_analysed(
         });
     }
     let session = edited.session;
+    if session.manifest.imported.is_some() {
+        let mut source = source_of_imported(session, stretch);
+        leave_out(&left_out_s, Seconds(0.0), &mut source.samples);
+        return Ok(source);
+    }
     let mut samples = samples_of(&session, stretch)?;
-    leave_out(&session, stretch, &left_out_s, &mut samples);
+    leave_out(&left_out_s, since_first(&session, stretch), &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;
@@ -225,12 +253,46 @@ pub fn read_analysed(
     }
     let specimen = session.manifest.specimen.trim();
     Ok(FitSource {
+        rig: session.manifest.rig.map(|rig| rig.name),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
         samples,
         start,
         notes,
         calibration,
     })
+}
+
+/// What a fit takes of an imported session: as of a table, for nobody knows the noise of its forces.
+fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
+    let table = table_of_imported(&session);
+    let specimen = session.manifest.specimen.trim();
+    FitSource {
+        rig: None,
+        samples: samples_of_table(&table, stretch),
+        start: Seconds(0.0),
+        specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
+        notes: session.notes,
+        calibration: None,
+    }
+}
+
+/// The samples of an imported session, its time from the first one.
+pub(crate) fn table_of_imported(session: &Session) -> Table {
+    let mut table = Table::default();
+    for row in &session.rows {
+        let is_taken = matches!(
+            row.phase,
+            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
+        );
+        let (Some(force), Some(depth), true) = (row.force, row.depth, is_taken) else {
+            continue;
+        };
+        table.t.push(session.manifest.time_of(row.tick as i64).0);
+        table.depth.push(depth);
+        table.force.push(force);
+        table.is_unload.push(row.phase == Phase::Unload);
+    }
+    table
 }
 
 /// The calibration in a session's manifest.
@@ -242,18 +304,23 @@ pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
     })
 }
 
+/// The curve of that calibration.
+pub(crate) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
+    let curve = calibration_of(session)?.curve();
+    curve.map_err(|err| SourceError::Calibration {
+        detail: err.to_string(),
+    })
+}
+
 /// What a fit takes of a session, each force weighted by what the signal's noise and the
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
 /// one at an end of the converter's range, every one after an interlock, and every one after the probe
 /// has left the tissue on the way back.
 pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
-    let bad = |detail: String| SourceError::Calibration { detail };
-    let curve = calibration_of(session)?
-        .curve()
-        .map_err(|err| bad(err.to_string()))?;
+    let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
-    let tick_secs = session.manifest.rig.tick().0;
+    let tick_secs = session.manifest.tick().0;
     let trusted = trusted_samples(&decisions);
     let is_known = |index: usize, row: &Row| !is_saturated(session, row) && index < trusted;
     let rows = session.rows.iter().enumerate();
@@ -300,7 +367,7 @@ fn is_fitted(row: &Row, stretch: Stretch) -> bool {
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
 pub(crate) fn is_saturated(session: &Session, row: &Row) -> bool {
-    let ends = session.manifest.rig.adc;
+    let ends = session.manifest.rig.as_ref().and_then(|rig| rig.adc);
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
@@ -329,26 +396,26 @@ pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceE
         .collect()
 }
 
-/// Forces in stretches of time, in s since the session's first sample, count no more.
-fn leave_out(
-    session: &Session,
-    stretch: Stretch,
-    left_out_s: &[[f64; 2]],
-    samples: &mut [FitSample],
-) {
-    let first = session.rows.iter().find(|row| is_fitted(row, stretch));
-    let (Some(origin), Some(first)) = (session.rows.first(), first) else {
-        return;
-    };
-    let offset = analysed::seconds_since(session, origin, first);
+/// Forces in stretches of time, in s since the session's first sample, count no more. `offset` is the time
+/// from there to the first of `samples`.
+fn leave_out(left_out_s: &[[f64; 2]], offset: Seconds, samples: &mut [FitSample]) {
     for sample in samples {
-        let at = offset + sample.t.0;
+        let at = offset.0 + sample.t.0;
         if left_out_s
             .iter()
             .any(|[from, to]| (*from..=*to).contains(&at))
         {
             sample.sigma = Newtons(f64::INFINITY);
         }
+    }
+}
+
+/// Time from the session's first sample to the first one that a fit takes.
+fn since_first(session: &Session, stretch: Stretch) -> Seconds {
+    let first = session.rows.iter().find(|row| is_fitted(row, stretch));
+    match (session.rows.first(), first) {
+        (Some(origin), Some(first)) => analysed::time_between(session, origin, first),
+        _ => Seconds(0.0),
     }
 }
 
@@ -362,7 +429,7 @@ fn start_of(session: &Session) -> Seconds {
 }
 
 /// The signal's noise as the tare found it.
-fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
+pub(crate) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
     decisions.iter().find_map(|(_, effect)| match effect {
         Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
         _ => None,
@@ -370,7 +437,7 @@ fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
 }
 
 /// A table knows nothing of its noise: every sample counts alike.
-fn samples_of_table(table: &palpate_sessions::import::Table, stretch: Stretch) -> Vec<FitSample> {
+fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
     (0..table.t.len())
         .filter(|&i| stretch == Stretch::WithUnload || !table.is_unload[i])
         .map(|i| FitSample {
@@ -399,7 +466,7 @@ mod tests {
         let options = FitOptions::default();
         let whole = fit(&samples_of(&session, Stretch::RampHold).unwrap(), &options).unwrap();
         assert_eq!(whole.censored, 0);
-        let adc = session.manifest.rig.adc.unwrap();
+        let adc = session.manifest.rig.as_ref().unwrap().adc.unwrap();
         let hold = session
             .rows
             .iter_mut()

@@ -1,12 +1,12 @@
 //! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
 
-use crate::analysis::{SourceError, decisions, is_saturated, trusted_samples};
+use crate::analysis::{SourceError, decisions, is_saturated, table_of_imported, trusted_samples};
 use crate::edited;
 use crate::engine::{Effect, Record};
 use palpate_model::cycles::{CycleSample, by_depth};
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
-use palpate_sessions::import::{ColumnNames, read_table};
+use palpate_sessions::import::{ColumnNames, Table, read_table};
 use palpate_sessions::log::Session;
 use palpate_sessions::record::Row;
 use std::path::Path;
@@ -39,22 +39,31 @@ pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, S
     if is_session || !path.exists() {
         return of_session(&edited::open(path)?.session);
     }
-    let table = read_table(path, columns)?;
-    let mut notes = table.notes;
+    let mut table = read_table(path, columns)?;
+    let notes = std::mem::take(&mut table.notes);
+    Ok(of_table(&table, notes))
+}
+
+/// What an analysis takes of a table or an imported session.
+fn of_table(table: &Table, mut notes: Vec<String>) -> CycleSource {
     notes.push("a table: its cycles, holds and ways back are told from the depth".into());
-    Ok(CycleSource {
+    CycleSource {
         samples: by_depth(&table.t, &table.depth, &table.force),
         notes,
         ..CycleSource::default()
-    })
+    }
 }
 
 /// What an analysis takes of a session. Forces at an end of the converter's range, and all after an interlock, are left out.
 pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
+    if session.manifest.imported.is_some() {
+        let table = table_of_imported(session);
+        return Ok(of_table(&table, session.notes.clone()));
+    }
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let contacts = contacts(&decisions);
-    let tick_secs = session.manifest.rig.tick().0;
+    let tick_secs = session.manifest.tick().0;
     let first_tick = session.rows.first().map_or(0, |row| row.tick);
     let mut source = CycleSource {
         notes: session.notes.clone(),
@@ -243,7 +252,7 @@ mod tests {
         let [(frequency, range)] = &source.sines[..] else {
             panic!("{:?}", source.sines);
         };
-        let tick = session.manifest.rig.tick().0;
+        let tick = session.manifest.tick().0;
         assert!((frequency * 500.0 * tick - 1.0).abs() < 1e-12);
         let moving = session.rows[ramp..]
             .iter()

@@ -44,6 +44,14 @@ pub const TOLERANCE_LIVE_ERROR: f64 = 1e-4;
 /// A session cannot be replayed at all.
 #[derive(Debug, Error)]
 pub enum ReplayError {
+    /// No rig recorded it, so no engine decided anything.
+    #[error(
+        "the session was imported from {file} and has no decisions to replay; its numbers can be checked against the original kept beside it"
+    )]
+    Imported {
+        /// The file it was made from.
+        file: String,
+    },
     /// The manifest's plan or calibration is not what this version knows.
     #[error(
         "the session's {what} cannot be understood ({detail}); it needs the palpate that wrote it"
@@ -180,6 +188,13 @@ pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport,
 fn config_of(session: &Session) -> Result<Config, ReplayError> {
     let manifest = &session.manifest;
     let bad = |what, detail: String| ReplayError::Manifest { what, detail };
+    if let Some(imported) = &manifest.imported {
+        let file = imported.file.clone();
+        return Err(ReplayError::Imported { file });
+    }
+    let nothing = |what| bad(what, "it is missing".into());
+    let rig = manifest.rig.clone().ok_or_else(|| nothing("rig"))?;
+    let limits = manifest.limits.ok_or_else(|| nothing("limits"))?;
     let plan: Plan = serde_json::from_value(manifest.plan.clone())
         .map_err(|err| bad("plan", err.to_string()))?;
     let calibration: Calibration = serde_json::from_value(manifest.calibration.clone())
@@ -190,8 +205,8 @@ fn config_of(session: &Session) -> Result<Config, ReplayError> {
         .and_then(Value::as_bool)
         .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
     Ok(Config {
-        rig: manifest.rig.clone(),
-        limits: plan.limits.tighten(manifest.limits),
+        rig,
+        limits: plan.limits.tighten(limits),
         curve: calibration
             .curve()
             .map_err(|err| bad("calibration", err.to_string()))?,
@@ -264,11 +279,15 @@ impl Replay<'_> {
     }
 
     fn feed_row(&mut self, index: u64, row: &Row) {
+        // Every row of a session with a rig has both.
+        let (Some(volts), Some(pulses)) = (row.volts, row.pulses) else {
+            return;
+        };
         let reading = Reading {
             tick: row.tick,
             counts: row.counts,
-            volts: Volts(row.volts),
-            pulses: row.pulses,
+            volts: Volts(volts),
+            pulses,
             status: AxisStatus(row.status),
         };
         self.step(row.host, index + 1, Input::Reading(reading));

@@ -16,10 +16,12 @@ pub mod calibrations;
 pub mod catalog;
 mod chain;
 pub mod checks;
+pub mod compliances;
 pub mod edits;
 pub mod export;
 pub mod folder;
 pub mod import;
+pub mod imported;
 pub mod journal;
 mod lock;
 pub mod log;
@@ -28,14 +30,13 @@ mod packed;
 pub mod record;
 pub mod recover;
 mod schema;
+pub mod shelf;
 pub mod text;
 pub mod trade;
 
 pub use about::{About, AboutError, Labels};
 pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
-pub use calibrations::{
-    Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
-};
+pub use calibrations::{Kept, Shelf, read_calibration};
 pub use catalog::{Catalog, CatalogError};
 pub use chain::ChainError;
 pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
@@ -46,9 +47,11 @@ pub use folder::{
     spare_folder,
 };
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
+pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
     BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace,
     ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use record::{Block, EndRecord, Entry, EntryKind, Row};
+pub use shelf::{Document, LibraryError, age_days, save, supersede, taken_at};

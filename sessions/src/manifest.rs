@@ -1,14 +1,22 @@
 //! The first message of every session: who measured what, on which rig, with which versions.
 
 use crate::about::About;
+use crate::imported::Imported;
 use crate::recover::Recovered;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
+use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicU32, Ordering};
 
 /// Version of the on-disk form. A reader refuses a higher one.
-pub const RECORD_VERSION: u32 = 1;
+///
+/// 2: imported sessions, which have no rig and no limits, and samples without volts and pulses.
+pub const RECORD_VERSION: u32 = 2;
+
+/// Ticks in a second of an imported session: fine enough to keep every digit that a file's times have, and
+/// 63 bits of them are 106 days.
+pub const IMPORTED_TICKS_PER_S: f64 = 1e12;
 
 /// What a session needs to be understood and replayed, beside its samples and entries.
 ///
@@ -24,7 +32,7 @@ pub struct Manifest {
     pub software_version: String,
     /// Version of the decision rules that recorded; a replay needs the same.
     pub engine_version: u32,
-    /// Wall clock at session time zero, UTC, RFC 3339 on disk.
+    /// Wall clock at session time zero, UTC, RFC 3339 on disk; of the import, for an imported session.
     pub started_at: DateTime<Utc>,
     /// Who measured.
     pub operator: String,
@@ -38,11 +46,16 @@ pub struct Manifest {
     /// How the signal was taken; `None` in sessions recorded before this was written down.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub signal: Option<SignalFacts>,
-    /// The rig as it described itself.
-    pub rig: RigDescription,
-    /// The interlock limits in force.
-    pub limits: Limits,
-    /// The load-cell calibration in force.
+    /// Which file the session was imported from, and how; `None` for one that was recorded.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imported: Option<Imported>,
+    /// The rig as it described itself; `None` in an imported session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rig: Option<RigDescription>,
+    /// The interlock limits in force; `None` in an imported session.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub limits: Option<Limits>,
+    /// The load-cell calibration in force; null in an imported session, as are plan and settings.
     pub calibration: serde_json::Value,
     /// The protocol and its parameters.
     pub plan: serde_json::Value,
@@ -56,6 +69,23 @@ pub struct Manifest {
 }
 
 impl Manifest {
+    /// Length of one tick of the samples.
+    #[must_use]
+    pub fn tick(&self) -> Seconds {
+        self.rig
+            .as_ref()
+            .map_or(Seconds(1.0 / IMPORTED_TICKS_PER_S), RigDescription::tick)
+    }
+
+    /// The length of so many ticks. Of an imported session it is the float that the file's decimal number is.
+    #[must_use]
+    pub fn time_of(&self, ticks: i64) -> Seconds {
+        Seconds(match &self.rig {
+            Some(rig) => ticks as f64 * rig.tick().0,
+            None => ticks as f64 / IMPORTED_TICKS_PER_S,
+        })
+    }
+
     /// The start as an RFC 3339 text in UTC, to the millisecond.
     #[must_use]
     pub fn started_at_text(&self) -> String {

@@ -2,7 +2,8 @@
 //!
 //! Samples are stored in pairs of Protocol Buffers messages: a [`DaqBlock`] with what the rig
 //! reported and a [`DerivedBlock`] with what was made of it. Every array of a pair has one
-//! element per sample, except `counts`, which is empty on a rig without a converter.
+//! element per sample, except that `counts` is empty on a rig without a converter, and `volts` and
+//! `pulses_delta` are where an imported file has no such thing.
 
 use crate::packed::{Field, extend_doubles, extend_numbers, next_field, zigzag};
 use palpate_model::Nanos;
@@ -18,17 +19,17 @@ const DEPTH_VALID: u32 = 1 << 1;
 /// One sample: raw as reported, and derived as shown to the operator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Row {
-    /// Controller clock, in its own counts.
+    /// Controller clock, in its own counts; picoseconds since the first sample of an imported session.
     pub tick: u64,
     /// Arrival on the host's clock.
     pub host: Nanos,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
-    /// Load-cell signal in V, as received.
-    pub volts: f64,
-    /// Commanded position in pulses.
-    pub pulses: i64,
-    /// Bits of [`palpate_model::rig::AxisStatus`].
+    /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
+    pub volts: Option<f64>,
+    /// Commanded position in pulses; `None` in an imported session.
+    pub pulses: Option<i64>,
+    /// Bits of [`palpate_model::rig::AxisStatus`]; none in an imported session.
     pub status: u32,
     /// Force above tare in N; `None` before tare.
     pub force: Option<f64>,
@@ -44,7 +45,7 @@ impl Row {
     /// The first value of this row that is not a number, named; `None` when all are.
     #[must_use]
     pub fn non_finite(&self) -> Option<&'static str> {
-        if !self.volts.is_finite() {
+        if self.volts.is_some_and(|volts| !volts.is_finite()) {
             Some("signal")
         } else if self.force.is_some_and(|force| !force.is_finite()) {
             Some("force")
@@ -159,8 +160,8 @@ pub(crate) struct DerivedBlock {
 pub(crate) struct View {
     #[prost(double, tag = "1")]
     pub t_s: f64,
-    #[prost(double, tag = "2")]
-    pub signal_v: f64,
+    #[prost(double, optional, tag = "2")]
+    pub signal_v: Option<f64>,
     #[prost(double, optional, tag = "3")]
     pub force_n: Option<f64>,
     #[prost(double, optional, tag = "4")]
@@ -169,13 +170,22 @@ pub(crate) struct View {
     pub cycle: u32,
 }
 
-/// Cuts rows where a block must end: at its size limit, and where counts appear or vanish.
+/// Which of its optional values a row has: counts, volts and pulses.
+fn held(row: &Row) -> [bool; 3] {
+    [
+        row.counts.is_some(),
+        row.volts.is_some(),
+        row.pulses.is_some(),
+    ]
+}
+
+/// Cuts rows where a block must end: at its size limit, and where counts, volts or pulses appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
-    rows.chunk_by(|a, b| a.counts.is_some() == b.counts.is_some())
+    rows.chunk_by(|a, b| held(a) == held(b))
         .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
 }
 
-/// The pair of blocks of some rows that all have counts or all have none.
+/// The pair of blocks of some rows that all have the same of their optional values.
 pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, DerivedBlock) {
     let mut daq = DaqBlock {
         first_sample,
@@ -189,10 +199,13 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     for row in rows {
         daq.tick_delta.push(row.tick.wrapping_sub(tick) as i64);
         daq.host_delta_ns.push(row.host.0.wrapping_sub(host) as i64);
-        daq.pulses_delta.push(row.pulses.wrapping_sub(pulses));
-        (tick, host, pulses) = (row.tick, row.host.0, row.pulses);
+        if let Some(to) = row.pulses {
+            daq.pulses_delta.push(to.wrapping_sub(pulses));
+            pulses = to;
+        }
+        (tick, host) = (row.tick, row.host.0);
         daq.counts.extend(row.counts);
-        daq.volts.push(row.volts);
+        daq.volts.extend(row.volts);
         daq.status.push(row.status);
         derived.force_newtons.push(row.force.unwrap_or(0.0));
         derived.depth_mm.push(row.depth.unwrap_or(0.0));
@@ -226,16 +239,16 @@ impl Block {
     /// How many samples there are.
     #[must_use]
     pub fn len(&self) -> usize {
-        self.daq.volts.len()
+        self.daq.tick_delta.len()
     }
 
     /// Whether there are none.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.daq.volts.is_empty()
+        self.daq.tick_delta.is_empty()
     }
 
-    /// Load-cell signal in V.
+    /// Load-cell signal in V; empty where an imported file has none.
     #[must_use]
     pub fn volts(&self) -> &[f64] {
         &self.daq.volts
@@ -268,8 +281,8 @@ impl Block {
             tick: daq.tick_delta[index] as u64,
             host: Nanos(daq.host_delta_ns[index] as u64),
             counts: daq.counts.get(index).copied(),
-            volts: daq.volts[index],
-            pulses: daq.pulses_delta[index],
+            volts: daq.volts.get(index).copied(),
+            pulses: daq.pulses_delta.get(index).copied(),
             status: daq.status[index],
             force: (validity & FORCE_VALID != 0).then_some(derived.force_newtons[index]),
             depth: (validity & DEPTH_VALID != 0).then_some(derived.depth_mm[index]),
@@ -337,8 +350,6 @@ impl Block {
         let count = daq.tick_delta.len();
         let lengths = [
             daq.host_delta_ns.len(),
-            daq.volts.len(),
-            daq.pulses_delta.len(),
             daq.status.len(),
             derived.force_newtons.len(),
             derived.depth_mm.len(),
@@ -346,10 +357,9 @@ impl Block {
             derived.phase.len(),
             derived.cycle.len(),
         ];
-        let has_counts = !daq.counts.is_empty();
-        if lengths.iter().any(|&length| length != count)
-            || (has_counts && daq.counts.len() != count)
-        {
+        let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
+        let is_odd = |length: &usize| *length > 0 && *length != count;
+        if lengths.iter().any(|&length| length != count) || optional.iter().any(is_odd) {
             return Err("the columns of a sample block differ in length".into());
         }
         if count > BLOCK_ROWS_MAX {
@@ -422,8 +432,8 @@ mod tests {
             tick,
             host: Nanos(u64::MAX - tick),
             counts,
-            volts: 0.1 + tick as f64 * 1e-17,
-            pulses: i64::MIN.wrapping_add(tick as i64),
+            volts: Some(0.1 + tick as f64 * 1e-17),
+            pulses: Some(i64::MIN.wrapping_add(tick as i64)),
             status: u32::MAX,
             force: tick.is_multiple_of(2).then_some(-0.0),
             depth: tick.is_multiple_of(3).then_some(f64::MIN_POSITIVE),
@@ -438,7 +448,15 @@ mod tests {
             row(u64::MAX, None),
             row(0, None),
             row(7, Some(i32::MIN)),
-            row(12, Some(0)),
+            Row {
+                volts: None,
+                ..row(12, Some(0))
+            },
+            Row {
+                pulses: None,
+                ..row(13, Some(1))
+            },
+            row(14, Some(2)),
         ];
         let mut back = Vec::new();
         let mut first = 0;
@@ -483,10 +501,12 @@ mod tests {
         let rows = [row(1, Some(2)), row(2, Some(3))];
         let (daq, derived) = blocks_from_rows(0, &rows);
         type Edit = fn(&mut DaqBlock, &mut DerivedBlock);
-        let edits: [(Edit, &str); 6] = [
+        let edits: [(Edit, &str); 8] = [
             (|_, derived| derived.phase[1] = 99, "phase code 99"),
             (|_, derived| derived.cycle.clear(), "length"),
             (|daq, _| daq.counts.truncate(1), "length"),
+            (|daq, _| daq.volts.truncate(1), "length"),
+            (|daq, _| daq.pulses_delta.truncate(1), "length"),
             (|daq, _| daq.volts[0] = f64::NAN, "signal"),
             (|_, derived| derived.validity[0] = 4, "validity"),
             (|_, derived| derived.first_sample = 1, "numbered"),

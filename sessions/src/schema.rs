@@ -190,7 +190,7 @@ fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
     FileDescriptorSet { file: vec![file] }.encode_to_vec()
 }
 
-const MANIFEST_SCHEMA: &str = r#"{"type":"object","properties":{"record_version":{"type":"integer"},"session_id":{"type":"string"},"software_version":{"type":"string"},"engine_version":{"type":"integer"},"started_at":{"type":"string","format":"date-time"},"operator":{"type":"string"},"specimen":{"type":"string"},"indenter":{"type":"string"},"about":{"type":"object"},"signal":{"type":"object"},"rig":{"type":"object"},"limits":{"type":"object"},"calibration":{},"plan":{},"settings":{},"acknowledgements":{"type":"array","items":{"type":"string"}}},"required":["record_version","session_id","software_version","started_at","rig"]}"#;
+const MANIFEST_SCHEMA: &str = r#"{"type":"object","properties":{"record_version":{"type":"integer"},"session_id":{"type":"string"},"software_version":{"type":"string"},"engine_version":{"type":"integer"},"started_at":{"type":"string","format":"date-time"},"operator":{"type":"string"},"specimen":{"type":"string"},"indenter":{"type":"string"},"about":{"type":"object"},"signal":{"type":"object"},"imported":{"type":"object"},"rig":{"type":"object"},"limits":{"type":"object"},"calibration":{},"plan":{},"settings":{},"acknowledgements":{"type":"array","items":{"type":"string"}}},"required":["record_version","session_id","software_version","started_at"]}"#;
 
 const ENTRY_SCHEMA: &str = r#"{"type":"object","properties":{"order":{"type":"integer"},"after_sample":{"type":"integer"},"now_ns":{"type":"integer"},"body":{}},"required":["order","after_sample","now_ns","body"]}"#;
 

@@ -30,7 +30,7 @@ fn run_until(relative: f64) -> Session {
 
 fn held_secs(session: &Session) -> f64 {
     let held = session.rows.iter().filter(|row| row.phase == Phase::Hold);
-    held.count() as f64 * session.manifest.rig.tick().0
+    held.count() as f64 * session.manifest.tick().0
 }
 
 fn early_ends(session: &Session) -> Vec<Record> {

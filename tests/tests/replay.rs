@@ -83,7 +83,7 @@ fn a_changed_raw_sample_changes_what_is_derived() {
         .iter()
         .position(|row| row.depth == Some(0.0) || row.depth > Some(5.0))
         .unwrap();
-    session.rows[place].volts += 1e-6;
+    session.rows[place].volts = session.rows[place].volts.map(|volts| volts + 1e-6);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
     assert_eq!(
         (difference.what.as_str(), difference.after_sample),
@@ -91,7 +91,7 @@ fn a_changed_raw_sample_changes_what_is_derived() {
     );
 
     let mut session = open("ramp-hold-lab");
-    session.rows[place].pulses += 3;
+    session.rows[place].pulses = session.rows[place].pulses.map(|pulses| pulses + 3);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
     assert_eq!(
         difference.what, "decision",

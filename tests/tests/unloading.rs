@@ -132,7 +132,7 @@ fn unloading_is_recorded_until_the_force_is_gone_and_replays() {
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
     let rows = session.rows.iter();
     let unload: Vec<_> = rows.filter(|row| row.phase == Phase::Unload).collect();
-    let tick = session.manifest.rig.tick().0;
+    let tick = session.manifest.tick().0;
     // 12.5 mm at 0.6 mm/s.
     let took = unload.len() as f64 * tick;
     assert!((took - 12.5 / 0.6).abs() < 0.1, "{took}");

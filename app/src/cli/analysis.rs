@@ -126,7 +126,8 @@ pub(super) fn recalibrate(args: &RecalibrateArgs, output: &Output) -> Result<(),
             &opened.edited.session.manifest.session_id,
             &analysis,
         )?;
-        for doubt in source.doubts(&opened.edited.session.manifest.rig.name) {
+        let rig = opened.edited.session.manifest.rig.as_ref();
+        for doubt in source.doubts(rig.map_or("", |rig| rig.name.as_str())) {
             bar.suspend(|| output.note(&format!("{}: {doubt}", session.display())));
         }
         done.push(Recalibrated {

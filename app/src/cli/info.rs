@@ -8,7 +8,7 @@ use palpate_protocols::analysed;
 use palpate_sessions::analyses::{Analysis, inputs_of};
 use palpate_sessions::edits::{Change, Edit, Review, Verdict};
 use palpate_sessions::log::Session;
-use palpate_sessions::{About, EDITS_FILE};
+use palpate_sessions::{About, EDITS_FILE, Imported};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -35,8 +35,9 @@ struct Info<'a> {
     indenter: &'a str,
     about: &'a About,
     signal: Option<&'a SignalFacts>,
-    rig: &'a str,
-    rig_settings: &'a std::collections::BTreeMap<String, String>,
+    imported: Option<&'a Imported>,
+    rig: Option<&'a str>,
+    rig_settings: Option<&'a std::collections::BTreeMap<String, String>>,
     plan: &'a serde_json::Value,
     acknowledgements: &'a [String],
     samples: usize,
@@ -75,8 +76,9 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         indenter: &manifest.indenter,
         about: &manifest.about,
         signal: manifest.signal.as_ref(),
-        rig: &manifest.rig.identity,
-        rig_settings: &manifest.rig.settings,
+        imported: manifest.imported.as_ref(),
+        rig: manifest.rig.as_ref().map(|rig| rig.identity.as_str()),
+        rig_settings: manifest.rig.as_ref().map(|rig| &rig.settings),
         plan: &manifest.plan,
         acknowledgements: &manifest.acknowledgements,
         samples: session.rows.len(),
@@ -132,10 +134,12 @@ fn text(info: &Info<'_>) -> String {
             .map(|(key, value)| format!("           {key} {value}")),
     );
     lines.extend(protocol_text(info.plan));
-    lines.push(format!("rig        {}", info.rig));
+    lines.extend(info.imported.map(imported_text));
+    lines.extend(info.rig.map(|rig| format!("rig        {rig}")));
     lines.extend(
         info.rig_settings
-            .iter()
+            .into_iter()
+            .flatten()
             .map(|(key, value)| format!("           {key} {value}")),
     );
     lines.extend(info.signal.map(signal_text));
@@ -162,7 +166,7 @@ fn text(info: &Info<'_>) -> String {
         (Some(ending), Some(reason)) => format!("ending     {ending}: {reason}"),
         _ => "ending     none: the recording was interrupted".into(),
     });
-    if let Some(time_use) = info.time_use_s {
+    if let Some(time_use) = info.time_use_s.filter(|use_s| !use_s.is_empty()) {
         let spent: Vec<String> = time_use
             .iter()
             .map(|(phase, secs)| format!("{phase} {secs:.1} s"))
@@ -176,6 +180,15 @@ fn text(info: &Info<'_>) -> String {
     lines.extend(info.review.as_ref().map(review_text));
     lines.extend(info.analyses.iter().map(analysis_text));
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
+    lines.join("\n")
+}
+
+fn imported_text(imported: &Imported) -> String {
+    let read = imported.readings.iter();
+    let mut lines = vec![format!("imported   {}", imported.source())];
+    lines.extend(read.map(|one| format!("           {} {}, {}", one.what, one.found, one.how)));
+    let facts = imported.facts.iter();
+    lines.extend(facts.map(|(key, value)| format!("           {key}: {value}")));
     lines.join("\n")
 }
 

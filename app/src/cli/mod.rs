@@ -4,12 +4,15 @@ mod analyse;
 mod analysis;
 mod calibration;
 mod catalog;
+mod compliance;
 mod daily_check;
+mod doctor;
 mod export;
 mod extremes;
 mod find;
 mod fit;
 mod history;
+mod import;
 mod info;
 mod last_fit;
 mod new_file;
@@ -71,6 +74,14 @@ enum Command {
     /// Keep, show and check load-cell calibrations
     #[command(subcommand)]
     Calibration(calibration::CalibrationCommand),
+    /// Tell in which state sessions are: whole, interrupted, damaged, newer or something else
+    Doctor(doctor::DoctorArgs),
+    /// Keep what is whole of interrupted or damaged sessions, beside the originals
+    Recover(doctor::RecoverArgs),
+    /// Find how far a rig gives way, from a session of stiff-surface
+    Compliance(compliance::ComplianceArgs),
+    /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
+    Import(Box<import::ImportArgs>),
     /// Write a session's samples as a table
     Export(export::ExportArgs),
     /// Find sessions of the library
@@ -185,6 +196,10 @@ pub fn main() -> ExitCode {
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
+        Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
+        Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
+        Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
+        Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Find(args)) => with(args.json, |out| find::run(&args, out)),
         Some(Command::History(args)) => with(args.json, |out| history::run(&args, out)),
@@ -239,7 +254,10 @@ fn source_failure(err: SourceError) -> Failure {
         SourceError::Analysis(err) => analysis::failure(err),
         SourceError::Table(_)
         | SourceError::TableAnalysis { .. }
-        | SourceError::Rejected { .. } => Failure::usage(err),
+        | SourceError::Rejected { .. }
+        | SourceError::Correction(_)
+        | SourceError::NoSignal { .. }
+        | SourceError::Imported { .. } => Failure::usage(err),
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

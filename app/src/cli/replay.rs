@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_protocols::replay::{ReplayReport, blessings_of, replay};
+use palpate_protocols::replay::{ReplayError, ReplayReport, blessings_of, replay};
 use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -76,8 +76,13 @@ fn replay_one(path: &Path, output: &Output) -> Result<ReplayReport, Failure> {
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
     let blessings = blessings_of(path).map_err(Failure::usage)?;
-    replay(&session, &blessings)
-        .map_err(|err| Failure::failed(format!("{err}: {}", path.display())))
+    replay(&session, &blessings).map_err(|err| {
+        let sentence = format!("{err}: {}", path.display());
+        match err {
+            ReplayError::Imported { .. } => Failure::Usage(sentence),
+            _ => Failure::Failed(sentence),
+        }
+    })
 }
 
 fn text(replayed: &Replayed) -> String {

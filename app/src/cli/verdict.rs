@@ -124,7 +124,9 @@ pub(super) fn correct(args: &CorrectArgs, output: &Output) -> Result<(), Failure
         }
         (Some(number), _) => number,
     };
-    let travel = edited.session.manifest.rig.travel;
+    // A session that found a contact has a rig.
+    let rig = edited.session.manifest.rig.as_ref();
+    let travel = rig.map_or(Position(0.0), |rig| rig.travel);
     let position = Position(args.position);
     if !(0.0..=travel.0).contains(&position.0) {
         return Err(Failure::usage(format!(

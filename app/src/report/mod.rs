@@ -7,6 +7,7 @@ pub mod catalog;
 pub mod cycles;
 pub mod extremes;
 pub mod family;
+pub(crate) mod imported;
 pub mod picture;
 pub mod plan_picture;
 pub mod programme;

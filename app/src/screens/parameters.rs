@@ -145,6 +145,7 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
         | Phase::Prompt
         | Phase::Weigh
         | Phase::CheckHome
+        | Phase::Imported
         | Phase::Rest => "the probe has not indented",
         Phase::Ramp => "more of the ramp is needed",
         Phase::Hold => "more of the hold is needed",

@@ -2,9 +2,12 @@
 
 mod analyse;
 mod calibration;
+mod compliance;
 mod disk;
+mod doctor;
 mod extremes;
 mod fit;
+mod import;
 mod plan;
 mod programme;
 mod protocol;
@@ -140,7 +143,7 @@ fn one_seed_gives_one_session_at_any_pace() {
     succeeded(&short_run(at, "other", &["--seed", "8"]));
     let open = |name: &str| palpate_sessions::log::Session::open(&at.join(name)).unwrap();
     let (max, paced, other) = (open("max"), open("paced"), open("other"));
-    assert_eq!(max.manifest.rig.settings["seed"], "7");
+    assert_eq!(max.manifest.rig.as_ref().unwrap().settings["seed"], "7");
     // Not assert_eq: a hundred thousand rows help nobody who reads the failure.
     assert!(
         max.rows == paced.rows,
@@ -154,7 +157,7 @@ fn one_seed_gives_one_session_at_any_pace() {
     );
     assert!(max.rows != other.rows);
     // The recorded seed rebuilds the rig: run again with what the manifest says.
-    let recorded = &max.manifest.rig.settings;
+    let recorded = &max.manifest.rig.as_ref().unwrap().settings;
     succeeded(&short_run(
         at,
         "again",

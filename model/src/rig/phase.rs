@@ -73,6 +73,8 @@ phases! {
     CheckHome = 17, "check-home";
     /// Paused at rest.
     Paused = 18, "paused";
+    /// Not known: the sample was imported from another program's file.
+    Imported = 19, "imported";
 }
 
 impl fmt::Display for Phase {

@@ -105,8 +105,9 @@ impl Measuring {
             self.depth = [self.depth[0].min(depth), self.depth[1].max(depth)];
             if self.is_cruising(&first, row, depth) {
                 self.by_path.push(t, depth);
-                self.by_pulses
-                    .push(t, row.pulses as f64 * self.mm_per_pulse);
+                if let Some(pulses) = row.pulses {
+                    self.by_pulses.push(t, pulses as f64 * self.mm_per_pulse);
+                }
             }
         }
         if let (Step::HoldForce(hold), Some(force)) = (&self.planned.step, row.force)

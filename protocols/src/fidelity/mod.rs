@@ -76,6 +76,8 @@ impl TimeUse {
             Phase::Rest | Phase::Prompt | Phase::Paused | Phase::Stopped | Phase::Ended => {
                 &mut self.waiting_s
             }
+            // No run is in this phase.
+            Phase::Imported => return,
         };
         *kind += seconds;
     }
@@ -239,12 +241,20 @@ impl FidelityMeter {
 
 /// The fidelity of a recorded session.
 pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
+    let rig = match (&session.manifest.imported, &session.manifest.rig) {
+        (None, Some(rig)) => rig,
+        (imported, _) => {
+            let file = imported.as_ref().map(|from| from.file.clone());
+            let file = file.unwrap_or_default();
+            return Err(SourceError::Imported { file });
+        }
+    };
     let plan: Plan =
         serde_json::from_value(session.manifest.plan.clone()).map_err(|err| SourceError::Plan {
             detail: err.to_string(),
         })?;
     let decisions = decisions(session)?;
-    let mut meter = FidelityMeter::new(&plan, &session.manifest.rig);
+    let mut meter = FidelityMeter::new(&plan, rig);
     let mut next = decisions.iter().peekable();
     for (index, row) in session.rows.iter().enumerate() {
         while let Some((_, effect)) = next.next_if(|(after, _)| *after <= index as u64 + 1) {

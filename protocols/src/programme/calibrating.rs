@@ -106,7 +106,10 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
         format: CALIBRATION_FORMAT,
         taken_at: Some(manifest.started_at_text()),
         source: format!("session {id}"),
-        rig: manifest.rig.name.clone(),
+        rig: manifest
+            .rig
+            .as_ref()
+            .map_or_else(String::new, |rig| rig.name.clone()),
         operator: manifest.operator.clone(),
         zero_before: empty.first().copied(),
         zero_after: empty.last().copied(),

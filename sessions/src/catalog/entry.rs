@@ -190,17 +190,22 @@ impl Entry {
         self.specimen.clone_from(&manifest.specimen);
         self.indenter.clone_from(&manifest.indenter);
         self.software_version.clone_from(&manifest.software_version);
-        // By its JSON: an imported session has no rig, and nothing says that it is imported in others.
-        let facts = serde_json::to_value(manifest).unwrap_or_default();
-        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
-        self.rig = text(&facts["rig"]["name"]);
-        self.rig_identity = text(&facts["rig"]["identity"]);
-        self.origin = match (&manifest.recovered, &facts["imported"]) {
+        if let Some(rig) = &manifest.rig {
+            self.rig.clone_from(&rig.name);
+            self.rig_identity.clone_from(&rig.identity);
+        }
+        self.origin = match (&manifest.recovered, &manifest.imported) {
             (Some(_), _) => Origin::Recovered,
-            (None, Value::Null) => Origin::Recorded,
-            (None, _) => Origin::Imported,
+            (None, Some(_)) => Origin::Imported,
+            (None, None) => Origin::Recorded,
         };
         self.words.clone_from(&manifest.acknowledgements);
+        if let Some(imported) = &manifest.imported {
+            self.words.push(imported.source());
+            let facts = imported.facts.iter();
+            self.words.extend(facts.map(|(_, fact)| fact.clone()));
+        }
+        let text = |value: &Value| value.as_str().unwrap_or_default().to_owned();
         let (plan, calibration) = (&manifest.plan, &manifest.calibration);
         self.protocol = text(&plan["name"]);
         self.protocol_version = plan["version"].as_u64();

@@ -1,12 +1,14 @@
 //! What is known of a specimen, a rig or a load cell over time: its sessions with all that was said of them,
-//! the rig's daily checks, and the calibrations of rig and cell.
+//! the rig's daily checks and compliances, and the calibrations of rig and cell.
 
 use super::search::{Order, Query};
 use super::{Catalog, CatalogError};
-use crate::calibrations::{Shelf, taken_at};
 use crate::checks::read_checks;
 use crate::edits::{Change, Edit, Edits};
+use crate::shelf::{Document, Shelf, taken_at};
 use chrono::{DateTime, SecondsFormat, Utc};
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::RigCompliance;
 use serde::Serialize;
 
 /// Whose history it is.
@@ -26,8 +28,8 @@ pub enum Subject {
 pub struct Event {
     /// When, UTC, RFC 3339 to the millisecond; empty where nobody knows.
     pub at: String,
-    /// `session`, `verdict`, `contact`, `tags`, `review`, `fit`, `recalibration`, `mask`, `calibration` or
-    /// `check`.
+    /// `session`, `verdict`, `contact`, `tags`, `review`, `fit`, `recalibration`, `mask`, `calibration`,
+    /// `compliance` or `check`.
     pub what: String,
     /// Folder of the session below the library; empty for what is of no session.
     pub folder: String,
@@ -81,7 +83,19 @@ impl Catalog {
                 sentence: one.name.clone(),
             }));
         }
-        self.calibrations(subject, name, &mut events, &mut remarks);
+        let calibrations = Shelf::<Calibration>::open(&self.library);
+        documents(&calibrations, &mut events, &mut remarks, |one| {
+            let is_its = match subject {
+                Subject::Specimen => false,
+                Subject::Rig => one.rig == name,
+                Subject::Cell => one.cell == name,
+            };
+            is_its.then(|| one.operator.clone())
+        });
+        let compliances = Shelf::<RigCompliance>::open(&self.library);
+        documents(&compliances, &mut events, &mut remarks, |one| {
+            (subject == Subject::Rig && one.rig == name).then(|| one.operator.clone())
+        });
         if subject == Subject::Rig {
             match read_checks(&self.library, name) {
                 Ok(checks) => events.extend(checks.iter().map(|one| Event {
@@ -101,37 +115,30 @@ impl Catalog {
         events.sort_by(|a, b| a.at.cmp(&b.at));
         Ok((events, remarks))
     }
+}
 
-    fn calibrations(
-        &self,
-        subject: Subject,
-        name: &str,
-        events: &mut Vec<Event>,
-        remarks: &mut Vec<String>,
-    ) {
-        let shelf = Shelf::open(&self.library);
-        remarks.extend(shelf.unreadable.iter().map(ToString::to_string));
-        for kept in &shelf.kept {
-            let one = &kept.calibration;
-            let is_its = match subject {
-                Subject::Specimen => false,
-                Subject::Rig => one.rig == name,
-                Subject::Cell => one.cell == name,
-            };
-            if !is_its {
-                continue;
-            }
-            let at = taken_at(one).ok().flatten();
-            let instead = one.supersedes.as_ref();
-            let instead = instead.map_or(String::new(), |old| format!(" in the place of {old}"));
-            events.push(Event {
-                at: at.map_or(String::new(), |at| stamp(at.to_utc())),
-                what: "calibration".into(),
-                folder: String::new(),
-                by: one.operator.clone(),
-                sentence: format!("{}{instead}", kept.id),
-            });
-        }
+/// The documents of a shelf as events; `author` tells who made one that belongs there.
+fn documents<D: Document>(
+    shelf: &Shelf<D>,
+    events: &mut Vec<Event>,
+    remarks: &mut Vec<String>,
+    author: impl Fn(&D) -> Option<String>,
+) {
+    remarks.extend(shelf.unreadable.iter().map(ToString::to_string));
+    for kept in &shelf.kept {
+        let Some(by) = author(&kept.document) else {
+            continue;
+        };
+        let at = taken_at(&kept.document).ok().flatten();
+        let instead = kept.document.supersedes();
+        let instead = instead.map_or(String::new(), |old| format!(" in the place of {old}"));
+        events.push(Event {
+            at: at.map_or(String::new(), |at| stamp(at.to_utc())),
+            what: D::KIND.into(),
+            folder: String::new(),
+            by,
+            sentence: format!("{}{instead}", kept.id),
+        });
     }
 }
 

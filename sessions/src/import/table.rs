@@ -2,7 +2,7 @@
 //! refuses with a reason; nothing is guessed and nothing repaired.
 
 use super::cells::{delimiter_of, split};
-use super::header::{Meaning, Quantity, meaning};
+use super::header::{Meaning, Quantity, Scale, meaning};
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -187,8 +187,8 @@ fn is_number(cell: &str, has_decimal_comma: bool) -> bool {
 /// Where the three quantities are.
 struct Layout {
     width: usize,
-    /// Column and factor of time, depth and force.
-    places: [(usize, f64); 3],
+    /// Column and scale of time, depth and force.
+    places: [(usize, Scale); 3],
     phase: Option<usize>,
     has_decimal_comma: bool,
     /// What was assumed.
@@ -197,16 +197,16 @@ struct Layout {
 
 impl Layout {
     fn of(cells: &[String], delimiter: char) -> Result<Self, String> {
-        let place = |quantity: Quantity| -> Result<(usize, f64), String> {
-            let found: Vec<(usize, Option<f64>)> = cells
+        let place = |quantity: Quantity| -> Result<(usize, Scale), String> {
+            let found: Vec<(usize, Option<Scale>)> = cells
                 .iter()
                 .enumerate()
                 .filter_map(|(i, cell)| match meaning(cell) {
-                    Meaning::Known(q, factor) if q == quantity => Some((i, Some(factor))),
+                    Meaning::Known(q, scale) if q == quantity => Some((i, Some(scale))),
                     // A time by its name alone is in seconds in every instrument's table we know;
                     // depths and forces come in too many units to assume one.
                     Meaning::Bare(Quantity::Time) if quantity == Quantity::Time => {
-                        Some((i, Some(1.0)))
+                        Some((i, Some(Scale::ONE)))
                     }
                     Meaning::Bare(q) | Meaning::Unitless(q) if q == quantity => Some((i, None)),
                     _ => None,
@@ -214,7 +214,7 @@ impl Layout {
                 .collect();
             let (name, example) = (quantity.name(), quantity.example());
             match found[..] {
-                [(i, Some(factor))] => Ok((i, factor)),
+                [(i, Some(scale))] => Ok((i, scale)),
                 [(i, None)] => Err(format!(
                     "column '{}' has no unit that is known; name it like {example}",
                     cells[i]
@@ -241,11 +241,12 @@ impl Layout {
 
     fn values(&self, cells: &[String], number: usize) -> Result<[f64; 3], String> {
         let mut values = [0.0; 3];
-        for (value, ((column, factor), quantity)) in
-            values.iter_mut().zip(self.places.iter().zip(Quantity::ALL))
+        for (value, ((column, scale), quantity)) in values
+            .iter_mut()
+            .zip(self.places.iter().zip(Quantity::FITTED))
         {
             let cell = &cells[*column];
-            let read = number_in(cell, self.has_decimal_comma).map(|read| read * factor);
+            let read = number_in(cell, self.has_decimal_comma).map(|read| scale.apply(read));
             *value = read.filter(|read| read.is_finite()).ok_or_else(|| {
                 format!(
                     "line {number}: the {} '{cell}' is not a number; mend or remove the line",

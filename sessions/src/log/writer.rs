@@ -127,7 +127,8 @@ pub struct LogWriter<S: Sink> {
     manifest_json: Vec<u8>,
     library: String,
     started_ns: u64,
-    tick_nanos: u64,
+    /// `None` in an imported session, whose ticks are picoseconds.
+    tick_nanos: Option<u64>,
     at: Counters,
     /// Where `at` stood when everything before was known to survive a power cut.
     synced: Counters,
@@ -149,7 +150,7 @@ impl<S: Sink> LogWriter<S> {
             manifest_json: readable_json("manifest", manifest)?,
             library,
             started_ns: u64::try_from(started_ns).unwrap_or(0),
-            tick_nanos: manifest.rig.tick_nanos,
+            tick_nanos: manifest.rig.as_ref().map(|rig| rig.tick_nanos),
             at: Counters::default(),
             synced: Counters::default(),
             failure: None,
@@ -232,7 +233,10 @@ impl<S: Sink> LogWriter<S> {
         for slice in block_slices(rows) {
             let Some(last) = slice.last() else { continue };
             let (daq, derived) = blocks_from_rows(self.at.samples, slice);
-            self.at.controller_ns = last.tick.saturating_mul(self.tick_nanos);
+            self.at.controller_ns = match self.tick_nanos {
+                Some(nanos) => last.tick.saturating_mul(nanos),
+                None => last.tick / 1000,
+            };
             self.put(Channel::Daq, last.host, &daq.encode_to_vec())?;
             self.put(Channel::Derived, last.host, &derived.encode_to_vec())?;
             self.put_view(slice)?;

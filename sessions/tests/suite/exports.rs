@@ -1,6 +1,7 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
+use palpate_sessions::export::Beside;
 use palpate_sessions::{ExportError, Session, export_csv, export_parquet, read_table};
 use polars::prelude::{ParquetReader, SerReader};
 use std::path::Path;
@@ -9,12 +10,12 @@ use std::process::Command;
 fn session() -> Session {
     let mut rows = rows(3000, 41);
     rows[5].counts = None;
-    rows[6].volts = 1e-300;
+    rows[6].volts = Some(1e-300);
     open_bytes(&log_bytes(&rows, &[], Some(end(Nanos::ZERO)))).unwrap()
 }
 
 fn time_of(session: &Session, i: usize) -> f64 {
-    (session.rows[i].tick - session.rows[0].tick) as f64 * session.manifest.rig.tick().0
+    (session.rows[i].tick - session.rows[0].tick) as f64 * session.manifest.tick().0
 }
 
 #[test]
@@ -22,7 +23,7 @@ fn csv_holds_every_digit_and_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.csv");
     let session = session();
-    export_csv(&session, &path).unwrap();
+    export_csv(&session, &Beside::default(), &path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(
@@ -36,9 +37,9 @@ fn csv_holds_every_digit_and_reads_back() {
         assert_eq!(number(cells[0]), Some(time_of(&session, i)));
         assert_eq!(number(cells[1]), row.depth);
         assert_eq!(number(cells[2]), row.force);
-        assert_eq!(number(cells[3]), Some(row.volts));
+        assert_eq!(number(cells[3]), row.volts);
         assert_eq!(number(cells[4]), row.counts.map(f64::from));
-        assert_eq!(cells[5], row.pulses.to_string());
+        assert_eq!(cells[5], row.pulses.unwrap().to_string());
         assert_eq!(cells[6], row.phase.name());
         assert_eq!(cells[7], row.cycle.to_string());
     }
@@ -70,7 +71,7 @@ fn parquet_holds_the_same_with_units() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.parquet");
     let session = session();
-    export_parquet(&session, &path).unwrap();
+    export_parquet(&session, &Beside::default(), &path).unwrap();
     let mut reader = ParquetReader::new(std::fs::File::open(&path).unwrap());
     let metadata = reader.get_metadata().unwrap().clone();
     let pairs = metadata.key_value_metadata().clone().unwrap();
@@ -84,7 +85,7 @@ fn parquet_holds_the_same_with_units() {
     assert_eq!(units, expected);
     assert_eq!(value("palpate.session"), session.manifest.session_id);
     assert_eq!(value("palpate.software"), "0.1.0");
-    assert_eq!(value("palpate.record_version"), "1");
+    assert_eq!(value("palpate.record_version"), "2");
 
     let frame = reader.finish().unwrap();
     let column = |name: &str| frame.column(name).unwrap().clone();
@@ -102,7 +103,7 @@ fn parquet_holds_the_same_with_units() {
         assert_eq!(t.f64().unwrap().get(i), Some(time_of(&session, i)));
         assert_eq!(depth.f64().unwrap().get(i), row.depth);
         assert_eq!(force.f64().unwrap().get(i), row.force);
-        assert_eq!(signal.f64().unwrap().get(i), Some(row.volts));
+        assert_eq!(signal.f64().unwrap().get(i), row.volts);
         assert_eq!(counts.i32().unwrap().get(i), row.counts);
         assert_eq!(phase.str().unwrap().get(i), Some(row.phase.name()));
     }
@@ -207,19 +208,19 @@ print(json.dumps([session, topics]))
 fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    type Export = fn(&Session, &Path) -> Result<(), ExportError>;
+    type Export = fn(&Session, &Beside, &Path) -> Result<(), ExportError>;
     for (name, export) in [
         ("one.csv", export_csv as Export),
         ("one.parquet", export_parquet as Export),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, "mine").unwrap();
-        let refusal = export(&session, &path).unwrap_err();
+        let refusal = export(&session, &Beside::default(), &path).unwrap_err();
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
         assert!(matches!(
-            export(&session, &nowhere),
+            export(&session, &Beside::default(), &nowhere),
             Err(ExportError::Io { .. })
         ));
     }

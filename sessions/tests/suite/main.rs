@@ -9,6 +9,10 @@ mod exports;
 #[cfg(test)]
 mod faults;
 #[cfg(test)]
+mod foreign;
+#[cfg(test)]
+mod foreign_damage;
+#[cfg(test)]
 mod pace;
 #[cfg(test)]
 mod recovery;

@@ -90,7 +90,7 @@ fn a_log_without_an_end_opens_with_a_note() {
 #[test]
 fn a_newer_session_is_refused_with_both_versions() {
     let mut newer = manifest();
-    newer.record_version = 2;
+    newer.record_version = 3;
     newer.software_version = "3.1.4".into();
     let sink = MemorySink::default();
     let mut log = LogWriter::begin(sink.clone(), "memory", &newer).unwrap();
@@ -100,7 +100,7 @@ fn a_newer_session_is_refused_with_both_versions() {
     let refusal = open_bytes(&bytes).unwrap_err();
     assert!(matches!(refusal, ReadError::Newer { .. }));
     let text = refusal.to_string();
-    let expected = "was written by palpate 3.1.4 with record version 2; this palpate reads up to 1; update palpate";
+    let expected = "was written by palpate 3.1.4 with record version 3; this palpate reads up to 2; update palpate";
     assert!(text.ends_with(expected), "{text}");
 }
 
@@ -145,7 +145,7 @@ fn what_could_not_be_read_back_is_not_written() {
     let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
     let good = rows(3, 5);
     let mut bad = good.clone();
-    bad[1].volts = f64::NAN;
+    bad[1].volts = Some(f64::NAN);
     let refusal = log.append(&bad, &[]).unwrap_err();
     assert!(matches!(refusal, LogError::NotFinite { .. }), "{refusal}");
     let mut entries = entries(&rows(30, 5), 10);
@@ -167,7 +167,7 @@ fn what_could_not_be_read_back_is_not_written() {
     assert!(same_bits(&open_bytes(&bytes).unwrap().rows, &good));
 
     let mut manifest = manifest();
-    manifest.limits.travel_max.0 = f64::INFINITY;
+    manifest.limits.as_mut().unwrap().travel_max.0 = f64::INFINITY;
     let refusal = LogWriter::begin(MemorySink::default(), "memory", &manifest);
     assert!(refusal.is_err());
 }

@@ -61,7 +61,8 @@ pub fn manifest() -> Manifest {
         indenter: "sphere 10 mm".into(),
         about: about(),
         signal: Some(signal()),
-        rig: RigDescription {
+        imported: None,
+        rig: Some(RigDescription {
             name: "sim".into(),
             identity: "simulated rig".into(),
             settings: [("seed".to_owned(), "7".to_owned())].into(),
@@ -77,8 +78,8 @@ pub fn manifest() -> Manifest {
                 volts_per_count: 10.0 / 32768.0,
             }),
             noise_expected: Volts(0.1 + 0.2),
-        },
-        limits: Limits::for_travel(Position(149.999_999_999_999_97)),
+        }),
+        limits: Some(Limits::for_travel(Position(149.999_999_999_999_97))),
         calibration: serde_json::json!({"slope_n_per_v": 3.591_234_567_890_123_4}),
         plan: serde_json::json!({"kind": "ramp-and-hold", "depth_mm": 30.0}),
         settings: serde_json::json!(null),
@@ -98,8 +99,8 @@ pub fn rows(count: usize, seed: u64) -> Vec<Row> {
                 tick: 1000 + i as u64,
                 host: Nanos(1_000_000 * i as u64 + random.next() % 1000),
                 counts: Some((volts * 3276.8) as i32),
-                volts,
-                pulses: (i / 7) as i64 - 3,
+                volts: Some(volts),
+                pulses: Some((i / 7) as i64 - 3),
                 status: 33,
                 force: (i > count / 5).then_some(volts * 3.59),
                 depth: (i > count / 4).then_some(i as f64 * 0.000_75),
@@ -223,7 +224,7 @@ pub fn open_bytes(bytes: &[u8]) -> Result<Session, palpate_sessions::ReadError> 
 pub fn same_bits(a: &[Row], b: &[Row]) -> bool {
     let bits = |row: &Row| {
         (
-            row.volts.to_bits(),
+            row.volts.map(f64::to_bits),
             row.force.map(f64::to_bits),
             row.depth.map(f64::to_bits),
         )

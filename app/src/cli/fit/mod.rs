@@ -9,15 +9,16 @@ pub(super) mod sources;
 
 use super::Failure;
 use super::analysis::Who;
-use super::new_file;
 use super::output::Output;
+use super::{compliance, new_file};
 use crate::report::{picture, text};
-use crate::workers::fit::{Fitted, fit_analysed};
+use crate::workers::fit::Fitted;
 use clap::Args;
 use intervals::Intervals;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitOptions, FitReport, Systematic};
-use palpate_protocols::analysis::{SourceError, Stretch, Wanted};
+use palpate_protocols::analysis::{self, SourceError, Stretch, Wanted};
+use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -75,6 +76,10 @@ pub struct FitArgs {
     save: Option<String>,
     #[command(flatten)]
     who: Who,
+    /// Fit over depths less what the rig gave way: last for the compliance in force for each
+    /// session's rig, a file, or an id of the library
+    #[arg(long, value_name = "FILE|last")]
+    compliance: Option<String>,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -95,6 +100,11 @@ impl FitArgs {
             is_rejected_included: self.include_rejected,
         }
     }
+
+    /// Which compliance is taken from which depths.
+    fn corrections(&self) -> Result<Corrections, Failure> {
+        compliance::corrections(self.compliance.as_deref())
+    }
 }
 
 /// How every source is fitted.
@@ -104,6 +114,7 @@ struct Recipe {
     is_systematic: bool,
     wanted: Wanted,
     analysis: Option<String>,
+    corrections: Corrections,
 }
 
 impl Recipe {
@@ -112,9 +123,13 @@ impl Recipe {
     }
 
     fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
-        let (columns, analysis) = (self.columns.as_ref(), self.analysis.as_deref());
-        let fitted = fit_analysed(path, columns, self.wanted, analysis, &self.options);
-        let fitted = fitted?;
+        let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
+        let mut source = analysis::read_analysed(path, columns, self.wanted, name)?;
+        let compliance = self.corrections.apply(&mut source)?;
+        let fitted = Fitted {
+            compliance,
+            ..Fitted::of(source, &self.options)
+        };
         Ok(match self.is_systematic {
             true => fitted.with_systematic(&self.options),
             false => fitted,
@@ -131,6 +146,9 @@ struct FitOutput<'a> {
     /// What the calibration adds; absent for tables and with `--no-systematic`.
     #[serde(skip_serializing_if = "Option::is_none")]
     systematic: Option<Systematic>,
+    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compliance: Option<Correction>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -153,6 +171,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
         analysis: args.analysis.clone(),
+        corrections: args.corrections()?,
     };
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
@@ -203,11 +222,13 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         report: &report,
         intervals: &intervals,
         systematic: fitted.systematic,
+        compliance: fitted.compliance,
         seconds: fitted.seconds,
     };
     saved::keep(args, source, &object)?;
     output.result(&object, || {
         let mut lines = vec![text::whole(&report)];
+        lines.extend(object.compliance.as_ref().map(Correction::sentence));
         lines.extend(intervals.lines(&report));
         lines.join("\n")
     });

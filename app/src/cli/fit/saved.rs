@@ -36,6 +36,7 @@ pub(super) fn keep(args: &FitArgs, source: &Path, results: &impl Serialize) -> R
             "profile": args.profile,
             "bootstrap": args.bootstrap,
             "seed": args.seed,
+            "compliance": args.compliance,
             "include_rejected": args.include_rejected,
         }),
         results: serde_json::to_value(results).map_err(Failure::failed)?,

@@ -1,0 +1,239 @@
+//! Where the numbers of a part begin, what their columns are called, and which decimal sign they have.
+
+use super::columns::{is_known_unit_cell, is_named, is_unit_cell};
+use super::decimal::{Decimal, Evidence, evidence};
+use super::rows::{Cell, Rows};
+use super::said::Said;
+use super::told::Told;
+
+/// Names and units of the columns.
+#[derive(Clone, Debug, PartialEq)]
+pub(super) struct Header {
+    pub names: Vec<String>,
+    /// As a row of units has them; empty without one.
+    pub units: Vec<String>,
+    pub width: usize,
+    /// Where the names stand, in words.
+    pub place: String,
+    /// Index of the first row of numbers.
+    pub first: usize,
+}
+
+/// So many rows of numbers one after the other are the table; fewer may be a remark with numbers in it.
+const ROWS_OF_A_TABLE: usize = 3;
+
+fn width_of(cells: &[Cell]) -> usize {
+    cells
+        .iter()
+        .rposition(|cell| !cell.is_empty())
+        .map_or(0, |last| last + 1)
+}
+
+/// The first row of the first table, or of the longest run of rows with numbers.
+fn first_numbers(rows: &Rows<'_>, from: usize) -> Option<usize> {
+    let mut best: Option<(usize, usize)> = None;
+    let mut run: Option<(usize, usize)> = None;
+    for index in from..rows.len() {
+        let cells = rows.words(index);
+        let numbers = cells.iter().filter(|cell| cell.is_number()).count();
+        if width_of(&cells) == 0 {
+            continue;
+        }
+        run = (numbers >= 2).then(|| run.map_or((index, 1), |(start, count)| (start, count + 1)));
+        if let Some((start, count)) = run {
+            if best.is_none_or(|(_, most)| count > most) {
+                best = Some((start, count));
+            }
+            if count == ROWS_OF_A_TABLE {
+                return Some(start);
+            }
+        }
+    }
+    best.map(|(start, _)| start)
+}
+
+fn texts(cells: &[Cell]) -> Vec<String> {
+    cells.iter().map(Cell::text).collect()
+}
+
+/// The nearest row above that is not blank.
+fn above(rows: &Rows<'_>, index: usize) -> Option<usize> {
+    (0..index).rev().find(|&i| width_of(&rows.words(i)) > 0)
+}
+
+fn is_units(cells: &[Cell]) -> bool {
+    let filled: Vec<String> = texts(cells)
+        .into_iter()
+        .filter(|text| !text.is_empty())
+        .collect();
+    filled.iter().all(|text| is_unit_cell(text))
+        && filled.iter().any(|text| is_known_unit_cell(text))
+}
+
+fn is_names(cells: &[Cell]) -> bool {
+    cells
+        .iter()
+        .any(|cell| matches!(cell, Cell::Text(text) if is_named(text)))
+}
+
+/// Finds header, units and the first row of numbers. The inner `None`: there are no numbers at all.
+pub(super) fn find(
+    rows: &Rows<'_>,
+    told: &Told,
+    said: &mut Said,
+) -> Result<Option<Header>, String> {
+    let row_told = |what: &str, number: usize| {
+        rows.index_of(number).ok_or_else(|| {
+            format!(
+                "there is no {} {number} for the {what}, or it is blank",
+                rows.word()
+            )
+        })
+    };
+    let header_told = told
+        .header_row
+        .map(|number| row_told("header", number))
+        .transpose()?;
+    let units_told = match told.units_row {
+        None | Some(0) => None,
+        Some(number) => Some(row_told("units", number)?),
+    };
+    let from = header_told.max(units_told).map_or(0, |index| index + 1);
+    let Some(first) = first_numbers(rows, from) else {
+        return Ok(None);
+    };
+    let may_have_units = told.units_row.is_none();
+    let mut units = units_told;
+    let mut header = header_told;
+    if header.is_none() && told.names.is_empty() {
+        let nearest = above(rows, units.unwrap_or(first));
+        header = nearest;
+        if let (Some(index), true) = (nearest, may_have_units) {
+            let next = above(rows, index).filter(|&next| is_names(&rows.words(next)));
+            let cells = rows.words(index);
+            if is_units(&cells) && (next.is_some() || !is_names(&cells)) {
+                (units, header) = (Some(index), next);
+            }
+        }
+    } else if let (Some(index), None, true) = (header, units, may_have_units) {
+        let between = (index + 1..first).find(|&i| is_units(&rows.words(i)));
+        units = between;
+    }
+    let is_header = |index: &usize| {
+        rows.words(*index)
+            .iter()
+            .any(|cell| matches!(cell, Cell::Text(_)))
+    };
+    let header = header.filter(is_header);
+    let word = rows.word();
+    let (names, place) = match header {
+        _ if !told.names.is_empty() => (told.names.clone(), "the names told".to_owned()),
+        Some(index) => (
+            texts(&rows.words(index)),
+            format!("{word} {}", rows.number(index)),
+        ),
+        None => {
+            return Err(format!(
+                "no names of columns stand above the numbers that begin in {word} {}; name every column with --columns, as in --columns t_s,depth_mm,force_N, or say the {word} with --header-row",
+                rows.number(first)
+            ));
+        }
+    };
+    said.say(
+        "header",
+        place.clone(),
+        !told.names.is_empty() || told.header_row.is_some(),
+        "--header-row N or --columns NAME,...",
+    );
+    let in_words = match units {
+        Some(index) => format!("{word} {}", rows.number(index)),
+        None => "no row of their own".into(),
+    };
+    said.say("units", in_words, told.units_row.is_some(), "--units-row N");
+    let width = names
+        .iter()
+        .rposition(|name| !name.is_empty())
+        .map_or(0, |last| last + 1);
+    let named = told.names.len();
+    if named > 0 {
+        let found = width_of(&rows.words(first));
+        if found != named {
+            return Err(format!(
+                "{word} {} has {found} columns but {named} are named; name every one",
+                rows.number(first)
+            ));
+        }
+    }
+    Ok(Some(Header {
+        names,
+        units: units.map_or_else(Vec::new, |index| texts(&rows.words(index))),
+        width,
+        place,
+        first,
+    }))
+}
+
+/// Rows looked at before it is believed that none will tell the decimal sign otherwise; a number that
+/// cannot be read with the sign found is refused wherever it stands.
+const ROWS_FOR_DECIMAL: usize = 2000;
+
+/// The decimal sign of the columns that are read.
+pub(super) fn decimal(
+    rows: &Rows<'_>,
+    header: &Header,
+    columns: &[usize],
+    told: Option<Decimal>,
+    said: &mut Said,
+) -> Result<Decimal, String> {
+    let option = "--decimal point or comma";
+    if let Some(decimal) = told {
+        said.say("decimal sign", decimal.name(), true, option);
+        return Ok(decimal);
+    }
+    let word = rows.word();
+    let mut found: Option<(Decimal, String)> = None;
+    let mut either: Option<String> = None;
+    for index in header.first..rows.len() {
+        if found.is_some() && index > header.first + ROWS_FOR_DECIMAL {
+            break;
+        }
+        let cells = rows.words(index);
+        for cell in columns.iter().filter_map(|&column| cells.get(column)) {
+            let Cell::Text(text) = cell else { continue };
+            let here = || format!("'{text}' in {word} {}", rows.number(index));
+            match (evidence(text), &found) {
+                (Evidence::Only(decimal), None) => found = Some((decimal, here())),
+                (Evidence::Only(decimal), Some((before, place))) if decimal != *before => {
+                    return Err(format!(
+                        "{place} has a decimal {}, {} a decimal {}; say which counts with --decimal, or mend the file",
+                        before.name(),
+                        here(),
+                        decimal.name()
+                    ));
+                }
+                (Evidence::Either, _) => {
+                    either.get_or_insert_with(here);
+                }
+                _ => {}
+            }
+        }
+    }
+    match (found, either) {
+        (Some((decimal, place)), _) => {
+            said.say(
+                "decimal sign",
+                format!("{}, from {place}", decimal.name()),
+                false,
+                option,
+            );
+            Ok(decimal)
+        }
+        (None, Some(place)) => Err(format!(
+            "{place} could be in thousands or have a decimal sign, and no other number tells; say --decimal point or --decimal comma"
+        )),
+        (None, None) => {
+            said.say("decimal sign", "none needed", false, option);
+            Ok(Decimal::Point)
+        }
+    }
+}

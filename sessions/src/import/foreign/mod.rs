@@ -1,0 +1,287 @@
+//! Files of other programs: what layout, encoding, delimiter, decimal sign, header and units they have is
+//! detected, said, and can be told instead. What has two readings is refused with the question.
+//!
+//! Start at [`open_foreign`]; [`keep`] makes a session of a part.
+
+mod columns;
+mod decimal;
+mod encoding;
+mod keep;
+mod layout;
+mod legacy;
+mod parts;
+mod rows;
+mod said;
+mod samples;
+mod told;
+mod unzipped;
+mod workbook;
+
+pub use decimal::Decimal;
+pub use encoding::TextEncoding;
+pub use keep::{KeepError, Kept, folder_name, keep};
+pub use rows::Delimiter;
+pub use samples::Sample;
+pub use told::{ColumnChoice, Fault, Format, Told, UnitChoice, ZeroChoice};
+
+use crate::imported::Imported;
+use columns::Unknown;
+use rows::Rows;
+use said::Said;
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Largest text read, in bytes: with what is made of it, about four times as much memory.
+const TEXT_BYTES_MAX: u64 = 256 << 20;
+
+/// Largest workbook read, in bytes; its cells are counted beside.
+const WORKBOOK_BYTES_MAX: u64 = 64 << 20;
+
+/// A foreign file could not be read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ForeignError {
+    /// The disk refused.
+    #[error("cannot read {} ({source}); check the path", path.display())]
+    Io {
+        /// The file.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+    /// It is not understood.
+    #[error("{}: {reason}", path.display())]
+    Content {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong, where, and what to do.
+        reason: String,
+    },
+}
+
+/// A foreign file in memory.
+#[derive(Clone, Debug)]
+pub struct Foreign {
+    /// Its bytes, untouched.
+    pub bytes: Vec<u8>,
+    /// Its measurements, in order.
+    pub parts: Vec<ForeignPart>,
+    /// What in it is no measurement, one sentence each.
+    pub left_out: Vec<String>,
+}
+
+/// One measurement of a foreign file.
+#[derive(Clone, Debug)]
+pub struct ForeignPart {
+    /// What the session will say of it.
+    pub imported: Imported,
+    /// Its samples, at least two, in order of time.
+    pub samples: Vec<Sample>,
+}
+
+/// Reads a foreign file.
+pub fn open_foreign(path: &Path, told: &Told) -> Result<Foreign, ForeignError> {
+    let failed = |source| ForeignError::Io {
+        path: path.into(),
+        source,
+    };
+    let refused = |reason| ForeignError::Content {
+        path: path.into(),
+        reason,
+    };
+    let size = std::fs::metadata(path).map_err(failed)?;
+    if !size.is_file() {
+        return Err(refused("it is not a file; name a file of a tester".into()));
+    }
+    if size.len() > TEXT_BYTES_MAX {
+        return Err(refused(format!(
+            "it has {} bytes, and {TEXT_BYTES_MAX} are the most; export it in parts",
+            size.len()
+        )));
+    }
+    let bytes = std::fs::read(path).map_err(failed)?;
+    let name = path.file_name().unwrap_or_default().to_string_lossy();
+    parse_foreign(&name, bytes, told).map_err(refused)
+}
+
+/// As [`open_foreign`], from bytes; the error is one sentence.
+pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign, String> {
+    if bytes.is_empty() {
+        return Err("it is empty".into());
+    }
+    let is_workbook = match told.format {
+        Some(format) => format == Format::Workbook,
+        None => workbook::is_one(&bytes),
+    };
+    let mut said = Said::default();
+    let mut origin = Imported {
+        file: file.into(),
+        bytes: bytes.len() as u64,
+        checksum: format!("{:08x}", crc32fast::hash(&bytes)),
+        format: Format::Workbook.name().into(),
+        part: String::new(),
+        first_time_s: 0.0,
+        readings: Vec::new(),
+        facts: Vec::new(),
+        remarks: Vec::new(),
+    };
+    if is_workbook {
+        if bytes.len() as u64 > WORKBOOK_BYTES_MAX {
+            return Err(format!(
+                "the workbook has {} bytes, and {WORKBOOK_BYTES_MAX} are the most; export the measurement as text",
+                bytes.len()
+            ));
+        }
+        said.say(
+            "layout",
+            origin.format.as_str(),
+            told.format.is_some(),
+            "--format NAME",
+        );
+        origin.readings = said.0;
+        let sheets = workbook::sheets(&bytes)?
+            .into_iter()
+            .map(|(name, rows)| RawPart {
+                name,
+                facts: Vec::new(),
+                rows: Rows::Cells(rows),
+            });
+        let (parts, left_out) = understand(sheets.collect(), &origin, told)?;
+        return Ok(Foreign {
+            bytes,
+            parts,
+            left_out,
+        });
+    }
+    let (text, how) = encoding::decode(&bytes, told.encoding)?;
+    let lines = parts::lines_of(&text);
+    let format = told.format.unwrap_or_else(|| parts::detect(&lines));
+    said.say(
+        "layout",
+        format.name(),
+        told.format.is_some(),
+        "--format NAME",
+    );
+    said.say("encoding", how, told.encoding.is_some(), "--encoding NAME");
+    let delimiter = told.delimiter.or_else(|| Delimiter::detect(&lines));
+    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say so with --delimiter")?;
+    said.say(
+        "delimiter",
+        delimiter.name(),
+        told.delimiter.is_some(),
+        "--delimiter NAME",
+    );
+    let cut = parts::cut(format, lines)?
+        .into_iter()
+        .map(|part| RawPart {
+            name: part.name,
+            facts: part.facts,
+            rows: Rows::Lines {
+                lines: part.lines,
+                delimiter,
+            },
+        })
+        .collect();
+    origin.format = format.name().into();
+    origin.readings = said.0;
+    let (parts, left_out) = understand(cut, &origin, told)?;
+    Ok(Foreign {
+        bytes,
+        parts,
+        left_out,
+    })
+}
+
+/// A part before its columns are known.
+struct RawPart<'a> {
+    name: String,
+    facts: Vec<(String, String)>,
+    rows: Rows<'a>,
+}
+
+/// Reads the parts that are wanted; one without a time is left out.
+fn understand(
+    cut: Vec<RawPart<'_>>,
+    origin: &Imported,
+    told: &Told,
+) -> Result<(Vec<ForeignPart>, Vec<String>), String> {
+    let is_whole = cut.len() == 1 && cut[0].name.is_empty();
+    let is_wanted = |index: usize, name: &str| {
+        let is_it = |wanted: &String| {
+            wanted.to_lowercase() == name.to_lowercase() || *wanted == (index + 1).to_string()
+        };
+        told.parts.is_empty() || told.parts.iter().any(is_it)
+    };
+    for wanted in &told.parts {
+        let is_it = |(index, part): (usize, &RawPart<'_>)| {
+            wanted.to_lowercase() == part.name.to_lowercase() || *wanted == (index + 1).to_string()
+        };
+        if !cut.iter().enumerate().any(is_it) {
+            let names: Vec<String> = cut.iter().map(|part| format!("'{}'", part.name)).collect();
+            return Err(format!(
+                "no part is called '{wanted}'; there are {}",
+                names.join(", ")
+            ));
+        }
+    }
+    let (mut parts, mut left_out) = (Vec::new(), Vec::new());
+    for (index, part) in cut.iter().enumerate() {
+        if !is_wanted(index, &part.name) {
+            continue;
+        }
+        let named = |reason: String| match is_whole {
+            true => reason,
+            false => format!("part '{}': {reason}", part.name),
+        };
+        match understand_one(part, origin, told) {
+            Ok(found) => parts.push(found),
+            Err(Unknown::NoMeasurement(reason)) => left_out.push(named(reason)),
+            Err(Unknown::Other(reason)) if is_whole => return Err(reason),
+            Err(Unknown::Other(reason)) => {
+                return Err(format!(
+                    "{}; other parts can be chosen with --part",
+                    named(reason)
+                ));
+            }
+        }
+    }
+    if parts.is_empty() {
+        let reason = left_out.into_iter().next();
+        return Err(reason.unwrap_or_else(|| "it holds no measurement".into()));
+    }
+    Ok((parts, left_out))
+}
+
+fn understand_one(
+    part: &RawPart<'_>,
+    origin: &Imported,
+    told: &Told,
+) -> Result<ForeignPart, Unknown> {
+    let mut said = Said(origin.readings.clone());
+    let header = layout::find(&part.rows, told, &mut said)
+        .map_err(Unknown::NoMeasurement)?
+        .ok_or_else(|| Unknown::NoMeasurement("it has no rows of numbers".into()))?;
+    if part.rows.len() - header.first < 2 {
+        let reason = "it has fewer than two rows of numbers".into();
+        return Err(Unknown::NoMeasurement(reason));
+    }
+    let columns = columns::find(&header, told, &mut said)?;
+    let mut read = vec![columns.time.index, columns.depth.index, columns.force.index];
+    read.extend(columns.signal.as_ref().map(|column| column.index));
+    let decimal = layout::decimal(&part.rows, &header, &read, told.decimal, &mut said)
+        .map_err(Unknown::Other)?;
+    let (samples, remarks) = samples::read(&part.rows, &header, &columns, decimal, &told.skip)
+        .map_err(Unknown::Other)?;
+    Ok(ForeignPart {
+        imported: Imported {
+            part: part.name.clone(),
+            first_time_s: samples.first().map_or(0.0, |first| first.t),
+            readings: said.0,
+            facts: part.facts.clone(),
+            remarks,
+            ..origin.clone()
+        },
+        samples,
+    })
+}

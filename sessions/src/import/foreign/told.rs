@@ -1,0 +1,184 @@
+//! What a person says of a file; everything else is detected.
+
+use super::super::header::Quantity;
+use super::decimal::Decimal;
+use super::encoding::TextEncoding;
+use super::rows::Delimiter;
+
+/// Everything that can be said. What is not said is detected.
+#[derive(Clone, Debug, Default)]
+pub struct Told {
+    /// Layout of the file.
+    pub format: Option<Format>,
+    /// What stands between cells.
+    pub delimiter: Option<Delimiter>,
+    /// Encoding of the text.
+    pub encoding: Option<TextEncoding>,
+    /// Decimal sign.
+    pub decimal: Option<Decimal>,
+    /// Names of all columns, in order, where the file has none.
+    pub names: Vec<String>,
+    /// Which column is what.
+    pub columns: Vec<ColumnChoice>,
+    /// In which unit.
+    pub units: Vec<UnitChoice>,
+    /// What counts as zero.
+    pub zeros: Vec<ZeroChoice>,
+    /// Line of the column names, from 1.
+    pub header_row: Option<usize>,
+    /// Line of the units, from 1; 0 for none.
+    pub units_row: Option<usize>,
+    /// Sheets, blocks or intervals wanted, by name or number from 1; empty for all.
+    pub parts: Vec<String>,
+    /// Rows that are left out instead of refused.
+    pub skip: Vec<Fault>,
+}
+
+/// A layout that is known.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Delimited text with one header.
+    Table,
+    /// Blocks of a Biomomentum Mach-1.
+    Mach1,
+    /// Intervals or steps of a rheometer.
+    Rheometer,
+    /// Sheets of an .xlsx or .xls workbook.
+    Workbook,
+}
+
+impl Format {
+    const ALL: [Self; 4] = [Self::Table, Self::Mach1, Self::Rheometer, Self::Workbook];
+
+    /// The name on the command line and in a session.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Table => "table",
+            Self::Mach1 => "mach-1",
+            Self::Rheometer => "rheometer",
+            Self::Workbook => "workbook",
+        }
+    }
+}
+
+impl std::str::FromStr for Format {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|one| one.name() == text);
+        found.ok_or_else(|| format!("give {}", Self::ALL.map(Self::name).join(", ")))
+    }
+}
+
+/// A row that is not as it should be.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Fault {
+    /// A value is empty or NaN.
+    Missing,
+    /// The time is that of the row before.
+    Repeated,
+    /// The time is before that of a row before.
+    Backward,
+}
+
+impl Fault {
+    pub(super) const ALL: [Self; 3] = [Self::Missing, Self::Repeated, Self::Backward];
+
+    pub(super) fn name(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Repeated => "repeated",
+            Self::Backward => "backward",
+        }
+    }
+}
+
+impl std::str::FromStr for Fault {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let found = Self::ALL.into_iter().find(|one| one.name() == text);
+        found.ok_or_else(|| format!("give {}", Self::ALL.map(Self::name).join(", ")))
+    }
+}
+
+fn quantity_and(text: &str, what: &str) -> Result<(Quantity, String), String> {
+    let names = || Quantity::ALL.map(Quantity::name).join(", ");
+    let wrong = || format!("give QUANTITY={what}, the quantity one of {}", names());
+    let (name, rest) = text.split_once('=').ok_or_else(wrong)?;
+    let quantity = Quantity::ALL
+        .into_iter()
+        .find(|one| one.name() == name.trim())
+        .ok_or_else(wrong)?;
+    match rest.trim() {
+        "" => Err(wrong()),
+        rest => Ok((quantity, rest.to_owned())),
+    }
+}
+
+/// `depth=NAME`; with a minus before the name its values are turned round.
+#[derive(Clone, Debug)]
+pub struct ColumnChoice {
+    pub(super) quantity: Quantity,
+    pub(super) name: String,
+}
+
+impl std::str::FromStr for ColumnChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (quantity, name) = quantity_and(text, "NAME")?;
+        Ok(Self { quantity, name })
+    }
+}
+
+/// `force=gf`.
+#[derive(Clone, Debug)]
+pub struct UnitChoice {
+    pub(super) quantity: Quantity,
+    pub(super) unit: String,
+}
+
+impl std::str::FromStr for UnitChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (quantity, unit) = quantity_and(text, "UNIT")?;
+        if quantity.scale(&unit).is_none() {
+            return Err(format!(
+                "the unit '{unit}' of the {} is not known; known are {}",
+                quantity.name(),
+                quantity.known_units()
+            ));
+        }
+        Ok(Self { quantity, unit })
+    }
+}
+
+/// `depth=first` or `depth=12.5`, in s, mm, N or V.
+#[derive(Clone, Debug)]
+pub struct ZeroChoice {
+    pub(super) quantity: Quantity,
+    /// `None` for the first row's value.
+    pub(super) value: Option<f64>,
+}
+
+impl std::str::FromStr for ZeroChoice {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (quantity, rest) = quantity_and(text, "first|NUMBER")?;
+        if quantity == Quantity::Time {
+            return Err("time counts from the first row in any case".into());
+        }
+        let value = match rest.as_str() {
+            "first" => None,
+            number => {
+                let value = number.parse().ok().filter(|value: &f64| value.is_finite());
+                Some(value.ok_or("give first or a number in mm, N or V")?)
+            }
+        };
+        Ok(Self { quantity, value })
+    }
+}

@@ -1,0 +1,540 @@
+//! Files of other programs: what is taken for what, what is refused, and the session that is made.
+//!
+//! The numbers are known by construction; the layouts are those cited in `docs/guide/import.md`.
+
+use chrono::{TimeZone, Utc};
+use palpate_model::rig::Phase;
+use palpate_sessions::import::{
+    Foreign, ForeignPart, Kept, Sample, Told, folder_name, keep, open_foreign, parse_foreign,
+};
+use palpate_sessions::{Labels, ORIGINAL_FOLDER, Session};
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+
+fn told() -> Told {
+    Told::default()
+}
+
+/// Tells `QUANTITY=...` options, as the command line does.
+fn telling(options: &[(&str, &str)]) -> Told {
+    let mut told = told();
+    for (option, value) in options {
+        let text = *value;
+        match *option {
+            "column" => told.columns.push(text.parse().unwrap()),
+            "unit" => told.units.push(text.parse().unwrap()),
+            "zero" => told.zeros.push(text.parse().unwrap()),
+            "skip" => told.skip.push(text.parse().unwrap()),
+            "decimal" => told.decimal = Some(text.parse().unwrap()),
+            "delimiter" => told.delimiter = Some(text.parse().unwrap()),
+            "columns" => told.names = text.split(',').map(str::to_owned).collect(),
+            "header-row" => told.header_row = Some(text.parse().unwrap()),
+            "units-row" => told.units_row = Some(text.parse().unwrap()),
+            "part" => told.parts.push(text.to_owned()),
+            other => panic!("{other}"),
+        }
+    }
+    told
+}
+
+fn read(text: &str, told: &Told) -> Foreign {
+    parse_foreign("file.txt", text.as_bytes().to_vec(), told)
+        .unwrap_or_else(|reason| panic!("{reason}\n{text}"))
+}
+
+fn refused(text: &str, told: &Told) -> String {
+    match parse_foreign("file.txt", text.as_bytes().to_vec(), told) {
+        Ok(read) => panic!("{text:?} was read as {:?}", read.parts),
+        Err(reason) => reason,
+    }
+}
+
+/// Time, depth and force of a part.
+fn numbers(part: &ForeignPart) -> Vec<[f64; 3]> {
+    let one = |sample: &Sample| [sample.t, sample.depth.unwrap(), sample.force.unwrap()];
+    part.samples.iter().map(one).collect()
+}
+
+fn said(part: &ForeignPart, what: &str) -> String {
+    let readings = &part.imported.readings;
+    let one = readings.iter().find(|one| one.what == what);
+    let one = one.unwrap_or_else(|| panic!("nothing said of {what}: {readings:?}"));
+    format!("{} ({})", one.found, one.how)
+}
+
+fn utf16(text: &str) -> Vec<u8> {
+    let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+    units.flat_map(u16::to_le_bytes).collect()
+}
+
+#[test]
+fn a_table_is_understood_and_everything_is_said() {
+    let text = "Sample;gel 3\nOperator;Ada\n\nPrüfzeit;Weg;Kraft;Spannung\ns;µm;mN;mV\n\
+        0,0;0;0,3;1,5\n0,1;250;1.250,5;2,5\n0,2;500;2.500,75;3,5\n";
+    let bytes: Vec<u8> = text.chars().map(|c| c as u8).collect();
+    let read = parse_foreign("Zug.csv", bytes.clone(), &told()).unwrap();
+    let part = &read.parts[0];
+    let expected = [[0.0, 0.0, 0.0003], [0.1, 0.25, 1.2505], [0.2, 0.5, 2.50075]];
+    assert_eq!(numbers(part), expected);
+    assert_eq!(part.samples[1].signal, Some(0.0025));
+    assert_eq!(read.bytes, bytes);
+    for (what, expected) in [
+        ("layout", "table (detected)"),
+        (
+            "encoding",
+            "windows-1252, for it is not UTF-8; other 8-bit encodings look alike (detected)",
+        ),
+        ("delimiter", "semicolon (detected)"),
+        ("header", "line 4 (detected)"),
+        ("units", "line 5 (detected)"),
+        ("decimal sign", "comma, from '0,0' in line 6 (detected)"),
+        ("depth", "column 2 'Weg' in µm (detected)"),
+        ("force", "column 3 'Kraft' in mN (detected)"),
+    ] {
+        assert_eq!(said(part, what), expected);
+    }
+}
+
+#[test]
+fn what_is_told_outweighs_what_is_detected() {
+    let text = "time;z;up;load\n0;10,5;1;-2\n1;10,25;1;-3\n2;10;2;-4\n";
+    let options = [
+        ("column", "depth=-z"),
+        ("column", "force=-4"),
+        ("unit", "depth=mm"),
+        ("unit", "force=gf"),
+        ("unit", "time=ms"),
+        ("zero", "depth=first"),
+    ];
+    let read = read(text, &telling(&options));
+    let part = &read.parts[0];
+    let gram = 0.009_806_65;
+    let expected = [
+        [0.0, 0.0, 2.0 * gram],
+        [1e-3, 0.25, 3.0 * gram],
+        [2e-3, 0.5, 4.0 * gram],
+    ];
+    for (found, expected) in numbers(part).iter().zip(expected) {
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() <= 1e-16, "{found} {expected}");
+        }
+    }
+    let expected = "column 2 'z' in mm, its sign turned, counted from the first row (told)";
+    assert_eq!(said(part, "depth"), expected);
+    assert_eq!(
+        said(part, "force"),
+        "column 4 'load' in gf, its sign turned (told)"
+    );
+    // A file without names.
+    let bare = "0 0,5 1\n1 0,75 2\n";
+    let read_bare = |options: &[(&str, &str)]| numbers(&read_one(bare, &telling(options)));
+    let expected = [[0.0, 0.5, 1.0], [1.0, 0.75, 2.0]];
+    assert_eq!(read_bare(&[("columns", "t_s,x_mm,F_N")]), expected);
+    let numbered = [
+        ("columns", "a,b,c"),
+        ("column", "time=1"),
+        ("column", "depth=2"),
+        ("column", "force=3"),
+        ("unit", "depth=mm"),
+        ("unit", "force=N"),
+    ];
+    assert_eq!(read_bare(&numbered), expected);
+}
+
+fn read_one(text: &str, told: &Told) -> ForeignPart {
+    read(text, told).parts.remove(0)
+}
+
+#[test]
+fn what_has_two_readings_is_refused_with_the_question() {
+    for (text, options, told) in [
+        (
+            "t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n",
+            &[][..],
+            "'1,234' in line 2 could be in thousands",
+        ),
+        (
+            "t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n",
+            &[],
+            "say which counts with --decimal",
+        ),
+        (
+            "t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n",
+            &[("decimal", "comma")],
+            "line 3: the depth '0.75' is not a number",
+        ),
+        (
+            "t_s,Step time,x_mm,F_N\n0,0,0,0\n1,1,1,1\n",
+            &[],
+            "could both be the time",
+        ),
+        (
+            "t_s,x_mm,F_furlong\n0,0,0\n1,1,1\n",
+            &[],
+            "the unit 'furlong' of the force",
+        ),
+        (
+            "t_s,x_mm,force\n0,0,0\n1,1,1\n",
+            &[],
+            "has no unit; say it with --unit force=UNIT, one of N, mN",
+        ),
+        (
+            "t_s,x_mm\n0,0\n1,1\n",
+            &[],
+            "no column is known as the force (line 1 has 't_s', 'x_mm')",
+        ),
+        ("0,0,0\n1,1,1\n", &[], "no names of columns stand above"),
+        (
+            "0,0,0\n1,1,1\n",
+            &[("columns", "t_s,x_mm")],
+            "has 3 columns but 2 are named",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,1,1\n",
+            &[("column", "depth=y")],
+            "no column is called 'y' in line 1",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,1,1,9\n",
+            &[],
+            "line 3 has a cell in column 4 where the header has 3",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,1,one\n2,2,2\n",
+            &[],
+            "line 3: the force 'one' is not a number",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n",
+            &[],
+            "line 3: there is no depth; mend the file, or leave such rows out with --skip missing",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n",
+            &[],
+            "line 3: there is no force",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n0,1,1\n2,2,2\n",
+            &[],
+            "line 3: the time 0 s is that of the row before",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n",
+            &[],
+            "line 4: the time goes back from 2 to 1 s",
+        ),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n",
+            &[("part", "x")],
+            "no part is called 'x'",
+        ),
+        ("t_s,x_mm,F_N\n0,0,0\n", &[], "fewer than two rows"),
+        ("nothing of use\n", &[], "no line holds two numbers"),
+        (
+            "t_s,x_mm,F_N\n0,0,0\n1,1,\"1\n",
+            &[],
+            "line 3: a quote is not closed",
+        ),
+    ] {
+        let reason = refused(text, &telling(options));
+        assert!(reason.contains(told), "{text:?}: {reason}");
+    }
+    assert!(parse_foreign("f", Vec::new(), &self::told()).is_err());
+}
+
+#[test]
+fn rows_left_out_are_counted_and_gaps_are_told() {
+    let mut text = "t_s,x_mm,F_N\n".to_owned();
+    for i in 0..50 {
+        let t = 0.1 * f64::from(i);
+        writeln!(text, "{t:.1},{},{}", 0.01 * t, 0.2 * t).unwrap();
+    }
+    text += "5.0,,1\n4.9,1,1\n4.9,1,1\n4.0,1,1\n5.5,1,1\n5.6,1,nan\n";
+    let all = [
+        ("skip", "missing"),
+        ("skip", "repeated"),
+        ("skip", "backward"),
+    ];
+    let part = read_one(&text, &telling(&all));
+    assert_eq!(part.samples.len(), 51);
+    let expected = [
+        "2 rows without a value are left out, as told; the first is line 52",
+        "2 rows with the time of the row before are left out, as told; the first is line 53",
+        "1 rows whose time goes back are left out, as told; the first is line 55",
+        "1 gaps: after line 51 nothing for 0.600000 s where rows are 0.100000 s apart; nothing is filled in",
+    ];
+    assert_eq!(part.imported.remarks, expected);
+    for (option, value) in all {
+        let others: Vec<(&str, &str)> = all.into_iter().filter(|one| one.1 != value).collect();
+        let reason = refused(&text, &telling(&others));
+        assert!(reason.contains(&format!("--{option} {value}")), "{reason}");
+    }
+    let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &told());
+    assert!(
+        turned.imported.remarks[0].contains("turn it with"),
+        "{:?}",
+        turned.imported.remarks
+    );
+    let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &told());
+    assert!(uneven.imported.remarks[0].contains("not evenly spaced: 1.000000 to 90.000000 s"));
+}
+
+/// A file as a Mach-1 writes it: a command without data, one with, and one with two ramps.
+fn mach1() -> String {
+    let info = |name: &str| {
+        format!(
+            "<INFO>\r\nTime:\t10:37:09.27\r\nDate:\tMonday, May 15, 2023\r\nLoad Cell Type:\tSingle axis\r\n<END INFO>\r\n<{name}>\r\n"
+        )
+    };
+    let header = "Time, s\tPosition (z), mm\tPosition (x), mm\tFz, gf\r\n";
+    let mut text = format!("<Mach-1 File>\r\n{}Load cell:\tz\r\n", info("Zero Load"));
+    write!(
+        text,
+        "{}Velocity, mm/s:\t0.1\r\n<DATA>\r\n{header}",
+        info("Move Relative")
+    )
+    .unwrap();
+    for i in 0..5 {
+        let t = 0.01 * f64::from(i);
+        write!(
+            text,
+            "{t:.3}\t{:.4}\t2.0000\t{:.4}\r\n",
+            10.0 + t,
+            100.0 * t
+        )
+        .unwrap();
+    }
+    write!(
+        text,
+        "<END DATA>\r\n{}<DATA>\r\n{header}",
+        info("Stress Relaxation")
+    )
+    .unwrap();
+    text += "0.000\t10.0400\t2.0000\t4.0000\r\n0.010\t10.1400\t2.0000\t14.0000\r\n<divider>\r\n";
+    text += "0.000\t10.1400\t2.0000\t13.0000\r\n0.010\t10.2400\t2.0000\t29.0000\r\n<END DATA>\r\n";
+    text
+}
+
+#[test]
+fn mach1_blocks_become_parts_in_newtons() {
+    let read = read(&mach1(), &told());
+    let names: Vec<&str> = read
+        .parts
+        .iter()
+        .map(|part| part.imported.part.as_str())
+        .collect();
+    let expected = [
+        "Move Relative 1",
+        "Stress Relaxation 1 ramp 1",
+        "Stress Relaxation 1 ramp 2",
+    ];
+    assert_eq!(names, expected);
+    let last = numbers(&read.parts[2]);
+    assert_eq!(last[1][..2], [0.01, 10.24]);
+    assert!((last[1][2] - 29.0 * 0.009_806_65).abs() < 1e-15);
+    let facts = &read.parts[0].imported.facts;
+    assert!(
+        facts.contains(&("Velocity, mm/s".into(), "0.1".into())),
+        "{facts:?}"
+    );
+    assert_eq!(said(&read.parts[0], "layout"), "mach-1 (detected)");
+    let by_number = self::read(&mach1(), &telling(&[("part", "3")]));
+    assert_eq!(by_number.parts.len(), 1);
+    assert_eq!(numbers(&by_number.parts[0]), last);
+}
+
+/// A rheometer's export: intervals, blank rows, a row of units, decimal commas.
+fn rheometer() -> String {
+    let mut text =
+        "Project:\tgels\r\n\r\nTest:\tgel 3\r\n\r\nResult:\tSqueeze 1\r\n\r\n".to_owned();
+    for interval in 1..=2 {
+        write!(
+            text,
+            "Interval and data points:\t{interval}\t3\r\nInterval data:\tPoint No.\tTime\tGap\tNormal Force\tStatus\r\n\
+             \t\t\t\t\t\r\n\t\t[s]\t[mm]\t[N]\t\r\n"
+        )
+        .unwrap();
+        for i in 0..3 {
+            let t = 10.0 * f64::from(interval) + 0.5 * f64::from(i);
+            let line = format!(
+                "\t{}\t{t:.3}\t{:.4}\t{:.3E}\tMV-\r\n",
+                i + 1,
+                2.5 - 0.1 * t,
+                0.2 * t
+            );
+            text += &line.replace('.', ",");
+        }
+        text += "\r\n";
+    }
+    text
+}
+
+#[test]
+fn rheometer_intervals_in_utf16_become_parts() {
+    let told = telling(&[("column", "depth=-Gap")]);
+    let read = parse_foreign("gel.csv", utf16(&rheometer()), &told).unwrap();
+    assert_eq!(read.parts.len(), 2);
+    let part = &read.parts[1];
+    assert_eq!(part.imported.part, "Squeeze 1 interval 2");
+    for (found, t) in numbers(part).iter().zip([20.0, 20.5, 21.0]) {
+        let expected = [t, 0.1 * t - 2.5, 0.2 * t];
+        for (found, expected) in found.iter().zip(expected) {
+            assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+        }
+    }
+    assert_eq!(
+        said(part, "encoding"),
+        "UTF-16LE, says its byte order mark (detected)"
+    );
+    assert!(said(part, "decimal sign").starts_with("comma, from '"));
+    // The header of the second interval and its units, two lines below.
+    assert_eq!(
+        (said(part, "header"), said(part, "units")),
+        ("line 16 (detected)".into(), "line 18 (detected)".into())
+    );
+    let reason = parse_foreign("gel.csv", utf16(&rheometer()), &self::told()).unwrap_err();
+    assert!(
+        reason.contains("part 'Squeeze 1 interval 1': no column is known as the depth"),
+        "{reason}"
+    );
+}
+
+fn data(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("tests/data")
+        .join(name)
+}
+
+#[test]
+fn sheets_with_a_time_become_parts_in_both_formats() {
+    for name in ["zwick.xlsx", "zwick.xls"] {
+        let read = open_foreign(&data(name), &told()).unwrap_or_else(|err| panic!("{err}"));
+        let names: Vec<&str> = read
+            .parts
+            .iter()
+            .map(|part| part.imported.part.as_str())
+            .collect();
+        assert_eq!(names, ["P002-1", "P002-2"], "{name}");
+        assert_eq!(read.left_out.len(), 2, "{:?}", read.left_out);
+        assert!(
+            read.left_out[0].contains("Paramètres"),
+            "{:?}",
+            read.left_out
+        );
+        // Both sheets hold what make_workbooks.py wrote, in units of their own.
+        for part in &read.parts {
+            assert_eq!(part.samples.len(), 20);
+            for (i, found) in numbers(part).iter().enumerate() {
+                let i = i as f64;
+                for (found, expected) in found.iter().zip([0.1 * i, 0.25 * i, 0.5 + 0.125 * i * i])
+                {
+                    assert!(
+                        (found - expected).abs() < 1e-12,
+                        "{name}: {found} {expected}"
+                    );
+                }
+            }
+        }
+        assert_eq!(
+            said(&read.parts[1], "force"),
+            "column 3 'Force standard' in mN (detected)"
+        );
+    }
+}
+
+#[test]
+fn a_session_is_made_and_the_original_kept() {
+    let folder = tempfile::tempdir().unwrap();
+    let original = mach1().into_bytes();
+    let read = parse_foreign("Gel 3 (first).txt", original.clone(), &told()).unwrap();
+    let part = &read.parts[2];
+    let name = folder_name(&part.imported);
+    assert_eq!(name, "Gel-3--first--Stress-Relaxation-1-ramp-2");
+    let at = folder.path().join(name);
+    let make = || {
+        let kept = Kept {
+            folder: &at,
+            original: &original,
+            session_id: "20260305T141507Z-0badcafe".into(),
+            at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
+            software_version: "0.1.0",
+            labels: Labels {
+                specimen: "gel 3".into(),
+                ..Labels::default()
+            },
+        };
+        keep(part, kept)
+    };
+    make().unwrap();
+    assert_eq!(
+        std::fs::read(at.join(ORIGINAL_FOLDER).join("Gel 3 (first).txt")).unwrap(),
+        original
+    );
+    let session = Session::open(&at).unwrap();
+    assert_eq!(session.manifest.imported.as_ref(), Some(&part.imported));
+    assert_eq!(session.manifest.specimen, "gel 3");
+    assert!(session.manifest.rig.is_none() && session.manifest.calibration.is_null());
+    assert_eq!(
+        session.end.as_ref().unwrap().samples,
+        part.samples.len() as u64
+    );
+    assert!(
+        session.notes[0].starts_with("imported from Gel 3 (first).txt"),
+        "{:?}",
+        session.notes
+    );
+    for (row, sample) in session.rows.iter().zip(&part.samples) {
+        // Nothing that the file does not have is made up.
+        assert_eq!((row.volts, row.pulses, row.counts), (None, None, None));
+        assert_eq!(
+            (row.depth, row.force, row.phase),
+            (sample.depth, sample.force, Phase::Imported)
+        );
+        assert_eq!(
+            session.manifest.time_of(row.tick as i64).0.to_bits(),
+            sample.t.to_bits()
+        );
+    }
+    let refusal = make().unwrap_err().to_string();
+    assert!(refusal.contains("is not empty"), "{refusal}");
+}
+
+#[test]
+fn times_that_no_session_holds_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for (text, expected) in [
+        ("t_s,x_mm,F_N\n0,0,0\n1e7,1,1\n", "more than 106 days"),
+        ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "less than a picosecond"),
+    ] {
+        let part = read_one(text, &told());
+        let kept = Kept {
+            folder: &folder.path().join("no"),
+            original: text.as_bytes(),
+            session_id: "id".into(),
+            at: Utc.with_ymd_and_hms(2026, 3, 5, 14, 15, 7).unwrap(),
+            software_version: "0.1.0",
+            labels: Labels::default(),
+        };
+        let refusal = keep(&part, kept).unwrap_err().to_string();
+        assert!(refusal.contains(expected), "{refusal}");
+        assert!(!folder.path().join("no").exists());
+    }
+}
+
+#[test]
+fn real_recordings_are_read_as_another_reader_reads_them() {
+    let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
+    let path = shared.join("perineal_P002_load_hold_unload.csv");
+    let Ok(text) = std::fs::read_to_string(&path) else {
+        eprintln!("skipped: {} is not there", path.display());
+        return;
+    };
+    // Columns t_s, F_N, x_mm; the reader of tables for fits goes another way to the numbers.
+    let table = palpate_sessions::parse_table(&text, None).unwrap();
+    let part = open_foreign(&path, &told()).unwrap().parts.remove(0);
+    let expected: Vec<[f64; 3]> = (0..table.t.len())
+        .map(|i| [table.t[i], table.depth[i], table.force[i]])
+        .collect();
+    assert_eq!(numbers(&part), expected);
+}

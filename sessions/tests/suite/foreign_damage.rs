@@ -1,0 +1,146 @@
+//! Foreign files that are damaged or made to harm: a refusal or finite numbers in order, never a panic, and
+//! never more memory than the file deserves.
+
+use crate::support::Random;
+use palpate_sessions::import::{Told, parse_foreign};
+use std::fs;
+use std::io::{Cursor, Write};
+use std::path::Path;
+
+/// Mutations of each file; the share that the gate has time for.
+const MUTATIONS: usize = 2000;
+
+fn seeds() -> Vec<(&'static str, Vec<u8>)> {
+    let table = "t_s;x_mm;F_N\n0,0;0,1;0,2\n0,1;0,2;0,4\n0,2;0,3;\"0,6\"\n0,3;1.000,4;0,8\n";
+    let mach1 = "<Mach-1 File>\n<INFO>\nTime:\t1\n<END INFO>\n<Move>\n<DATA>\nTime, s\tPosition (z), mm\tFz, gf\n\
+        0.0\t1\t2\n0.1\t2\t3\n<divider>\n0.0\t2\t3\n0.1\t2\t3\n<END DATA>\n";
+    let rheometer = "Result:\tR\nInterval and data points:\t1\t2\nInterval data:\tTime\tDisplacement\tNormal Force\n\
+        \t[s]\t[mm]\t[N]\n\t0,0\t1,5\t2\n\t0,1\t1,6\t3\n[step]\nS\nTime\tPosition\tForce\ns\tmm\tN\n0\t1\t2\n1\t2\t3\n";
+    let wide: Vec<u8> = "\u{feff}"
+        .encode_utf16()
+        .chain(table.encode_utf16())
+        .flat_map(u16::to_le_bytes)
+        .collect();
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    vec![
+        ("table", table.into()),
+        ("mach-1", mach1.into()),
+        ("rheometer", rheometer.into()),
+        ("utf-16", wide),
+        ("xlsx", fs::read(data.join("zwick.xlsx")).unwrap()),
+        ("xls", fs::read(data.join("zwick.xls")).unwrap()),
+    ]
+}
+
+fn mutate(bytes: &mut Vec<u8>, random: &mut Random) {
+    for _ in 0..=random.below(3) {
+        if bytes.is_empty() {
+            return;
+        }
+        let place = random.below(bytes.len());
+        let stop = (place + 1 + random.below(16)).min(bytes.len());
+        match random.below(6) {
+            0 => bytes.truncate(place),
+            1 => bytes[place] ^= 1 << random.below(8),
+            2 => bytes[place..stop]
+                .iter_mut()
+                .for_each(|byte| *byte = random.next() as u8),
+            3 => bytes[place..stop].fill(0xff),
+            4 => drop(bytes.drain(place..stop)),
+            _ => {
+                let repeated = bytes[place..stop].to_vec();
+                bytes.splice(place..place, repeated);
+            }
+        }
+    }
+}
+
+#[test]
+fn damaged_files_are_refused_or_give_finite_numbers_in_order() {
+    for (name, seed) in seeds() {
+        assert!(
+            parse_foreign(name, seed.clone(), &Told::default()).is_ok(),
+            "{name}"
+        );
+        let mut random = Random(seed.len() as u64);
+        let (mut read, mut refused) = (0, 0);
+        for _ in 0..MUTATIONS {
+            let mut bytes = seed.clone();
+            mutate(&mut bytes, &mut random);
+            match parse_foreign(name, bytes, &Told::default()) {
+                Ok(foreign) => {
+                    read += 1;
+                    for part in &foreign.parts {
+                        let mut last = f64::NEG_INFINITY;
+                        for sample in &part.samples {
+                            assert!(sample.t.is_finite() && sample.t > last, "{name}");
+                            last = sample.t;
+                            let values = [sample.depth, sample.force, sample.signal];
+                            assert!(values.into_iter().flatten().all(f64::is_finite), "{name}");
+                        }
+                    }
+                }
+                Err(reason) => {
+                    refused += 1;
+                    assert!(!reason.trim().is_empty(), "{name}");
+                }
+            }
+        }
+        // Mutations that none noticed, or that all killed, would test nothing.
+        assert!(
+            read > 0 && refused > 0,
+            "{name}: {read} read, {refused} refused"
+        );
+    }
+}
+
+fn xlsx_with(name: &str, content: &mut dyn FnMut(&mut dyn Write)) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    archive.start_file(name, options).unwrap();
+    content(&mut archive);
+    archive.finish().unwrap().into_inner()
+}
+
+fn reason_of(bytes: Vec<u8>) -> String {
+    parse_foreign("bomb", bytes, &Told::default()).unwrap_err()
+}
+
+#[test]
+fn an_archive_that_unpacks_to_too_much_is_refused() {
+    let block = vec![b' '; 1 << 20];
+    let bomb = xlsx_with("xl/workbook.xml", &mut |file| {
+        for _ in 0..300 {
+            file.write_all(&block).unwrap();
+        }
+    });
+    assert!(bomb.len() < 1 << 20, "{} bytes", bomb.len());
+    let reason = reason_of(bomb);
+    assert!(reason.contains("unpacks to more than"), "{reason}");
+    let liar = xlsx_with("xl/sharedStrings.xml", &mut |file| {
+        file.write_all(b"<sst uniqueCount=\"9999999999999\"></sst>")
+            .unwrap();
+    });
+    let reason = reason_of(liar);
+    assert!(reason.contains("more texts than it has bytes"), "{reason}");
+}
+
+#[test]
+fn a_sheet_that_claims_the_whole_world_is_refused() {
+    let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");
+    let sound = fs::read(data.join("zwick.xls")).unwrap();
+    // The first number record (0x0203, 14 bytes) is moved to the last row and a far column.
+    let head = [0x03, 0x02, 14, 0];
+    let place = sound.windows(4).position(|window| window == head).unwrap();
+    let mut far = sound.clone();
+    far[place + 4..place + 8].copy_from_slice(&[0xff, 0xff, 0xff, 0xff]);
+    assert!(reason_of(far).contains("structure is broken"));
+    // Within the format's own limits, but sheet by sheet more than is worth it.
+    let mut wide = sound.clone();
+    let label = [0x04, 0x02];
+    let first = wide.windows(2).position(|window| window == label).unwrap();
+    wide[first + 4..first + 8].copy_from_slice(&[0, 0, 0, 0]);
+    wide[place + 4..place + 8].copy_from_slice(&[0xff, 0xff, 0xff, 0]);
+    let reason = reason_of(wide);
+    assert!(reason.contains("span more than"), "{reason}");
+}
