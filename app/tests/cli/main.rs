@@ -2,6 +2,7 @@
 
 mod analyse;
 mod calibration;
+mod catalog;
 mod compliance;
 mod disk;
 mod doctor;

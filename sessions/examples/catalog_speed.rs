@@ -1,0 +1,159 @@
+//! How long the catalog of many sessions takes to be made, brought up to date and searched.
+//!
+//! Every session is the beginning of a recorded one, written again with another manifest.
+//!
+//! `cargo run -p palpate-sessions --example catalog_speed -- [SESSIONS] [FOLDER]`
+
+use chrono::Duration;
+use palpate_sessions::catalog::{Catalog, Condition, Query};
+use palpate_sessions::{
+    Change, Edit, EndRecord, Labels, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
+};
+use std::error::Error;
+use std::fs;
+use std::io;
+use std::path::Path;
+use std::sync::{Arc, Mutex};
+use std::time::Instant;
+
+type Outcome<T> = Result<T, Box<dyn Error>>;
+
+/// Samples of each session: the catalog reads the first and the last chunk of any length.
+const SAMPLES: usize = 2000;
+
+/// A log in memory: what is measured is reading, not the disk's synchronisation.
+#[derive(Clone, Default)]
+struct Memory(Arc<Mutex<Vec<u8>>>);
+
+impl Sink for Memory {
+    fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut all = self.0.lock().map_err(|_| io::Error::other("poisoned"))?;
+        all.extend_from_slice(bytes);
+        Ok(())
+    }
+
+    fn sync(&mut self) -> io::Result<()> {
+        Ok(())
+    }
+}
+
+#[expect(clippy::disallowed_methods, reason = "this program measures time")]
+fn timed<T>(what: &str, body: impl FnOnce() -> T) -> T {
+    let start = Instant::now();
+    let done = body();
+    println!("{what}: {:.1} ms", start.elapsed().as_secs_f64() * 1e3);
+    done
+}
+
+fn manifest_of(original: &Manifest, number: usize) -> Outcome<Manifest> {
+    let operators = ["Ada", "Grace", "Mary", "Emmy"];
+    let mut labels = Labels::default();
+    let thickness = 5.0 + (number % 100) as f64 / 10.0;
+    labels.tell("specimen.thickness_mm", &thickness.to_string())?;
+    labels.tell("specimen.source", "pig stomach, fundus")?;
+    let mut plan = original.plan.clone();
+    plan["source"]["values"]["depth"] = format!("{} mm", number % 30).into();
+    Ok(Manifest {
+        session_id: format!("20260101T000000Z-{number:08x}"),
+        started_at: original.started_at + Duration::minutes(20 * number as i64),
+        operator: operators[number % operators.len()].into(),
+        specimen: format!("stomach {}", number % 500),
+        about: labels.about,
+        plan,
+        ..original.clone()
+    })
+}
+
+fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
+    let manifest = manifest_of(&original.manifest, number)?;
+    let memory = Memory::default();
+    let mut log = LogWriter::begin(memory.clone(), "memory", &manifest)?;
+    for batch in original.rows[..SAMPLES].chunks(100) {
+        log.append(batch, &[])?;
+    }
+    log.finish(EndRecord {
+        outcome: "finish".into(),
+        reason: "the plan is complete".into(),
+        samples: 0,
+        entries: 0,
+        ended_at: original.rows[SAMPLES - 1].host,
+        time_use: Vec::new(),
+    })?;
+    let folder = library.join("sessions").join(&manifest.session_id);
+    fs::create_dir_all(&folder)?;
+    let bytes = memory.0.lock().map_err(|_| "poisoned")?;
+    fs::write(folder.join("000.mcap"), bytes.as_slice())?;
+    let edit = Edit {
+        at: manifest.started_at,
+        by: "palpate".into(),
+        reason: "finished, no sample missing".into(),
+        change: Change::Verdict {
+            verdict: [Verdict::Valid, Verdict::Suspect][usize::from(number % 9 == 0)],
+        },
+    };
+    Ok(add_edit(&folder, &manifest.session_id, &edit)?)
+}
+
+fn main() -> Outcome<()> {
+    let mut words = std::env::args().skip(1);
+    let sessions: usize = words.next().map_or(Ok(10_000), |word| word.parse())?;
+    let folder = words
+        .next()
+        .unwrap_or_else(|| "target/catalog_speed".into());
+    let library = Path::new(&folder);
+    let recorded = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab");
+    let original = Session::open(&recorded)?;
+    timed(
+        &format!("{sessions} sessions written"),
+        || -> Outcome<()> { (0..sessions).try_for_each(|number| make(library, &original, number)) },
+    )?;
+    let mut catalog = Catalog::open(library)?;
+    let changes = timed("catalog made", || catalog.rebuild(&mut |_, _| {}))?;
+    println!("  {} sessions read", changes.read);
+    let changes = timed("brought up to date, nothing new", || {
+        catalog.update(&mut |_, _| {})
+    })?;
+    println!("  {} sessions read", changes.read);
+    let text = |text: &str| text.to_owned();
+    let page = Query {
+        limit: Some(20),
+        ..Query::default()
+    };
+    for (what, query) in [
+        ("the latest", page.clone()),
+        (
+            "a specimen",
+            Query {
+                specimen: Some(text("stomach 77")),
+                ..page.clone()
+            },
+        ),
+        (
+            "words",
+            Query {
+                words: text("pig fund ada"),
+                ..page.clone()
+            },
+        ),
+        (
+            "one value",
+            Query {
+                conditions: vec!["depth>=28mm".parse::<Condition>()?],
+                ..page.clone()
+            },
+        ),
+        (
+            "words, operator and two values",
+            Query {
+                words: text("stomach"),
+                operator: Some(text("Grace")),
+                conditions: vec!["depth>=10mm".parse()?, "specimen.thickness_mm<8".parse()?],
+                ..page
+            },
+        ),
+    ] {
+        let found = timed(&format!("search for {what}"), || catalog.find(&query))?;
+        println!("  {} sessions", found.count);
+    }
+    Ok(fs::remove_dir_all(library)?)
+}
