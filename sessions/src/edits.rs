@@ -257,7 +257,8 @@ impl Edits {
         tags
     }
 
-    /// The last review. `now` are files as they are: each is compared with what was seen of it.
+    /// The last review. `now` are the files that were seen as they are now: the analyses and, unless only
+    /// those are to be compared, every file of the log.
     #[must_use]
     pub fn review(&self, now: &[Input]) -> Option<Review> {
         let place = |edit: &Edit| matches!(edit.change, Change::Review { .. });
@@ -270,7 +271,14 @@ impl Edits {
             let seen = seen.iter().find(|seen| seen.what == one.what);
             seen.map(|seen| &seen.sha256) != Some(&one.sha256)
         };
-        let changed = now.iter().filter(is_other);
+        // Where no log is compared, none is missing.
+        let is_log = |one: &Input| segment_number(&one.what).is_some();
+        let has_logs = now.iter().any(is_log);
+        let is_gone = |one: &&Input| {
+            (has_logs || !is_log(one)) && now.iter().all(|there| there.what != one.what)
+        };
+        let gone = seen.iter().filter(is_gone);
+        let changed = now.iter().filter(is_other).chain(gone);
         let mut changed: Vec<String> = changed.map(|one| one.what.clone()).collect();
         let is_tags = |edit: &Edit| matches!(edit.change, Change::Tags { .. });
         if !later.iter().all(is_tags) {
@@ -423,9 +431,17 @@ mod tests {
         ];
         let changed = |edits: &Edits, now: &[Input]| edits.review(now).unwrap().changed;
         assert!(changed(&edits, &seen).is_empty());
-        assert!(changed(&edits, &seen[..1]).is_empty());
-        let other = [input("000.mcap", "c"), input("001.mcap", "d")];
+        assert!(changed(&edits, &seen[1..]).is_empty());
+        assert_eq!(changed(&edits, &seen[..1]), ["analyses.jsonl"]);
+        assert_eq!(changed(&edits, &[]), ["analyses.jsonl"]);
+        let other = [
+            input("000.mcap", "c"),
+            input("001.mcap", "d"),
+            seen[1].clone(),
+        ];
         assert_eq!(changed(&edits, &other), ["000.mcap", "001.mcap"]);
+        let other = [input("001.mcap", "d"), seen[1].clone()];
+        assert_eq!(changed(&edits, &other), ["001.mcap", "000.mcap"]);
         let tags = Change::Tags {
             add: vec!["good".into()],
             remove: Vec::new(),

@@ -210,7 +210,7 @@ pub fn main() -> ExitCode {
         Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
         Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
-        Some(Command::Tag(args)) => with(args.json, |out| review::tag(&args, out)),
+        Some(Command::Tag(args)) => with(args.is_json(), |out| review::tag(&args, out)),
         Some(Command::Review(args)) => with(args.json, |out| review::review(&args, out)),
         Some(Command::Recalibrate(args)) => {
             with(args.json, |out| analysis::recalibrate(&args, out))

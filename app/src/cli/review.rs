@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Arguments of `palpate tag`.
 #[derive(Debug, Args)]
 pub struct TagArgs {
-    /// Session folders, then tags: +TAG to give one, -TAG to take one away
+    /// Session folders, then tags: +TAG to give one, -TAG to take one away; options come before
     #[arg(
         required = true,
         value_name = "SESSION|+TAG|-TAG",
@@ -26,7 +26,17 @@ pub struct TagArgs {
     by: Option<String>,
     /// Print one JSON object
     #[arg(long)]
-    pub json: bool,
+    json: bool,
+}
+
+/// What is taken for an option though it stands among the tags.
+const JSON: &str = "--json";
+
+impl TagArgs {
+    /// Whether it prints JSON.
+    pub fn is_json(&self) -> bool {
+        self.json || self.words.iter().any(|word| word == JSON)
+    }
 }
 
 /// Arguments of `palpate review`.
@@ -87,8 +97,13 @@ struct Tagged {
 
 pub(super) fn tag(args: &TagArgs, output: &Output) -> Result<(), Failure> {
     let (mut sessions, mut add, mut remove) = (Vec::new(), Vec::new(), Vec::new());
-    for word in &args.words {
+    for word in args.words.iter().filter(|word| *word != JSON) {
         match word.as_bytes() {
+            [b'-', b'-', ..] => {
+                return Err(Failure::usage(format!(
+                    "{word} stands among the tags; options come before the sessions, as in 'palpate tag --by Ada demo +good'"
+                )));
+            }
             [b'+', ..] => add.push(word[1..].to_owned()),
             [b'-', ..] => remove.push(word[1..].to_owned()),
             _ => sessions.push(PathBuf::from(word)),

@@ -83,7 +83,11 @@ impl CatalogError {
             Some(code) => matches!(
                 code,
                 // A table that ought to be there and is not is `Unknown`.
-                ErrorCode::DatabaseCorrupt | ErrorCode::NotADatabase | ErrorCode::Unknown
+                ErrorCode::DatabaseCorrupt
+                    | ErrorCode::NotADatabase
+                    | ErrorCode::Unknown
+                    // Two rows of one folder.
+                    | ErrorCode::ConstraintViolation
             ),
             // Something else in a column than was written there.
             None => true,

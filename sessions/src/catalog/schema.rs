@@ -5,9 +5,10 @@ use rusqlite::{Connection, TransactionBehavior};
 /// Marks the file as ours: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and of what stands in them. Another one is replaced.
-pub(super) const VERSION: i64 = 3;
+pub(super) const VERSION: i64 = 4;
 
-/// `entry` has all that is known of a session, as JSON; the other columns are what is searched.
+/// `entry` has all that is known of a session, as JSON, with its own checksum, for SQLite has none; the other
+/// columns are what is searched.
 const TABLES: &str = "
 CREATE TABLE session (
     id INTEGER PRIMARY KEY,
@@ -22,7 +23,8 @@ CREATE TABLE session (
     verdict TEXT NOT NULL,
     review TEXT NOT NULL,
     duration_s REAL NOT NULL,
-    entry TEXT NOT NULL
+    entry TEXT NOT NULL,
+    checksum TEXT NOT NULL
 ) STRICT;
 CREATE INDEX session_started ON session (started_ms);
 CREATE INDEX session_specimen ON session (specimen);

@@ -235,16 +235,14 @@ impl Catalog {
             let count: i64 = count.query_row(params_from_iter(&values), |row| row.get(0))?;
             let order = query.order.sql(query.is_reversed);
             let sql = format!(
-                "SELECT entry FROM session WHERE {meets} ORDER BY {order} LIMIT ? OFFSET ?"
+                "SELECT entry, checksum FROM session WHERE {meets} ORDER BY {order} LIMIT ? OFFSET ?"
             );
             // SQLite takes a limit below zero for none.
             let limit = query.limit.and_then(|limit| i64::try_from(limit).ok());
             values.push(limit.unwrap_or(-1).into());
             values.push(i64::try_from(query.skip).unwrap_or(i64::MAX).into());
             let mut statement = self.db.prepare_cached(&sql)?;
-            let rows = statement.query_map(params_from_iter(&values), |row| {
-                entry_of(&row.get::<_, String>(0)?)
-            })?;
+            let rows = statement.query_map(params_from_iter(&values), entry_of)?;
             Ok(Found {
                 count: count.unsigned_abs() as usize,
                 entries: rows.collect::<rusqlite::Result<_>>()?,

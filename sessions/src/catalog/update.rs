@@ -4,6 +4,7 @@ use super::entry::Entry;
 use super::search::ReviewIs;
 use super::walk::{Place, walk};
 use super::{Catalog, CatalogError};
+use crate::text::checksum;
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -122,9 +123,9 @@ impl Catalog {
     /// Every entry, by folder.
     pub fn all(&self) -> Result<Vec<Entry>, CatalogError> {
         let read = || -> rusqlite::Result<Vec<Entry>> {
-            let sql = "SELECT entry FROM session ORDER BY folder";
+            let sql = "SELECT entry, checksum FROM session ORDER BY folder";
             let mut statement = self.db.prepare_cached(sql)?;
-            let rows = statement.query_map([], |row| entry_of(&row.get::<_, String>(0)?))?;
+            let rows = statement.query_map([], entry_of)?;
             rows.collect()
         };
         read().map_err(self.failed())
@@ -157,11 +158,16 @@ impl Catalog {
     }
 }
 
-/// An entry as it stands in the table.
-pub(super) fn entry_of(text: &str) -> rusqlite::Result<Entry> {
-    serde_json::from_str(text).map_err(|err| {
-        rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, err.into())
-    })
+/// An entry as it stands in the table: its JSON and the checksum of that.
+pub(super) fn entry_of(row: &rusqlite::Row<'_>) -> rusqlite::Result<Entry> {
+    let text: String = row.get(0)?;
+    let bad = |err: Box<dyn std::error::Error + Send + Sync>| {
+        rusqlite::Error::FromSqlConversionFailure(0, rusqlite::types::Type::Text, err)
+    };
+    if checksum(&text) != row.get::<_, String>(1)? {
+        return Err(bad("an entry is not as it was written".into()));
+    }
+    serde_json::from_str(&text).map_err(|err| bad(err.into()))
 }
 
 fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
@@ -171,8 +177,8 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     let started = chrono::DateTime::parse_from_rfc3339(&entry.started_at);
     let verdict = entry.verdict.map_or("", |verdict| verdict.word());
     db.prepare_cached(
-        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry)
-         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry, checksum)
+         VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
     )?
     .execute(params![
         entry.folder,
@@ -187,6 +193,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         ReviewIs::of(entry.review.as_ref()).word(),
         entry.duration_s,
         text,
+        checksum(&text),
     ])?;
     let id = db.last_insert_rowid();
     let mut named = db.prepare_cached(

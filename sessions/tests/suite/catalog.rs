@@ -628,7 +628,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
             catalog.find(&words)?;
             catalog.all()
         });
-        assert!(done.is_ok(), "{done:?}");
+        assert_eq!(done.unwrap(), expected);
     }
     assert!(set_aside > 10, "{set_aside}");
 }

@@ -230,6 +230,8 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         let mut lines = vec![text::whole(&report)];
         lines.extend(object.compliance.as_ref().map(Correction::sentence));
         lines.extend(intervals.lines(&report));
+        let kept = args.save.iter();
+        lines.extend(kept.map(|name| format!("kept as analysis '{name}'")));
         lines.join("\n")
     });
     Ok(())
