@@ -255,7 +255,7 @@ fn gaps(rows: &Rows<'_>, samples: &[Sample], numbers: &[usize]) -> Option<String
     }
     let is_gap = |step: &f64| *step > GAP * median;
     let count = steps.iter().filter(|step| is_gap(step)).count();
-    let first = steps.iter().position(|step| is_gap(step))?;
+    let first = steps.iter().position(is_gap)?;
     Some(format!(
         "{count} gaps: after {} {} nothing for {:.6} s where rows are {median:.6} s apart; nothing is filled in",
         rows.word(),
