@@ -1,6 +1,6 @@
 //! From what is on disk to what a fit takes: sessions and foreign tables alike.
 
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
@@ -11,6 +11,7 @@ use palpate_sessions::record::{EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
+use crate::compliance::CorrectionError;
 use crate::edited;
 use crate::engine::{Effect, Record};
 
@@ -25,6 +26,8 @@ pub struct FitSource {
     pub notes: Vec<String>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
+    /// Name of the rig it was recorded on; `None` for a table.
+    pub rig: Option<String>,
     /// The calibration its forces were read with; `None` for a table.
     pub calibration: Option<Calibration>,
 }
@@ -143,6 +146,9 @@ pub enum SourceError {
         /// The parser's words.
         detail: String,
     },
+    /// Depths cannot be corrected as asked.
+    #[error(transparent)]
+    Correction(#[from] CorrectionError),
     /// The session's calibration is not what this version knows.
     #[error("the session's calibration cannot be understood ({detail})")]
     Calibration {
@@ -183,6 +189,7 @@ pub fn read_stretch(
             start: Seconds(0.0),
             notes: table.notes,
             specimen: None,
+            rig: None,
             calibration: None,
         });
     }
@@ -208,6 +215,7 @@ pub fn read_stretch(
     }
     let specimen = session.manifest.specimen.trim();
     Ok(FitSource {
+        rig: session.manifest.rig.map(|rig| rig.name),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
         samples,
         start,
@@ -221,6 +229,7 @@ fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
     let table = table_of_imported(&session);
     let specimen = session.manifest.specimen.trim();
     FitSource {
+        rig: None,
         samples: samples_of_table(&table, stretch),
         start: Seconds(0.0),
         specimen: (!specimen.is_empty()).then(|| specimen.to_owned()),
@@ -257,15 +266,20 @@ pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
     })
 }
 
+/// The curve of that calibration.
+pub(crate) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
+    let curve = calibration_of(session)?.curve();
+    curve.map_err(|err| SourceError::Calibration {
+        detail: err.to_string(),
+    })
+}
+
 /// What a fit takes of a session, each force weighted by what the signal's noise and the
 /// calibration curve's sensitivity make of it. A force that is not known has infinite uncertainty:
 /// one at an end of the converter's range, every one after an interlock, and every one after the probe
 /// has left the tissue on the way back.
 pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>, SourceError> {
-    let bad = |detail: String| SourceError::Calibration { detail };
-    let curve = calibration_of(session)?
-        .curve()
-        .map_err(|err| bad(err.to_string()))?;
+    let curve = curve_of(session)?;
     let decisions = decisions(session)?;
     let noise = noise_of(&decisions).ok_or(SourceError::Empty)?;
     let tick_secs = session.manifest.tick().0;
@@ -354,7 +368,7 @@ fn start_of(session: &Session) -> Seconds {
 }
 
 /// The signal's noise as the tare found it.
-fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
+pub(crate) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
     decisions.iter().find_map(|(_, effect)| match effect {
         Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
         _ => None,

@@ -6,6 +6,7 @@
 //! Start reading at [`engine::step`].
 
 pub mod analysis;
+pub mod compliance;
 pub mod cycles;
 pub mod daily;
 pub mod edited;

@@ -14,6 +14,7 @@ pub mod about;
 pub mod calibrations;
 mod chain;
 pub mod checks;
+pub mod compliances;
 pub mod edits;
 pub mod export;
 pub mod folder;
@@ -27,13 +28,12 @@ mod packed;
 pub mod record;
 pub mod recover;
 mod schema;
+pub mod shelf;
 pub mod text;
 pub mod trade;
 
 pub use about::{About, AboutError, Labels};
-pub use calibrations::{
-    Kept, LibraryError, Shelf, age_days, read_calibration, save_calibration, supersede, taken_at,
-};
+pub use calibrations::{Kept, Shelf, read_calibration};
 pub use chain::ChainError;
 pub use edits::{Change, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit};
 pub use export::{ExportError, export_csv, export_parquet};
@@ -50,3 +50,4 @@ pub use log::{
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use record::{Block, EndRecord, Entry, EntryKind, Row};
+pub use shelf::{Document, LibraryError, age_days, save, supersede, taken_at};

@@ -2,7 +2,9 @@
 
 mod analyse;
 mod calibration;
+mod compliance;
 mod daily_check;
+mod doctor;
 mod export;
 mod extremes;
 mod fit;
@@ -67,6 +69,12 @@ enum Command {
     /// Keep, show and check load-cell calibrations
     #[command(subcommand)]
     Calibration(calibration::CalibrationCommand),
+    /// Tell in which state sessions are: whole, interrupted, damaged, newer or something else
+    Doctor(doctor::DoctorArgs),
+    /// Keep what is whole of interrupted or damaged sessions, beside the originals
+    Recover(doctor::RecoverArgs),
+    /// Find how far a rig gives way, from a session of stiff-surface
+    Compliance(compliance::ComplianceArgs),
     /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
     Import(Box<import::ImportArgs>),
     /// Write a session's samples as a table
@@ -166,6 +174,9 @@ pub fn main() -> ExitCode {
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
+        Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
+        Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
+        Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
         Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
         Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
@@ -206,9 +217,10 @@ fn read_failure(err: ReadError) -> Failure {
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Table(_) | SourceError::Rejected { .. } | SourceError::Imported { .. } => {
-            Failure::usage(err)
-        }
+        SourceError::Table(_)
+        | SourceError::Rejected { .. }
+        | SourceError::Correction(_)
+        | SourceError::Imported { .. } => Failure::usage(err),
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty

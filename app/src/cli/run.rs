@@ -44,6 +44,9 @@ pub struct RunArgs {
     pub json: bool,
 }
 
+/// Heading of what is short for `--set` in the help.
+const SHORT: &str = "Short for --set, of ramp-hold and every protocol with such a parameter";
+
 /// The parameters most often set, short: `--depth 20` for `--set depth="20 mm"`.
 #[derive(Debug, Args)]
 #[command(
@@ -51,19 +54,19 @@ pub struct RunArgs {
 )]
 struct ShortArgs {
     /// Indentation speed in mm/s
-    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
     speed: Option<f64>,
     /// Depth from contact in mm
-    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
     depth: Option<f64>,
     /// Time at depth in s
-    #[arg(long, value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_parser = number, allow_negative_numbers = true)]
     hold: Option<f64>,
     /// End the hold once a parameter is known this well, such as tau=1%; --hold is then the longest
-    #[arg(long, value_name = "PARAMETER=SHARE")]
+    #[arg(long, help_heading = SHORT, value_name = "PARAMETER=SHARE")]
     hold_until: Option<String>,
     /// After the hold come back to the surface at this speed in mm/s, recorded for a fit of unloading
-    #[arg(long, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
+    #[arg(long, help_heading = SHORT, value_name = "SPEED", value_parser = number, allow_negative_numbers = true)]
     unload: Option<f64>,
 }
 
@@ -155,6 +158,9 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let (how, values) = (&args.how, args.values()?);
     if programme::is_one(name) {
         return programme::run(Path::new(name), how, &values, output);
+    }
+    if let Ok(library) = library_folder() {
+        super::doctor::recover_unfinished(&library, output);
     }
     let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;

@@ -10,6 +10,7 @@ use palpate_model::families::by_key;
 use palpate_model::fit::FitSample;
 use palpate_model::select::{SelectError, SelectOptions, Selection, select};
 use palpate_protocols::analysis::{Stretch, Wanted};
+use palpate_protocols::compliance::Corrections;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::ops::ControlFlow;
@@ -75,7 +76,13 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
         },
         is_rejected_included: args.include_rejected,
     };
-    let records = sources::read(&found, columns.as_ref(), wanted, output)?;
+    let records = sources::read(
+        &found,
+        columns.as_ref(),
+        wanted,
+        &Corrections::none(None),
+        output,
+    )?;
     options.specimens = specimens(args, &records)?;
     let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let bar = output.count_bar(0);

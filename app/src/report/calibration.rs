@@ -39,7 +39,7 @@ impl Entry {
     /// The line of one that is kept.
     #[must_use]
     pub fn of(shelf: &Shelf, kept: &Kept, age_days: Option<i64>) -> Self {
-        let document = &kept.calibration;
+        let document = &kept.document;
         let in_force = shelf.in_force(&document.rig);
         Self {
             id: kept.id.clone(),

@@ -5,7 +5,7 @@ use crate::report::calibration_plot::Curves;
 use palpate_model::calibration::{Bench, Calibration};
 use palpate_protocols::programme::calibration_of;
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::{Session, Shelf, age_days, save_calibration, supersede};
+use palpate_sessions::{Session, Shelf, age_days, save, supersede};
 use std::path::Path;
 
 /// What the library holds, judged, and what was just added to it.
@@ -65,8 +65,8 @@ pub fn read(
         ..Shown::of(entry, own, &rig)
     }];
     shown.extend(shelf.kept.iter().map(|kept| {
-        let age = age_days(&kept.calibration, now.into());
-        Shown::of(Entry::of(&shelf, kept, age), kept.calibration.clone(), &rig)
+        let age = age_days(&kept.document, now.into());
+        Shown::of(Entry::of(&shelf, kept, age), kept.document.clone(), &rig)
     }));
     Shelved {
         shown,
@@ -82,7 +82,7 @@ pub fn keep(library: &Path, session: &Path, name: &str) -> Result<String, String
     let shelf = Shelf::open(library);
     let kept = match shelf.in_force(&calibration.rig) {
         Some(old) => supersede(library, &old.id, &calibration),
-        None => save_calibration(library, &calibration),
+        None => save(library, &calibration),
     };
     kept.map(|kept| kept.id).map_err(|err| err.to_string())
 }

@@ -9,7 +9,8 @@ use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
-use palpate_protocols::analysis::{self, SourceError, Wanted};
+use palpate_protocols::analysis::{self, FitSource, SourceError, Wanted};
+use palpate_protocols::compliance::Correction;
 use palpate_protocols::runner::{RunView, Stopwatch};
 use palpate_sessions::import::ColumnNames;
 use std::path::{Path, PathBuf};
@@ -31,9 +32,28 @@ pub struct Fitted {
     pub calibration: Option<Calibration>,
     /// What the calibration adds to the uncertainty, once asked for.
     pub systematic: Option<Systematic>,
+    /// What the rig's compliance does to the depths, or would, once asked for.
+    pub compliance: Option<Correction>,
 }
 
 impl Fitted {
+    /// Fits what was read.
+    #[must_use]
+    pub fn of(source: FitSource, options: &FitOptions) -> Self {
+        let watch = Stopwatch::start();
+        let result = fit(&source.samples, options);
+        Self {
+            seconds: watch.seconds(),
+            samples: source.samples,
+            start: source.start,
+            notes: source.notes,
+            calibration: source.calibration,
+            systematic: None,
+            compliance: None,
+            result,
+        }
+    }
+
     /// Adds what the calibration's own errors do to the parameters; a table has none, and a refusal is a
     /// note. `options` are those of the fit.
     #[must_use]
@@ -68,17 +88,7 @@ pub fn fit_source(
     options: &FitOptions,
 ) -> Result<Fitted, SourceError> {
     let source = analysis::read_stretch(path, columns, wanted)?;
-    let watch = Stopwatch::start();
-    let result = fit(&source.samples, options);
-    Ok(Fitted {
-        seconds: watch.seconds(),
-        samples: source.samples,
-        start: source.start,
-        notes: source.notes,
-        calibration: source.calibration,
-        systematic: None,
-        result,
-    })
+    Ok(Fitted::of(source, options))
 }
 
 /// Columns for which the curves of a plot are thinned: more than a screen is wide.

@@ -2,7 +2,9 @@
 
 mod analyse;
 mod calibration;
+mod compliance;
 mod disk;
+mod doctor;
 mod extremes;
 mod fit;
 mod import;

@@ -10,6 +10,9 @@ pub struct StiffSample {
     pub position: Position,
     /// Force above tare.
     pub force: Newtons,
+    /// Its standard uncertainty beside that of the others: only ratios matter. Where a load cell hardly answers,
+    /// forces are worth little.
+    pub sigma: Newtons,
 }
 
 /// Compliance of a rig with everything that was between its axis and the stiff surface, the surface included.
@@ -23,8 +26,10 @@ pub struct Compliance {
     pub surface: Position,
     /// Its standard error in mm.
     pub surface_std_error_mm: f64,
-    /// Standard deviation of the forces about the line, in N.
+    /// Standard deviation of the forces about the line in N, each by its weight.
     pub rmse_n: f64,
+    /// Samples in the line.
+    pub samples: usize,
 }
 
 /// No compliance follows from a run.
@@ -67,64 +72,139 @@ const BEND_MAX: f64 = 0.02;
 /// A bend counts once it is beyond noise by so many standard errors.
 const BEND_SIGMAS: f64 = 3.0;
 
-/// Estimates the compliance of a rig from a slow run forward onto a stiff surface, by a straight line through
-/// the forces at or above `seating`: below it surfaces touch at their roughest points only.
+/// The line decides which samples are seated, and those decide the line: two or three rounds settle it.
+const ROUNDS_MAX: usize = 8;
+
+/// Estimates the compliance of a rig from slow runs forward onto a stiff surface, by a straight line through
+/// the samples from where it reaches `seating`: before, surfaces touch at their roughest points only.
 ///
 /// Positions are commanded and exact; forces carry the noise. So force is fitted over position,
-/// `F = (x - x_0) / C`, and `C` follows with its error to first order.
+/// `F = (x - x_0) / C`, by weighted least squares, and `C` follows with its error to first order. Samples are
+/// chosen by position for the same reason: chosen by their own force, those near the seating force would be
+/// the ones with positive noise, and the line would bend and tilt.
 pub fn fit_compliance(
     samples: &[StiffSample],
     seating: Newtons,
 ) -> Result<Compliance, ComplianceError> {
-    let used: Vec<(f64, f64)> = samples
-        .iter()
-        .filter(|sample| sample.force >= seating && sample.position.is_finite())
-        .map(|sample| (sample.position.0, sample.force.0))
-        .filter(|(_, force)| force.is_finite())
-        .collect();
-    let count = used.len() as f64;
-    if used.len() < SAMPLES_MIN {
-        let samples = used.len();
-        return Err(ComplianceError::TooShort { samples, seating });
+    let known: Vec<Weighed> = samples.iter().filter_map(Weighed::of).collect();
+    let by_force = known.iter().filter(|one| one.force >= seating.0);
+    let mut line = Line::through(by_force.copied().collect(), seating)?;
+    for _ in 0..ROUNDS_MAX {
+        let from = line.middle + (seating.0 - line.force_mean) * line.half / line.slope;
+        let seated = known.iter().filter(|one| one.position >= from);
+        let next = Line::through(seated.copied().collect(), seating)?;
+        let is_settled = next.samples == line.samples;
+        line = next;
+        if is_settled {
+            break;
+        }
     }
-    let mean = |of: &dyn Fn(&(f64, f64)) -> f64| used.iter().map(of).sum::<f64>() / count;
-    let (middle, force_mean) = (mean(&|s| s.0), mean(&|s| s.1));
-    let half = used
-        .iter()
-        .fold(0.0f64, |max, s| max.max((s.0 - middle).abs()));
-    // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
-    let u = |x: f64| (x - middle) / half;
-    let (square, cube) = (mean(&|s| u(s.0).powi(2)), mean(&|s| u(s.0).powi(3)));
-    let parabola = |x: f64| u(x).powi(2) - cube / square * u(x) - square;
-    let slope = mean(&|s| u(s.0) * s.1) / square;
-    let parabola_square = mean(&|s| parabola(s.0).powi(2));
-    let bend = mean(&|s| parabola(s.0) * s.1) / parabola_square;
-    let residual = |s: &(f64, f64)| s.1 - force_mean - slope * u(s.0);
-    let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
-    let slope_error = (variance / count / square).sqrt();
-    // Three standard errors: a slope that could be noise is none.
-    if !(half > 0.0 && slope > 3.0 * slope_error && slope.is_finite()) {
-        return Err(ComplianceError::NotRising);
+    line.check_straight()?;
+    Ok(line.compliance())
+}
+
+/// A sample as the line takes it, in mm and N.
+#[derive(Clone, Copy)]
+struct Weighed {
+    position: f64,
+    force: f64,
+    weight: f64,
+}
+
+impl Weighed {
+    fn of(sample: &StiffSample) -> Option<Self> {
+        let weight = sample.sigma.0.powi(-2);
+        let is_known = sample.position.is_finite() && sample.force.is_finite();
+        (is_known && weight.is_finite() && weight > 0.0).then_some(Self {
+            position: sample.position.0,
+            force: sample.force.0,
+            weight,
+        })
     }
-    let curved = variance - bend.powi(2) * parabola_square;
-    let bend_error = (curved.max(0.0) / count / parabola_square).sqrt();
-    let share = bend.abs() / (2.0 * slope);
-    if share > BEND_MAX && bend.abs() > BEND_SIGMAS * bend_error {
-        return Err(ComplianceError::Curved {
-            bend: 100.0 * share,
-            limit: 100.0 * BEND_MAX,
-        });
+}
+
+/// Force over `u`, the position from its middle in halves of its range, and how a parabola would leave the line.
+struct Line {
+    samples: usize,
+    middle: f64,
+    half: f64,
+    force_mean: f64,
+    slope: f64,
+    slope_error: f64,
+    variance: f64,
+    bend: f64,
+    bend_error: f64,
+}
+
+impl Line {
+    fn through(used: Vec<Weighed>, seating: Newtons) -> Result<Self, ComplianceError> {
+        let (samples, count) = (used.len(), used.len() as f64);
+        if samples < SAMPLES_MIN {
+            return Err(ComplianceError::TooShort { samples, seating });
+        }
+        let weights: f64 = used.iter().map(|one| one.weight).sum();
+        let mean = |of: &dyn Fn(&Weighed) -> f64| {
+            used.iter().map(|one| one.weight * of(one)).sum::<f64>() / weights
+        };
+        let (middle, force_mean) = (mean(&|s| s.position), mean(&|s| s.force));
+        let half = used
+            .iter()
+            .fold(0.0f64, |max, s| max.max((s.position - middle).abs()));
+        // Orthogonal polynomials over the samples: 1, u, u^2 - a u - b, with u in -1..1.
+        let u = |s: &Weighed| (s.position - middle) / half;
+        let (square, cube) = (mean(&|s| u(s).powi(2)), mean(&|s| u(s).powi(3)));
+        let parabola = |s: &Weighed| u(s).powi(2) - cube / square * u(s) - square;
+        let slope = mean(&|s| u(s) * s.force) / square;
+        let parabola_square = mean(&|s| parabola(s).powi(2));
+        let bend = mean(&|s| parabola(s) * s.force) / parabola_square;
+        let residual = |s: &Weighed| s.force - force_mean - slope * u(s);
+        let variance = mean(&|s| residual(s).powi(2)) * count / (count - 2.0);
+        let slope_error = (variance / count / square).sqrt();
+        // Three standard errors: a slope that could be noise is none.
+        if !(half > 0.0 && slope > 3.0 * slope_error && slope.is_finite()) {
+            return Err(ComplianceError::NotRising);
+        }
+        let curved = variance - bend.powi(2) * parabola_square;
+        let bend_error = (curved.max(0.0) / count / parabola_square).sqrt();
+        Ok(Self {
+            samples,
+            middle,
+            half,
+            force_mean,
+            slope,
+            slope_error,
+            variance,
+            bend,
+            bend_error,
+        })
     }
-    let compliance = half / slope;
-    Ok(Compliance {
-        mm_per_newton: compliance,
-        std_error: compliance * slope_error / slope,
-        surface: Position(middle - force_mean * compliance),
-        // Mean force and slope of centred samples are independent.
-        surface_std_error_mm: compliance
-            * (variance / count + (force_mean * slope_error / slope).powi(2)).sqrt(),
-        rmse_n: variance.sqrt(),
-    })
+
+    fn check_straight(&self) -> Result<(), ComplianceError> {
+        let share = self.bend.abs() / (2.0 * self.slope);
+        if share > BEND_MAX && self.bend.abs() > BEND_SIGMAS * self.bend_error {
+            return Err(ComplianceError::Curved {
+                bend: 100.0 * share,
+                limit: 100.0 * BEND_MAX,
+            });
+        }
+        Ok(())
+    }
+
+    fn compliance(&self) -> Compliance {
+        let compliance = self.half / self.slope;
+        let relative = self.slope_error / self.slope;
+        Compliance {
+            mm_per_newton: compliance,
+            std_error: compliance * relative,
+            surface: Position(self.middle - self.force_mean * compliance),
+            // Mean force and slope of centred samples are independent.
+            surface_std_error_mm: compliance
+                * (self.variance / self.samples as f64 + (self.force_mean * relative).powi(2))
+                    .sqrt(),
+            rmse_n: self.variance.sqrt(),
+            samples: self.samples,
+        }
+    }
 }
 
 /// A depth with what a rig's compliance takes from it. It stands beside the raw depth, never in its place.
@@ -165,6 +245,7 @@ mod tests {
                 StiffSample {
                     position: Position(52.3 + x),
                     force: Newtons(force(x.max(0.0)) + noise * random.normal()),
+                    sigma: Newtons(1.0),
                 }
             })
             .collect()
@@ -188,6 +269,46 @@ mod tests {
         // Chi-square with 40 degrees: 16 to 76 holds all but 1e-3.
         assert!((16.0..76.0).contains(&slope), "{slope}");
         assert!((16.0..76.0).contains(&surface), "{surface}");
+    }
+
+    #[test]
+    fn forces_that_are_worth_little_hardly_count() {
+        // Above 3 N the cell says a tenth less than there is, and is known to be ten times as uncertain there.
+        let mut samples = run(0.005, 5, |x| x / 0.02);
+        let like = |samples: &[StiffSample]| fit_compliance(samples, Newtons(0.5)).unwrap();
+        for sample in samples.iter_mut().filter(|one| one.force.0 > 3.0) {
+            sample.force.0 -= 0.02;
+        }
+        let blind = like(&samples);
+        for sample in samples.iter_mut().filter(|one| one.force.0 > 3.0) {
+            sample.sigma = Newtons(10.0);
+        }
+        let weighed = like(&samples);
+        let miss = |found: &Compliance| (found.mm_per_newton - 0.02).abs();
+        assert!(miss(&weighed) < 0.2 * miss(&blind), "{blind:?} {weighed:?}");
+        // All alike count as before, however large.
+        let mut same = run(0.005, 5, |x| x / 0.02);
+        let before = like(&same);
+        same.iter_mut().for_each(|one| one.sigma = Newtons(4.0));
+        assert_eq!(before, like(&same));
+    }
+
+    #[test]
+    fn noise_at_the_seating_force_does_not_tilt_the_line() {
+        // A soft rig and a short run, as a search for the base makes it: 0.12 to 0.4 N with 0.02 N of noise.
+        let (mut squares, mut count) = (0.0, 0.0);
+        for seed in 0..40 {
+            let mut samples = run(0.02, seed, |x| x / 0.1);
+            samples.retain(|one| one.position.0 < 52.34);
+            // By noise alone one run in 370 is beyond three standard errors of the bend.
+            if let Ok(found) = fit_compliance(&samples, Newtons(0.12)) {
+                squares += ((found.mm_per_newton - 0.1) / found.std_error).powi(2);
+                count += 1.0;
+            }
+        }
+        assert!(count >= 38.0, "{count}");
+        // Chi-square with 38 to 40 degrees, as above.
+        assert!((16.0..76.0).contains(&squares), "{squares}");
     }
 
     #[test]
@@ -219,7 +340,8 @@ mod tests {
         let still = vec![
             StiffSample {
                 position: Position(1.0),
-                force: Newtons(1.0)
+                force: Newtons(1.0),
+                sigma: Newtons(1.0),
             };
             100
         ];
@@ -237,6 +359,7 @@ mod tests {
             surface: Position(52.3),
             surface_std_error_mm: 0.001,
             rmse_n: 0.02,
+            samples: 1000,
         };
         let corrected = rig.correct(Depth(30.0), Newtons(6.0), Newtons(0.1));
         assert!((corrected.depth.0 - 29.88).abs() < 1e-12);

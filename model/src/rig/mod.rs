@@ -2,6 +2,7 @@
 
 pub mod command;
 pub mod compliance;
+pub mod compliance_document;
 pub mod course;
 pub mod description;
 pub mod event;
@@ -17,6 +18,7 @@ pub mod thickness;
 
 pub use command::{MoveTo, Oscillation, RigCommand};
 pub use compliance::{Compliance, ComplianceError, CorrectedDepth, StiffSample, fit_compliance};
+pub use compliance_document::{COMPLIANCE_FORMAT, PressCompliance, RigCompliance};
 pub use course::Course;
 pub use description::{AdcDescription, RigDescription};
 pub use event::{Ack, Fault};

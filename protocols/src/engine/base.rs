@@ -22,7 +22,7 @@ const PASS_OVERRUN_MM: f64 = 0.5;
 const TRAVEL_MARGIN_MM: f64 = 1.0;
 
 /// Share of the force of the second touch from which the surfaces count as seated.
-const SEATED_SHARE: f64 = 0.3;
+pub(crate) const SEATED_SHARE: f64 = 0.3;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Stage {
@@ -108,7 +108,13 @@ impl BaseSearch {
                 self.stage = Stage::SlowPass;
             }
             Stage::SlowPass => {
-                self.samples.push(StiffSample { position, force });
+                // Forces this small are all worth the same.
+                let sigma = Newtons(1.0);
+                self.samples.push(StiffSample {
+                    position,
+                    force,
+                    sigma,
+                });
                 if filtered >= self.plan.pass_force {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;

@@ -60,7 +60,7 @@ const CLEARANCE_MM: f64 = 1.0;
 const TRAVEL_MARGIN_MM: f64 = 1.0;
 
 /// A search feels with the load cell.
-pub(super) const NOT_TARED: &str = "tare the load cell before searching with it";
+pub(crate) const NOT_TARED: &str = "tare the load cell before searching with it";
 
 #[derive(Clone, Debug, PartialEq)]
 enum Stage {

@@ -28,6 +28,14 @@ pub(super) struct Context<'a> {
 /// Time a move may overrun its profile before the axis counts as stuck.
 const MOVE_GRACE: Seconds = Seconds(1.0);
 
+/// Why a move does not begin that would end beyond the travel.
+pub(crate) fn outside_travel(what: &str, end: Position, travel: Position) -> String {
+    format!(
+        "a {what} to {:.3} mm is outside the travel of 0 to {:.1} mm",
+        end.0, travel.0
+    )
+}
+
 impl Context<'_> {
     pub fn command(&mut self, command: RigCommand) {
         self.state.unacknowledged.push_back((self.now, command));
@@ -49,10 +57,7 @@ impl Context<'_> {
         let rig = &self.state.config.rig;
         let travel = self.state.config.limits.travel_max;
         if self.state.is_homed && !(0.0..=travel.0).contains(&target.0) {
-            return Err(format!(
-                "a move to {:.3} mm is outside the travel of 0 to {:.1} mm",
-                target.0, travel.0
-            ));
+            return Err(outside_travel("move", target, travel));
         }
         self.move_to_pulses(pulses_from_position(target, rig.mm_per_pulse), speed)
     }
@@ -99,11 +104,7 @@ impl Context<'_> {
         let deepest = 2.0 * command.amplitude_pulses as f64 * rig.mm_per_pulse;
         let travel = self.state.config.limits.travel_max;
         if from.moved_by(deepest) > travel {
-            return Err(format!(
-                "a sine to {:.3} mm is outside the travel of 0 to {:.1} mm",
-                from.moved_by(deepest).0,
-                travel.0
-            ));
+            return Err(outside_travel("sine", from.moved_by(deepest), travel));
         }
         let deadline = self.now + Nanos::from_seconds(sine.duration() + MOVE_GRACE);
         let speed = sine.speed_max();

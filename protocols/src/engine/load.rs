@@ -42,6 +42,11 @@ impl Loading {
             before: None,
             slope: 0.0,
         };
+        if let Some(depth) = cx.state.derived.depth {
+            loading
+                .plan
+                .check_from(depth, cx.state.config.rig.mm_per_pulse)?;
+        }
         loading.go(cx)?;
         Ok(loading)
     }

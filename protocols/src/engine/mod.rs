@@ -28,9 +28,13 @@ mod tests;
 mod touch_log;
 mod weigh;
 
+pub(crate) use base::SEATED_SHARE;
+pub(crate) use contact::NOT_TARED;
+pub(crate) use context::outside_travel;
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
 pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, Tare};
+pub(crate) use step::NOT_HOMED;
 pub use step::{PLAN_COMPLETE, step};
 
 /// Version of the engine's decisions. Raised whenever a recorded session could decide

@@ -2,7 +2,7 @@
 
 use super::base::BaseSearch;
 use super::contact::ContactSearch;
-use super::context::{Context, Progress};
+use super::context::{Context, Progress, outside_travel};
 use super::creep::Creeping;
 use super::hold::{self, Holding};
 use super::home::Homing;
@@ -187,9 +187,12 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
     }
 }
 
+/// Why a step does not begin that needs to know where it is.
+pub(crate) const NOT_HOMED: &str = "the axis is not homed; home it first";
+
 fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
     if step.needs_homed_axis() && !cx.state.is_homed {
-        return Err("the axis is not homed; home it first".into());
+        return Err(NOT_HOMED.into());
     }
     Ok(match *step {
         Step::SelfTest { duration } => Active::SelfTest(SelfTest::begin(cx, duration)),
@@ -236,10 +239,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
             let travel = cx.state.config.limits.travel_max;
             // Where home is unknown the switches are all there is; a jog that comes back is always allowed.
             if cx.state.is_homed && distance_mm > 0.0 && end > travel.0 {
-                return Err(format!(
-                    "a jog to {end:.3} mm is outside the travel of 0 to {:.1} mm",
-                    travel.0
-                ));
+                return Err(outside_travel("jog", Position(end), travel));
             }
             cx.move_to_pulses(to, speed)?;
             Active::Move

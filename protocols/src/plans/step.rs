@@ -144,6 +144,20 @@ pub struct LoadTo {
     pub brake: Option<Newtons>,
 }
 
+impl LoadTo {
+    /// Refuses to begin deeper than it may go, which would lead out of the tissue. A pulse of `pulse_mm` is
+    /// forgiven: depths end on whole ones.
+    pub fn check_from(&self, depth: Depth, pulse_mm: f64) -> Result<(), String> {
+        if depth.0 <= self.depth_max.0 + pulse_mm {
+            return Ok(());
+        }
+        Err(format!(
+            "the load may go to a depth of {:.2} and the probe is at {depth:.2} already; allow a greater depth, or unload before it",
+            self.depth_max
+        ))
+    }
+}
+
 /// Constant force.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct HoldForce {

@@ -15,10 +15,19 @@ pub const COLUMNS: [(&str, &str); 8] = [
     ("cycle", "1"),
 ];
 
+/// Columns that stand beside the session's own, such as corrected depths.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Beside {
+    /// Name, unit and values, one for each sample and none where it is not known.
+    pub columns: Vec<(&'static str, &'static str, Vec<Option<f64>>)>,
+    /// What a reader must know of them: keys and texts of a Parquet file's metadata.
+    pub metadata: Vec<(String, String)>,
+}
+
 /// The samples as a frame: `t_s` is controller time since the first sample in true seconds, depth
 /// is null before contact is known, force before tare, counts on a rig without a converter,
 /// signal and pulses in an imported session.
-pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
+pub(super) fn frame(session: &Session, beside: &Beside) -> PolarsResult<DataFrame> {
     let rows = &session.rows;
     let first_tick = rows.first().map_or(0, |row| row.tick);
     // A controller that restarted counts from zero again: its time is negative, not a failure.
@@ -46,7 +55,7 @@ pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
         n_phase,
         n_cycle,
     ] = COLUMNS.map(|(name, _)| name.into());
-    let columns: Vec<Column> = [
+    let own = [
         Series::new(n_t, t),
         Series::new(n_depth, depth),
         Series::new(n_force, force),
@@ -55,9 +64,9 @@ pub(super) fn frame(session: &Session) -> PolarsResult<DataFrame> {
         Series::new(n_pulses, pulses),
         Series::new(n_phase, phase),
         Series::new(n_cycle, cycle),
-    ]
-    .into_iter()
-    .map(Column::from)
-    .collect();
+    ];
+    let more = beside.columns.iter();
+    let more = more.map(|(name, _, values)| Series::new((*name).into(), values));
+    let columns: Vec<Column> = own.into_iter().chain(more).map(Column::from).collect();
     DataFrame::new(rows.len(), columns)
 }

@@ -4,7 +4,7 @@ mod atomic;
 mod columns;
 mod parquet;
 
-pub use columns::COLUMNS;
+pub use columns::{Beside, COLUMNS};
 pub use parquet::export_parquet;
 
 use crate::log::Session;
@@ -43,15 +43,15 @@ pub enum ExportError {
 
 /// Writes the samples as comma-separated text: names with units in the header, `.` as decimal
 /// mark, shortest digits that read back to the same number, empty cells for missing values.
-pub fn export_csv(session: &Session, path: &Path) -> Result<(), ExportError> {
-    let mut frame = frame(session, path)?;
+pub fn export_csv(session: &Session, beside: &Beside, path: &Path) -> Result<(), ExportError> {
+    let mut frame = frame(session, beside, path)?;
     atomic::write(path, |file| {
         CsvWriter::new(file).include_header(true).finish(&mut frame)
     })
 }
 
-fn frame(session: &Session, path: &Path) -> Result<DataFrame, ExportError> {
-    columns::frame(session).map_err(|source| ExportError::Table {
+fn frame(session: &Session, beside: &Beside, path: &Path) -> Result<DataFrame, ExportError> {
+    columns::frame(session, beside).map_err(|source| ExportError::Table {
         path: path.to_owned(),
         source,
     })

@@ -1,6 +1,6 @@
 //! Parquet with units in the file's metadata.
 
-use super::{COLUMNS, ExportError, atomic, frame};
+use super::{Beside, COLUMNS, ExportError, atomic, frame};
 use crate::log::Session;
 use polars::prelude::{DataFrame, KeyValueMetadata, ParquetWriter, PolarsError, PolarsResult};
 use std::io::Write;
@@ -13,17 +13,19 @@ const ROW_GROUP: usize = 1 << 18;
 /// Writes the samples as Parquet. The file's metadata carries the units (`palpate.columns`, JSON
 /// from column to unit) and where the numbers come from (`palpate.session`, `palpate.software`,
 /// `palpate.record_version`), of what (`palpate.specimen`, `palpate.about`, a JSON object) and what a reader
-/// must know (`palpate.notes`, a JSON list of sentences).
-pub fn export_parquet(session: &Session, path: &Path) -> Result<(), ExportError> {
-    let frame = frame(session, path)?;
-    let metadata = metadata(session);
+/// must know (`palpate.notes`, a JSON list of sentences), and what is told of the columns `beside`.
+pub fn export_parquet(session: &Session, beside: &Beside, path: &Path) -> Result<(), ExportError> {
+    let frame = frame(session, beside, path)?;
+    let metadata = metadata(session, beside);
     atomic::write(path, |file| write(file, &frame, metadata))
 }
 
-fn metadata(session: &Session) -> KeyValueMetadata {
+fn metadata(session: &Session, beside: &Beside) -> KeyValueMetadata {
     let units: serde_json::Map<String, serde_json::Value> = COLUMNS
         .iter()
-        .map(|(name, unit)| ((*name).to_owned(), (*unit).into()))
+        .copied()
+        .chain(beside.columns.iter().map(|(name, unit, _)| (*name, *unit)))
+        .map(|(name, unit)| (name.to_owned(), unit.into()))
         .collect();
     let manifest = &session.manifest;
     let pairs = [
@@ -51,6 +53,7 @@ fn metadata(session: &Session) -> KeyValueMetadata {
         pairs
             .into_iter()
             .map(|(key, value)| (key.to_owned(), value))
+            .chain(beside.metadata.clone())
             .collect(),
     )
 }

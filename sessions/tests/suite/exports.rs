@@ -1,6 +1,7 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
+use palpate_sessions::export::Beside;
 use palpate_sessions::{ExportError, Session, export_csv, export_parquet, read_table};
 use polars::prelude::{ParquetReader, SerReader};
 use std::path::Path;
@@ -22,7 +23,7 @@ fn csv_holds_every_digit_and_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.csv");
     let session = session();
-    export_csv(&session, &path).unwrap();
+    export_csv(&session, &Beside::default(), &path).unwrap();
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(
@@ -70,7 +71,7 @@ fn parquet_holds_the_same_with_units() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.parquet");
     let session = session();
-    export_parquet(&session, &path).unwrap();
+    export_parquet(&session, &Beside::default(), &path).unwrap();
     let mut reader = ParquetReader::new(std::fs::File::open(&path).unwrap());
     let metadata = reader.get_metadata().unwrap().clone();
     let pairs = metadata.key_value_metadata().clone().unwrap();
@@ -207,19 +208,19 @@ print(json.dumps([session, topics]))
 fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    type Export = fn(&Session, &Path) -> Result<(), ExportError>;
+    type Export = fn(&Session, &Beside, &Path) -> Result<(), ExportError>;
     for (name, export) in [
         ("one.csv", export_csv as Export),
         ("one.parquet", export_parquet as Export),
     ] {
         let path = folder.path().join(name);
         std::fs::write(&path, "mine").unwrap();
-        let refusal = export(&session, &path).unwrap_err();
+        let refusal = export(&session, &Beside::default(), &path).unwrap_err();
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
         assert!(matches!(
-            export(&session, &nowhere),
+            export(&session, &Beside::default(), &nowhere),
             Err(ExportError::Io { .. })
         ));
     }

@@ -11,9 +11,9 @@ use palpate_model::units::Volts;
 use palpate_protocols::programme::calibration_of;
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::Session;
-use palpate_sessions::calibrations;
 use palpate_sessions::import::read_weights;
 use palpate_sessions::library_folder;
+use palpate_sessions::{read_calibration, shelf};
 use std::path::PathBuf;
 
 /// Arguments of `palpate calibration import`.
@@ -114,7 +114,7 @@ impl std::str::FromStr for CurveChoice {
 pub(super) fn import(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
-    let kept = calibrations::save_calibration(&library, &document(args)?).map_err(failure)?;
+    let kept = shelf::save(&library, &document(args)?).map_err(failure)?;
     let source = Source::kept(&kept);
     super::tell(
         "calibration import",
@@ -128,7 +128,7 @@ pub(super) fn supersede(args: &SupersedeArgs, output: &Output) -> Result<(), Fai
     new_file::check("picture", args.new.picture.as_deref())?;
     let library = library_folder().map_err(Failure::usage)?;
     let new = document(&args.new)?;
-    let kept = calibrations::supersede(&library, &args.old, &new).map_err(failure)?;
+    let kept = shelf::supersede(&library, &args.old, &new).map_err(failure)?;
     let (source, picture) = (Source::kept(&kept), args.new.picture.as_deref());
     super::tell("calibration supersede", &source, picture, output)
 }
@@ -145,7 +145,7 @@ fn document(args: &ImportArgs) -> Result<Calibration, Failure> {
         calibration_of(&session, args.name.as_deref().unwrap_or("load cell"))
             .map_err(Failure::usage)?
     } else if is_document {
-        calibrations::read_calibration(&args.file).map_err(failure)?
+        read_calibration(&args.file).map_err(failure)?
     } else {
         let table = read_weights(&args.file).map_err(Failure::usage)?;
         let file = args.file.file_name().unwrap_or_default().to_string_lossy();

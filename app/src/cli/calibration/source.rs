@@ -3,8 +3,9 @@
 use super::super::Failure;
 use palpate_model::calibration::{Bench, Calibration};
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::calibrations::{self, Kept, LibraryError, Shelf, read_calibration};
+use palpate_sessions::calibrations::{Kept, Shelf, read_calibration};
 use palpate_sessions::library_folder;
+use palpate_sessions::shelf::{self, LibraryError};
 use std::path::{Path, PathBuf};
 
 /// What names the table of the source thesis.
@@ -38,12 +39,12 @@ impl Source {
     /// One of the library.
     pub fn kept(kept: &Kept) -> Self {
         let (id, path) = (kept.id.clone(), kept.path.clone());
-        Self::new(Some(id), Some(path), kept.calibration.clone())
+        Self::new(Some(id), Some(path), kept.document.clone())
     }
 
     fn new(id: Option<String>, file: Option<PathBuf>, calibration: Calibration) -> Self {
         Self {
-            age_days: calibrations::age_days(&calibration, wall_now().into()),
+            age_days: shelf::age_days(&calibration, wall_now().into()),
             id,
             file,
             calibration,
@@ -62,7 +63,7 @@ impl Source {
 
 /// Days since one of the library was taken.
 pub(super) fn age_days(kept: &Kept) -> Option<i64> {
-    calibrations::age_days(&kept.calibration, wall_now().into())
+    shelf::age_days(&kept.document, wall_now().into())
 }
 
 /// Names and documents are the user's; the disk is not.

@@ -6,6 +6,7 @@ use crate::report::text;
 use crate::workers::pool::{News, NoAnswer, in_order};
 use palpate_model::fit::{FitReport, PARAMETER_NAMES, PARAMETER_UNITS};
 use palpate_protocols::analysis::SourceError;
+use palpate_protocols::compliance::Correction;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -14,6 +15,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// What came of one source.
 struct Answer {
     notes: Vec<String>,
+    compliance: Option<Correction>,
     result: Result<FitReport, NotFitted>,
 }
 
@@ -30,6 +32,8 @@ struct Line<'a> {
     #[serde(flatten)]
     report: &'a FitReport,
     notes: &'a [String],
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compliance: Option<&'a Correction>,
 }
 
 #[derive(Serialize)]
@@ -66,7 +70,11 @@ pub(super) fn run(
         }
         News::Next(answer) => {
             let source = sources[rows.len()].as_path();
-            let Answer { notes, result } = answer.unwrap_or_else(missing);
+            let Answer {
+                notes,
+                compliance,
+                result,
+            } = answer.unwrap_or_else(missing);
             match &result {
                 Err(NotFitted::Failed(_)) => failed += 1,
                 Err(NotFitted::Rejected(_)) => rejected += 1,
@@ -81,6 +89,7 @@ pub(super) fn run(
                         source,
                         report,
                         notes: &notes,
+                        compliance: compliance.as_ref(),
                     }),
                     Err(NotFitted::Rejected(reason)) => output.object(&RejectedLine {
                         source,
@@ -130,19 +139,28 @@ fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
 fn answer(source: &Path, recipe: &Recipe) -> Answer {
     match recipe.read(source) {
         Ok(fitted) => Answer {
-            notes: fitted.notes,
+            notes: with_correction(fitted.notes, fitted.compliance.as_ref()),
+            compliance: fitted.compliance,
             result: fitted
                 .result
                 .map_err(|err| NotFitted::Failed(Failure::failed(err))),
         },
         Err(err) => Answer {
             notes: Vec::new(),
+            compliance: None,
             result: Err(match err {
                 SourceError::Rejected { reason } => NotFitted::Rejected(reason),
                 err => NotFitted::Failed(source_failure(err)),
             }),
         },
     }
+}
+
+/// A correction that was made is told of each source; one that could be made is not.
+fn with_correction(mut notes: Vec<String>, told: Option<&Correction>) -> Vec<String> {
+    let made = told.filter(|told| told.is_applied);
+    notes.extend(made.map(Correction::sentence));
+    notes
 }
 
 fn missing(none: NoAnswer) -> Answer {
@@ -152,6 +170,7 @@ fn missing(none: NoAnswer) -> Answer {
     };
     Answer {
         notes: Vec::new(),
+        compliance: None,
         result: Err(NotFitted::Failed(Failure::failed(sentence))),
     }
 }

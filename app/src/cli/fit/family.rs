@@ -8,6 +8,7 @@ use palpate_model::families::by_key;
 use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
+use palpate_protocols::compliance::Correction;
 use palpate_protocols::runner::Stopwatch;
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
@@ -47,6 +48,8 @@ struct RecordOutput<'a> {
     r2: f64,
     rmse_n: f64,
     worst_n: f64,
+    /// What the rig's compliance did to the depths, or would; null where none is known.
+    compliance: Option<&'a Correction>,
     work_measured_n_mm: f64,
     work_fitted_n_mm: f64,
 }
@@ -67,7 +70,7 @@ pub(super) fn run(
             "--picture is for one record; name a single session or table",
         ));
     }
-    let named = sources::read(&found, columns, args.wanted(), output)?;
+    let named = sources::read(&found, columns, args.wanted(), &args.corrections()?, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = named.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let fit = fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
@@ -91,7 +94,7 @@ pub(super) fn run(
         equation: family.equation(),
         cannot_represent: family.cannot_represent(),
         parameters: parameters(&fit),
-        records: outputs(&fit, &records),
+        records: outputs(&fit, &records, &named),
         samples: fit.samples,
         free: fit.free,
         rmse_n: fit.rms,
@@ -138,10 +141,14 @@ fn parameters(fit: &FamilyFit) -> Vec<ParameterOutput<'_>> {
     all.collect()
 }
 
-fn outputs<'a>(fit: &'a FamilyFit, records: &[FittedRecord<'_>]) -> Vec<RecordOutput<'a>> {
-    let pairs = fit.records.iter().zip(records);
+fn outputs<'a>(
+    fit: &'a FamilyFit,
+    records: &[FittedRecord<'_>],
+    named: &'a [Recording],
+) -> Vec<RecordOutput<'a>> {
+    let pairs = fit.records.iter().zip(records).zip(named);
     pairs
-        .map(|(own, record)| RecordOutput {
+        .map(|((own, record), read)| RecordOutput {
             record: &own.name,
             f_offset_n: own.offset,
             f0_n: own.initial,
@@ -149,6 +156,7 @@ fn outputs<'a>(fit: &'a FamilyFit, records: &[FittedRecord<'_>]) -> Vec<RecordOu
             r2: record.r2,
             rmse_n: own.rms,
             worst_n: own.worst,
+            compliance: read.compliance.as_ref(),
             work_measured_n_mm: record.work[0],
             work_fitted_n_mm: record.work[1],
         })

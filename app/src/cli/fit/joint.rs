@@ -5,6 +5,7 @@ use super::Recipe;
 use super::sources::{self, Recording};
 use crate::report::text;
 use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
+use palpate_protocols::compliance::Correction;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
 use std::path::PathBuf;
@@ -16,6 +17,8 @@ const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 struct JointOutput<'a> {
     #[serde(flatten)]
     report: &'a JointReport,
+    /// What the rig's compliance did to the depths of each record, or would; null where none is known.
+    compliances: Vec<Option<&'a Correction>>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -34,7 +37,13 @@ pub(super) fn run(
         ));
     }
     let shared = names(shared);
-    let records = sources::read(&found, recipe.columns.as_ref(), recipe.wanted, output)?;
+    let records = sources::read(
+        &found,
+        recipe.columns.as_ref(),
+        recipe.wanted,
+        &recipe.corrections,
+        output,
+    )?;
     let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
     let report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {
@@ -47,6 +56,7 @@ pub(super) fn run(
     let seconds = watch.seconds();
     let object = JointOutput {
         report: &report,
+        compliances: records.iter().map(|one| one.compliance.as_ref()).collect(),
         seconds,
     };
     output.result(&object, || whole(&report));

@@ -7,15 +7,16 @@ mod joint;
 pub(super) mod sources;
 
 use super::Failure;
-use super::new_file;
 use super::output::Output;
+use super::{compliance, new_file};
 use crate::report::{picture, text};
-use crate::workers::fit::{Fitted, fit_source};
+use crate::workers::fit::Fitted;
 use clap::Args;
 use intervals::Intervals;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitOptions, FitReport, Systematic};
-use palpate_protocols::analysis::{SourceError, Stretch, Wanted};
+use palpate_protocols::analysis::{self, SourceError, Stretch, Wanted};
+use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_sessions::import::ColumnNames;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -65,6 +66,10 @@ pub struct FitArgs {
     /// Take sessions though they were rejected
     #[arg(long)]
     include_rejected: bool,
+    /// Fit over depths less what the rig gave way: last for the compliance in force for each
+    /// session's rig, a file, or an id of the library
+    #[arg(long, value_name = "FILE|last")]
+    compliance: Option<String>,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -85,6 +90,11 @@ impl FitArgs {
             is_rejected_included: self.include_rejected,
         }
     }
+
+    /// Which compliance is taken from which depths.
+    fn corrections(&self) -> Result<Corrections, Failure> {
+        compliance::corrections(self.compliance.as_deref())
+    }
 }
 
 /// How every source is fitted.
@@ -93,6 +103,7 @@ struct Recipe {
     columns: Option<ColumnNames>,
     is_systematic: bool,
     wanted: Wanted,
+    corrections: Corrections,
 }
 
 impl Recipe {
@@ -101,8 +112,12 @@ impl Recipe {
     }
 
     fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
-        let fitted = fit_source(path, self.columns.as_ref(), self.wanted, &self.options);
-        let fitted = fitted?;
+        let mut source = analysis::read_stretch(path, self.columns.as_ref(), self.wanted)?;
+        let compliance = self.corrections.apply(&mut source)?;
+        let fitted = Fitted {
+            compliance,
+            ..Fitted::of(source, &self.options)
+        };
         Ok(match self.is_systematic {
             true => fitted.with_systematic(&self.options),
             false => fitted,
@@ -119,6 +134,9 @@ struct FitOutput<'a> {
     /// What the calibration adds; absent for tables and with `--no-systematic`.
     #[serde(skip_serializing_if = "Option::is_none")]
     systematic: Option<Systematic>,
+    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compliance: Option<Correction>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -140,6 +158,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         columns,
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
+        corrections: args.corrections()?,
     };
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
@@ -189,10 +208,12 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         report: &report,
         intervals: &intervals,
         systematic: fitted.systematic,
+        compliance: fitted.compliance,
         seconds: fitted.seconds,
     };
     output.result(&object, || {
         let mut lines = vec![text::whole(&report)];
+        lines.extend(object.compliance.as_ref().map(Correction::sentence));
         lines.extend(intervals.lines(&report));
         lines.join("\n")
     });

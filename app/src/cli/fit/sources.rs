@@ -5,6 +5,7 @@ use super::super::source_failure;
 use super::Failure;
 use palpate_model::fit::FitSample;
 use palpate_protocols::analysis::{self, SourceError, Wanted};
+use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_sessions::import::ColumnNames;
 use palpate_sessions::log::ReadError;
 use std::fs;
@@ -82,6 +83,8 @@ pub(in crate::cli) struct Recording {
     pub samples: Vec<FitSample>,
     /// The specimen pressed, where the source says so.
     pub specimen: Option<String>,
+    /// What the rig's compliance does to its depths, or would.
+    pub compliance: Option<Correction>,
 }
 
 impl Recording {
@@ -96,6 +99,7 @@ pub(in crate::cli) fn read(
     found: &[PathBuf],
     columns: Option<&ColumnNames>,
     wanted: Wanted,
+    corrections: &Corrections,
     output: &Output,
 ) -> Result<Vec<Recording>, Failure> {
     let mut real: Vec<PathBuf> = found
@@ -111,13 +115,17 @@ pub(in crate::cli) fn read(
     }
     let one = |path: &PathBuf| {
         let name = path.display().to_string();
-        let source = match analysis::read_stretch(path, columns, wanted) {
+        let mut source = match analysis::read_stretch(path, columns, wanted) {
             Err(SourceError::Rejected { reason }) => {
                 output.note(&format!("{name}: rejected, left out: {reason}"));
                 return Ok(None);
             }
             source => source.map_err(source_failure)?,
         };
+        let compliance = corrections.apply(&mut source);
+        let compliance = compliance.map_err(|err| source_failure(err.into()))?;
+        let told = compliance.as_ref().filter(|told| told.is_applied);
+        source.notes.extend(told.map(Correction::sentence));
         for note in &source.notes {
             output.note(&format!("{name}: {note}"));
         }
@@ -125,6 +133,7 @@ pub(in crate::cli) fn read(
             name,
             samples: source.samples,
             specimen: source.specimen,
+            compliance,
         }))
     };
     let read: Vec<Option<Recording>> = found.iter().map(one).collect::<Result<_, Failure>>()?;

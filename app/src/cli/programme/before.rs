@@ -83,7 +83,7 @@ pub(super) fn ask(file: &Path, programme: &Programme) -> Result<(), Failure> {
         .map(|question| format!("line {}: {}", question.line, question.message))
         .collect();
     Err(Failure::usage(format!(
-        "{}: nothing has begun, for {}; {TELL}",
+        "{}: before it begins, something must be told: {}; {TELL}",
         file.display(),
         told.join("; ")
     )))

@@ -1,0 +1,239 @@
+//! `palpate doctor` and `palpate recover`: in which state sessions are, and what can be kept of them.
+
+use super::Failure;
+use super::output::Output;
+use clap::Args;
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::library_folder;
+use palpate_sessions::recover::{
+    Health, Missing, Patient, RecoverError, examine, examine_library, recover,
+};
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+const VERSION: &str = env!("CARGO_PKG_VERSION");
+
+/// Arguments of `palpate doctor`.
+#[derive(Debug, Args)]
+pub struct DoctorArgs {
+    /// Session folders or files; without any, every session of the library (~/palpate or PALPATE_HOME)
+    sessions: Vec<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+/// Arguments of `palpate recover`.
+#[derive(Debug, Args)]
+pub struct RecoverArgs {
+    /// Session folders; without any, every unfinished session of the library
+    sessions: Vec<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
+}
+
+#[derive(Serialize)]
+struct Visit {
+    command: &'static str,
+    sessions: Vec<Patient>,
+    /// How many cannot be used as they are.
+    unwell: usize,
+}
+
+#[derive(Serialize)]
+struct Recovered {
+    session: PathBuf,
+    recovered: PathBuf,
+    session_id: String,
+    samples: u64,
+    missing: Missing,
+}
+
+#[derive(Serialize)]
+struct Recoveries {
+    command: &'static str,
+    sessions: Vec<Recovered>,
+}
+
+pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
+    let paths = if args.sessions.is_empty() {
+        all_sessions(&library_folder().map_err(Failure::usage)?)?
+    } else {
+        args.sessions.clone()
+    };
+    let bar = output.count_bar(paths.len() as u64);
+    let mut sessions = Vec::new();
+    for path in &paths {
+        bar.set_message(path.display().to_string());
+        sessions.push(examine(path));
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
+    let visit = Visit {
+        command: "doctor",
+        sessions,
+        unwell,
+    };
+    output.result(&visit, || {
+        let count = visit.sessions.len();
+        let mut lines: Vec<String> = visit.sessions.iter().map(patient_text).collect();
+        lines.push(match unwell {
+            0 => format!("{count} looked at, all can be used"),
+            _ => format!("{count} looked at, {unwell} cannot be used as they are"),
+        });
+        lines.join("\n")
+    });
+    if unwell > 0 {
+        return Err(Failure::failed(format!(
+            "{unwell} of {} cannot be used as they are",
+            visit.sessions.len()
+        )));
+    }
+    Ok(())
+}
+
+fn is_unwell(patient: &Patient) -> bool {
+    !matches!(
+        patient.health,
+        Health::Healthy | Health::BeingRecorded | Health::Interrupted
+    )
+}
+
+fn patient_text(patient: &Patient) -> String {
+    let state = match &patient.health {
+        Health::Healthy => "healthy",
+        Health::BeingRecorded => "being recorded",
+        Health::Interrupted => "interrupted",
+        Health::Damaged { .. } => "damaged",
+        Health::Lost => "lost",
+        Health::Newer => "newer",
+        Health::Foreign => "not a session",
+    };
+    let mut lines = vec![match patient.samples {
+        0 => format!("{}: {state}", patient.path.display()),
+        samples => format!(
+            "{}: {state}, {samples} samples to {:.1} s",
+            patient.path.display(),
+            patient.until_s
+        ),
+    }];
+    lines.extend(patient.findings.iter().map(|one| format!("  {one}")));
+    let can_be_kept = matches!(patient.health, Health::Damaged { .. } | Health::Interrupted);
+    match &patient.recovered {
+        Some(folder) => lines.push(format!(
+            "  what is whole was recovered into {}",
+            folder.display()
+        )),
+        None if can_be_kept => lines.push(format!(
+            "  palpate recover {} keeps what is whole",
+            patient.path.display()
+        )),
+        None => {}
+    }
+    lines.join("\n")
+}
+
+/// Every session of a library, oldest first.
+fn all_sessions(library: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let folder = library.join("sessions");
+    let failed = |err: std::io::Error| {
+        Failure::failed(format!(
+            "cannot read {} ({err}); check its permissions",
+            folder.display()
+        ))
+    };
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let mut paths = Vec::new();
+    for item in std::fs::read_dir(&folder).map_err(failed)? {
+        let path = item.map_err(failed)?.path();
+        if path.is_dir() {
+            paths.push(path);
+        }
+    }
+    paths.sort_unstable();
+    Ok(paths)
+}
+
+pub(super) fn run_recover(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
+    let paths = if args.sessions.is_empty() {
+        unfinished(&library_folder().map_err(Failure::usage)?)?
+    } else {
+        args.sessions.clone()
+    };
+    let bar = output.count_bar(paths.len() as u64);
+    let mut sessions = Vec::new();
+    for path in &paths {
+        bar.set_message(path.display().to_string());
+        sessions.push(one(path)?);
+        bar.inc(1);
+    }
+    bar.finish_and_clear();
+    let recoveries = Recoveries {
+        command: "recover",
+        sessions,
+    };
+    output.result(&recoveries, || {
+        if recoveries.sessions.is_empty() {
+            return "nothing to recover".into();
+        }
+        recoveries
+            .sessions
+            .iter()
+            .map(recovered_text)
+            .collect::<Vec<_>>()
+            .join("\n")
+    });
+    Ok(())
+}
+
+fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
+    examine_library(library).map_err(|err| {
+        Failure::failed(format!(
+            "cannot read {} ({err}); check its permissions",
+            library.display()
+        ))
+    })
+}
+
+fn one(path: &Path) -> Result<Recovered, Failure> {
+    let recovery = recover(path, VERSION, wall_now().into()).map_err(|err| match err {
+        RecoverError::Read(err) => super::read_failure(err),
+        RecoverError::Whole { .. } | RecoverError::InUse { .. } | RecoverError::Before { .. } => {
+            Failure::usage(err)
+        }
+        _ => Failure::failed(err),
+    })?;
+    Ok(Recovered {
+        session: path.into(),
+        recovered: recovery.folder,
+        session_id: recovery.session_id,
+        samples: recovery.salvage.samples,
+        missing: recovery.salvage.missing,
+    })
+}
+
+fn recovered_text(one: &Recovered) -> String {
+    let mut lines = vec![format!(
+        "{}: {} samples kept in {}",
+        one.session.display(),
+        one.samples,
+        one.recovered.display()
+    )];
+    let missing = one.missing.sentences();
+    lines.extend(missing.iter().map(|sentence| format!("  {sentence}")));
+    lines.join("\n")
+}
+
+/// Recovers what a crash left unfinished in a library, and says so; what fails is only told.
+pub(super) fn recover_unfinished(library: &Path, output: &Output) {
+    for path in examine_library(library).unwrap_or_default() {
+        match one(&path) {
+            Ok(done) => output.note(&recovered_text(&done)),
+            Err(failure) => output.note(failure.sentence()),
+        }
+    }
+}

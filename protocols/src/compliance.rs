@@ -1,0 +1,366 @@
+//! How far a rig gives way: found from a session against a stiff surface, and taken from the depths of other
+//! sessions. The axis goes as far as the probe sinks in and the rig gives way, so the probe's own depth is
+//! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
+
+use crate::analysis::{
+    FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, trusted_samples,
+};
+use crate::engine::{Effect, Record, SEATED_SHARE};
+use palpate_model::fit::FitSample;
+use palpate_model::rig::{
+    Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
+};
+use palpate_model::units::{Depth, Newtons, Position};
+use palpate_sessions::compliances::{Kept, Shelf};
+use palpate_sessions::export::Beside;
+use palpate_sessions::log::Session;
+use palpate_sessions::record::Row;
+use palpate_sessions::shelf::LibraryError;
+use serde::Serialize;
+use std::path::Path;
+use thiserror::Error;
+
+/// What asks for the compliance in force for a session's rig.
+pub const LAST: &str = "last";
+
+/// A session tells no compliance.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum MeasureError {
+    /// The session cannot be used.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// No surface was searched, or none found.
+    #[error(
+        "the session found no stiff surface, so what it pressed may have been tissue; run stiff-surface and name its session"
+    )]
+    NoSurface,
+    /// The surface was found and never pressed.
+    #[error(
+        "the session found a stiff surface and did not press it with a known force; run stiff-surface to its end"
+    )]
+    NoPress,
+    /// The forces are not those of a rig that gives way.
+    #[error(transparent)]
+    Line(#[from] ComplianceError),
+}
+
+/// The compliance that a session of the protocol `stiff-surface` tells, from the ways in of all presses at or
+/// above `seating`; without it from 0.3 of the highest force, as the search for the surface takes it.
+pub fn measured(
+    session: &Session,
+    seating: Option<Newtons>,
+) -> Result<RigCompliance, MeasureError> {
+    let presses = presses(session)?;
+    let forces = presses.iter().flat_map(|(_, samples)| samples);
+    let highest = forces.map(|sample| sample.force.0).fold(0.0, f64::max);
+    if presses.is_empty() {
+        return Err(MeasureError::NoPress);
+    }
+    let seating = seating.unwrap_or(Newtons(SEATED_SHARE * highest));
+    let manifest = &session.manifest;
+    Ok(RigCompliance {
+        rig: manifest
+            .rig
+            .as_ref()
+            .map_or_else(String::new, |rig| rig.name.clone()),
+        taken_at: manifest.started_at_text(),
+        operator: manifest.operator.clone(),
+        session_id: manifest.session_id.clone(),
+        session_checksum: format!("{:08x}", session.checksum()),
+        software_version: env!("CARGO_PKG_VERSION").into(),
+        ..RigCompliance::of_presses(&presses, seating)?
+    })
+}
+
+/// The ways in after a stiff surface was found, press by press.
+fn presses(session: &Session) -> Result<Vec<(u32, Vec<StiffSample>)>, MeasureError> {
+    let curve = curve_of(session)?;
+    let decisions = decisions(session)?;
+    let noise = noise_of(&decisions).ok_or(MeasureError::NoPress)?;
+    let found = decisions
+        .iter()
+        .rev()
+        .find_map(|(after, effect)| match effect {
+            Effect::Record(Record::BaseFound { position, .. }) => {
+                Some((*after as usize, *position))
+            }
+            _ => None,
+        });
+    let (after, surface) = found.ok_or(MeasureError::NoSurface)?;
+    let trusted = trusted_samples(&decisions);
+    let mut presses: Vec<(u32, Vec<StiffSample>)> = Vec::new();
+    let rows = session.rows.iter().enumerate().take(trusted).skip(after);
+    for (_, row) in rows {
+        let (Some(force), Some(depth)) = (row.force, row.depth) else {
+            continue;
+        };
+        if row.phase != Phase::Ramp || is_saturated(session, row) {
+            continue;
+        }
+        let sample = StiffSample {
+            position: Position(surface.0 + depth),
+            force: Newtons(force),
+            sigma: curve.force_sigma(Newtons(force), noise),
+        };
+        match presses.last_mut() {
+            Some((press, samples)) if *press == row.cycle => samples.push(sample),
+            _ => presses.push((row.cycle, vec![sample])),
+        }
+    }
+    Ok(presses)
+}
+
+/// A compliance cannot be used on a record.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum CorrectionError {
+    /// It cannot be read or found.
+    #[error(transparent)]
+    Library(#[from] LibraryError),
+    /// None is kept for the rig.
+    #[error(
+        "the library has no compliance of rig {rig}; run stiff-surface on it and keep what 'palpate compliance SESSION --save' finds"
+    )]
+    NoneInForce {
+        /// The rig.
+        rig: String,
+    },
+    /// A table does not say where it is from.
+    #[error(
+        "a table does not say which rig it is from, so there is no last compliance for it; name the compliance's file"
+    )]
+    NoRig,
+    /// Another rig gives way otherwise.
+    #[error(
+        "{id} is the compliance of rig {of}, and this was recorded on rig {rig}; name one of that rig"
+    )]
+    OtherRig {
+        /// The document.
+        id: String,
+        /// Its rig.
+        of: String,
+        /// The record's rig.
+        rig: String,
+    },
+}
+
+/// What is asked about compliance.
+#[derive(Debug)]
+enum Asked {
+    /// Depths stay raw.
+    Raw,
+    /// The one in force for the rig of each record.
+    InForce,
+    /// This one.
+    This(Box<Kept>),
+}
+
+/// Which compliance goes with which record.
+#[derive(Debug)]
+pub struct Corrections {
+    asked: Asked,
+    shelf: Shelf,
+}
+
+impl Corrections {
+    /// Depths stay raw; with a library, what the compliance in force would change is told.
+    #[must_use]
+    pub fn none(library: Option<&Path>) -> Self {
+        Self {
+            asked: Asked::Raw,
+            shelf: library.map(Shelf::open).unwrap_or_default(),
+        }
+    }
+
+    /// What a user names: [`LAST`] for the one in force for each record's rig, a file, or an id of the library.
+    pub fn named(name: &str, library: Option<&Path>) -> Result<Self, CorrectionError> {
+        let shelf = library.map(Shelf::open).unwrap_or_default();
+        let path = Path::new(name);
+        let asked = if name == LAST {
+            Asked::InForce
+        } else if path.is_file() {
+            let stem = path.file_stem().unwrap_or_default();
+            Asked::This(Box::new(Kept {
+                id: stem.to_string_lossy().into_owned(),
+                path: path.into(),
+                document: palpate_sessions::shelf::read(path)?,
+            }))
+        } else {
+            Asked::This(Box::new(shelf.find(name)?.clone()))
+        };
+        Ok(Self { asked, shelf })
+    }
+
+    /// The document for a record of a rig, and whether depths are corrected with it; a table has no rig.
+    pub fn of_rig(&self, rig: Option<&str>) -> Result<Option<(&Kept, bool)>, CorrectionError> {
+        let in_force = |rig: &str| self.shelf.in_force(rig);
+        match (&self.asked, rig) {
+            (Asked::Raw, rig) => Ok(rig.and_then(in_force).map(|kept| (kept, false))),
+            (Asked::InForce, None) => Err(CorrectionError::NoRig),
+            (Asked::InForce, Some(rig)) => match in_force(rig) {
+                Some(kept) => Ok(Some((kept, true))),
+                None => Err(CorrectionError::NoneInForce { rig: rig.into() }),
+            },
+            (Asked::This(kept), Some(rig)) if kept.document.rig != rig => {
+                Err(CorrectionError::OtherRig {
+                    id: kept.id.clone(),
+                    of: kept.document.rig.clone(),
+                    rig: rig.into(),
+                })
+            }
+            (Asked::This(kept), _) => Ok(Some((kept, true))),
+        }
+    }
+
+    /// Corrects what is to be fitted, where that is asked, and tells what the compliance does to it; `None`
+    /// where none is asked and none is kept.
+    pub fn apply(&self, source: &mut FitSource) -> Result<Option<Correction>, CorrectionError> {
+        let Some((kept, is_applied)) = self.of_rig(source.rig.as_deref())? else {
+            return Ok(None);
+        };
+        let told = Correction::of(kept, is_applied, &source.samples);
+        if is_applied {
+            correct_samples(&mut source.samples, &kept.document.compliance());
+            source.notes.extend(told.doubt.clone());
+            // One that cannot be read might be the one in force.
+            if let Asked::InForce = self.asked {
+                let unreadable = self.shelf.unreadable.iter();
+                source.notes.extend(unreadable.map(ToString::to_string));
+            }
+        }
+        Ok(Some(told))
+    }
+}
+
+/// What a compliance does to the depths of a record.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Correction {
+    /// The document.
+    pub id: String,
+    /// Way of the axis per force, in mm/N.
+    pub mm_per_n: f64,
+    /// Its standard uncertainty.
+    pub std_error_mm_per_n: f64,
+    /// Whether depths were corrected; if not, this is what would be.
+    pub is_applied: bool,
+    /// Highest force of the record, in N.
+    pub force_peak_n: f64,
+    /// By how much the depth is less there, in um.
+    pub at_peak_um: f64,
+    /// The standard uncertainty of that in um, from that of the compliance.
+    pub at_peak_std_error_um: f64,
+    /// What speaks against it.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub doubt: Option<String>,
+}
+
+impl Correction {
+    fn of(kept: &Kept, is_applied: bool, samples: &[FitSample]) -> Self {
+        let known = samples.iter().filter(|sample| sample.is_measured());
+        let peak = known.map(|sample| sample.force.0).fold(0.0, f64::max);
+        let document = &kept.document;
+        let doubt = (peak > document.force_max_n).then(|| {
+            format!(
+                "the compliance was measured up to {:.1} N and the record goes to {peak:.1} N; beyond, it is taken as a straight line",
+                document.force_max_n
+            )
+        });
+        Self {
+            id: kept.id.clone(),
+            mm_per_n: document.mm_per_n,
+            std_error_mm_per_n: document.std_error_mm_per_n,
+            is_applied,
+            force_peak_n: peak,
+            at_peak_um: 1e3 * document.mm_per_n * peak,
+            at_peak_std_error_um: 1e3 * document.std_error_mm_per_n * peak,
+            doubt,
+        }
+    }
+
+    /// In a sentence.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let (id, um, peak) = (&self.id, self.at_peak_um, self.force_peak_n);
+        if self.is_applied {
+            format!(
+                "depths are corrected for the rig's compliance {id}: {um:.0} ± {:.1} um less at {peak:.2} N",
+                self.at_peak_std_error_um
+            )
+        } else {
+            format!(
+                "depths are raw; the rig's compliance {id} would make them {um:.0} um less at {peak:.2} N (--compliance {LAST})"
+            )
+        }
+    }
+}
+
+/// Forces are averaged over so long, in s, before they bend the rig in a fit: noise is in the reading and bends
+/// nothing, and a depth that moved with the noise of its own force would pull the fitted stiffness down. At the
+/// corner of a ramp, where the force turns from 2 N/s to rest, the mean is off by 2 * 0.05 / 8 = 0.0125 N, a
+/// micrometre on a soft rig.
+const AVERAGED_SECS: f64 = 0.05;
+
+/// Takes from every depth what the rig gives way. Where no force near is known, the last one known bends the rig.
+fn correct_samples(samples: &mut [FitSample], compliance: &Compliance) {
+    let half = 0.5 * AVERAGED_SECS;
+    let (mut first, mut end, mut force) = (0, 0, Newtons(0.0));
+    let bends: Vec<Newtons> = samples
+        .iter()
+        .map(|sample| {
+            while samples[first].t.0 < sample.t.0 - half {
+                first += 1;
+            }
+            while end < samples.len() && samples[end].t.0 <= sample.t.0 + half {
+                end += 1;
+            }
+            let near = samples[first..end].iter().filter(|one| one.is_measured());
+            let (sum, count) = near.fold((0.0, 0.0), |(sum, count), one| {
+                (sum + one.force.0, count + 1.0)
+            });
+            if count > 0.0 {
+                force = Newtons(sum / count);
+            }
+            force
+        })
+        .collect();
+    for (sample, force) in samples.iter_mut().zip(bends) {
+        sample.depth = compliance.correct(sample.depth, force, Newtons(0.0)).depth;
+    }
+}
+
+/// The corrected depths of a session as columns beside its own: empty before contact, and where the converter
+/// was at an end of its range or an interlock had tripped, for there the force is not known.
+pub fn columns(session: &Session, kept: &Kept) -> Result<Beside, SourceError> {
+    let curve = curve_of(session)?;
+    let decisions = decisions(session)?;
+    let trusted = trusted_samples(&decisions);
+    let noise = noise_of(&decisions);
+    let compliance = kept.document.compliance();
+    let one = |(index, row): (usize, &Row)| -> Option<CorrectedDepth> {
+        let (force, depth) = (Newtons(row.force?), Depth(row.depth?));
+        if index >= trusted || is_saturated(session, row) {
+            return None;
+        }
+        Some(compliance.correct(depth, force, curve.force_sigma(force, noise?)))
+    };
+    let corrected: Vec<Option<CorrectedDepth>> = session.rows.iter().enumerate().map(one).collect();
+    let column = |of: fn(CorrectedDepth) -> f64| corrected.iter().map(|one| one.map(of)).collect();
+    let document = serde_json::json!({
+        "id": kept.id,
+        "rig": kept.document.rig,
+        "taken_at": kept.document.taken_at,
+        "session_id": kept.document.session_id,
+        "session_checksum": kept.document.session_checksum,
+        "checksum": kept.checksum(),
+        "mm_per_n": kept.document.mm_per_n,
+        "std_error_mm_per_n": kept.document.std_error_mm_per_n,
+    });
+    Ok(Beside {
+        columns: vec![
+            ("depth_corrected_mm", "mm", column(|one| one.depth.0)),
+            ("depth_corrected_sigma_mm", "mm", column(|one| one.sigma_mm)),
+        ],
+        metadata: vec![("palpate.compliance".into(), document.to_string())],
+    })
+}

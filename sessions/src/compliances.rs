@@ -1,0 +1,77 @@
+//! How far rigs give way, as a library keeps it in `compliances/`.
+
+use crate::shelf::{self, Document};
+use palpate_model::rig::RigCompliance;
+
+/// A compliance in the library.
+pub type Kept = shelf::Kept<RigCompliance>;
+
+/// The compliances of a library.
+pub type Shelf = shelf::Shelf<RigCompliance>;
+
+impl Document for RigCompliance {
+    const KIND: &'static str = "compliance";
+    const FOLDER: &'static str = "compliances";
+    const LISTED: &'static str = "its folder compliances";
+    const RENEW: &'static str = "measure and save it anew";
+
+    /// A rig has one at a time, so it goes by the rig's name.
+    fn name(&self) -> &str {
+        &self.rig
+    }
+
+    fn rig(&self) -> &str {
+        &self.rig
+    }
+
+    fn taken_at(&self) -> Option<&str> {
+        Some(&self.taken_at)
+    }
+
+    fn supersedes(&self) -> Option<&str> {
+        self.supersedes.as_deref()
+    }
+
+    fn superseding(self, id: String) -> Self {
+        Self {
+            supersedes: Some(id),
+            ..self
+        }
+    }
+
+    fn check(&self) -> Result<(), String> {
+        Self::check(self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::shelf::{LibraryError, read, save, supersede};
+
+    fn taken(day: &str, mm_per_n: f64) -> RigCompliance {
+        RigCompliance {
+            format: 1,
+            rig: "bench".into(),
+            taken_at: format!("{day}T10:00:00Z"),
+            mm_per_n,
+            std_error_mm_per_n: 1e-4,
+            ..RigCompliance::default()
+        }
+    }
+
+    #[test]
+    fn a_compliance_is_kept_superseded_and_no_calibration() {
+        let home = tempfile::tempdir().unwrap();
+        let first = save(home.path(), &taken("2026-03-05", 0.06)).unwrap();
+        assert!(first.id.starts_with("20260305-bench-"), "{}", first.id);
+        let second = supersede(home.path(), &first.id, &taken("2026-03-01", 0.05)).unwrap();
+        let shelf = Shelf::open(home.path());
+        assert_eq!(shelf.in_force("bench"), Some(&second));
+        let wrong = read::<palpate_model::calibration::Calibration>(&first.path).unwrap_err();
+        assert!(matches!(wrong, LibraryError::NotOne { .. }), "{wrong}");
+        assert!(crate::Shelf::open(home.path()).kept.is_empty());
+        let nothing = save(home.path(), &taken("2026-03-05", 0.0)).unwrap_err();
+        assert!(matches!(nothing, LibraryError::Unsound { .. }), "{nothing}");
+    }
+}

@@ -1,0 +1,135 @@
+//! A rig that gives way: how much, found on a stiff surface, and what a fit makes of depths with and without it.
+#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
+
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
+use palpate_model::fit::{FitOptions, FitReport, fit};
+use palpate_model::units::Seconds;
+use palpate_protocols::analysis::{FitSource, Stretch, samples_of};
+use palpate_protocols::compliance::{Corrections, MeasureError, measured};
+use palpate_protocols::file::built_in;
+use palpate_protocols::plans::RampHold;
+use palpate_sessions::Session;
+use palpate_sessions::shelf::save;
+use palpate_tests::recorded;
+use std::collections::BTreeMap;
+
+/// The base the simulated rig presses gives way by this much itself, in mm/N.
+const BASE: f64 = 1e-3;
+
+fn rig(um_per_n: &str) -> SimRig {
+    SimRig::new(SimSettings {
+        profile: SimProfile::Ideal,
+        seed: 11,
+        compliance: um_per_n.parse().unwrap(),
+        ..SimSettings::default()
+    })
+}
+
+fn stiff_surface(um_per_n: &str) -> Session {
+    let protocol = built_in("stiff-surface").unwrap().unwrap();
+    let plan = protocol.plan(&BTreeMap::new()).unwrap();
+    let rig = rig(um_per_n);
+    let calibration = rig.calibration();
+    recorded::of_plan(Box::new(rig), calibration, plan)
+}
+
+/// The five parameters of the body, true and fitted with their standard errors.
+fn body(rig: &SimRig, report: &FitReport) -> [(f64, f64, f64); 5] {
+    let truth = rig.truth().body;
+    let truth = [
+        ("tau_eps", truth.tau_eps),
+        ("mu1", truth.mu[0]),
+        ("mu2", truth.mu[1]),
+        ("mu3", truth.mu[2]),
+        ("tau_sig", truth.tau_sig),
+    ];
+    truth.map(|(name, truth)| {
+        let found = report.parameter(name).unwrap();
+        (truth, found.value, found.std_error.unwrap())
+    })
+}
+
+#[test]
+fn depths_less_what_the_rig_gives_way_bring_the_parameters_back() {
+    let library = tempfile::tempdir().unwrap();
+    let options = FitOptions::default();
+    let stiff = fit(&source(&recorded_on("0")).samples, &options).unwrap();
+    let stiff = body(&rig("0"), &stiff);
+    for um_per_n in ["20", "60", "100"] {
+        let wanted = um_per_n.parse::<f64>().unwrap() * 1e-3 + BASE;
+        let found = measured(&stiff_surface(um_per_n), None).unwrap();
+        println!(
+            "{um_per_n} um/N: {:.5} ± {:.5} mm/N",
+            found.mm_per_n, found.std_error_mm_per_n
+        );
+        assert_eq!(found.presses.len(), 3);
+        let error = found.mm_per_n - wanted;
+        // Four standard errors; of three presses the scatter itself is known to a half.
+        assert!(
+            error.abs() < 4.0 * found.std_error_mm_per_n + 1e-4 * wanted,
+            "{error} {found:?}"
+        );
+        let folder = library.path().join(um_per_n);
+        save(&folder, &found).unwrap();
+
+        let truth = rig(um_per_n);
+        let session = recorded_on(um_per_n);
+        let raw = source(&session);
+        let mut corrected = raw.clone();
+        let corrections = Corrections::named("last", Some(&folder)).unwrap();
+        let told = corrections.apply(&mut corrected).unwrap().unwrap();
+        println!("  {}", told.sentence());
+        assert!(
+            told.is_applied && (told.at_peak_um - 1e3 * wanted * told.force_peak_n).abs() < 5.0
+        );
+        let before = body(&truth, &fit(&raw.samples, &options).unwrap());
+        let after = body(&truth, &fit(&corrected.samples, &options).unwrap());
+        for ((raw, corrected), stiff) in before.iter().zip(&after).zip(&stiff) {
+            let off = |one: &(f64, f64, f64)| (one.1 - one.0) / one.2;
+            println!(
+                "  true {:.5}: raw {:.5} ({:+.1} sigma), corrected {:.5} ({:+.1} sigma), stiff rig {:.5}",
+                raw.0,
+                raw.1,
+                off(raw),
+                corrected.1,
+                off(corrected),
+                stiff.1
+            );
+            // The contact's own error is left, which no compliance makes or mends: the rig that does not give way
+            // has it too. Three standard errors of the difference of two fits.
+            let left = (corrected.1 - stiff.1).abs();
+            assert!(
+                left < 3.0 * corrected.2.hypot(stiff.2),
+                "{corrected:?} {stiff:?}"
+            );
+            assert!((raw.1 - stiff.1).abs() > 3.0 * left, "{raw:?} {stiff:?}");
+        }
+    }
+}
+
+/// A ramp and hold on such a rig.
+fn recorded_on(um_per_n: &str) -> Session {
+    let rig = rig(um_per_n);
+    let calibration = rig.calibration();
+    recorded::session(Box::new(rig), calibration, RampHold::default())
+}
+
+fn source(session: &Session) -> FitSource {
+    FitSource {
+        samples: samples_of(session, Stretch::RampHold).unwrap(),
+        start: Seconds(0.0),
+        notes: Vec::new(),
+        specimen: None,
+        rig: session.manifest.rig.as_ref().map(|rig| rig.name.clone()),
+        calibration: None,
+    }
+}
+
+#[test]
+fn a_session_that_touched_no_base_tells_no_compliance() {
+    let refused = measured(&recorded_on("60"), None);
+    assert!(
+        matches!(refused, Err(MeasureError::NoSurface)),
+        "{refused:?}"
+    );
+}
