@@ -66,10 +66,10 @@ fn an_imported_table_is_a_session_for_every_command() {
         &["export", "in/zug", "--format", "csv", "--to", "out"],
     ));
     let exported = fs::read_to_string(at.join("out/zug.csv")).unwrap();
-    // Time, depth and force, and nothing in the columns of a rig.
+    // Time, depth and 4 gf as force, and nothing in the columns of a rig.
     assert_eq!(
         exported.lines().nth(2),
-        Some("0.1,0.1,0.03922660000000001,,,,imported,0")
+        Some("0.1,0.1,0.0392266,,,,imported,0")
     );
 }
 

@@ -203,7 +203,7 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
 enum Outcome {
     /// The next segment goes on from here.
     GoOn,
-    /// The segment was begun and holds nothing; it is the last.
+    /// The segment was begun and holds nothing.
     Nothing,
 }
 
@@ -265,8 +265,7 @@ impl<'v> Reader<'v> {
         let files = std::mem::take(&mut self.files);
         let mut damage = None;
         for (number, file) in files.iter().enumerate() {
-            let is_last = number + 1 == files.len();
-            match self.read_file(file, number == 0, is_last)? {
+            match self.read_file(file, number == 0)? {
                 Ok(Outcome::GoOn) => {}
                 Ok(Outcome::Nothing) => {
                     let name = name_of(file);
@@ -355,7 +354,6 @@ impl<'v> Reader<'v> {
         &mut self,
         path: &Path,
         is_first: bool,
-        is_last: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage {
             path: path.into(),
@@ -375,7 +373,8 @@ impl<'v> Reader<'v> {
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
         if is_first {
             check_beginning(path, &source, is_ours)?;
-        } else if is_last && source.is_barely_begun().map_err(failed)? {
+        } else if source.is_barely_begun().map_err(failed)? {
+            // What should be in it shows as missing in the next, if anything follows.
             return Ok(Ok(Outcome::Nothing));
         } else if !is_ours {
             self.broken_off
@@ -398,14 +397,10 @@ impl<'v> Reader<'v> {
         let stop = walked.err();
         if stop.as_ref().is_none_or(|stop| stop.is_torn) {
             if !self.content.has_manifest {
-                let here = damage(source.length(), NOT_BEGUN);
                 return Ok(if is_first || is_finished {
-                    Err(here)
-                } else if is_last {
-                    Ok(Outcome::Nothing)
+                    Err(damage(source.length(), NOT_BEGUN))
                 } else {
-                    self.broken_off.push(here);
-                    Ok(Outcome::GoOn)
+                    Ok(Outcome::Nothing)
                 });
             }
             // However a file ends: once there is an end record, all it counted must be there.

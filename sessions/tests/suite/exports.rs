@@ -200,7 +200,8 @@ print(json.dumps([session, topics]))
     let found: serde_json::Value = serde_json::from_str(&text)
         .unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr)));
     let expected = serde_json::json!(["20260305T141507Z-0badcafe",
-        {"/manifest": 1, "/daq/block": 10, "/derived/block": 10, "/end": 1}]);
+        // Of a second at 1 kHz with jitter one sample is shown every 20 ms.
+        {"/manifest": 1, "/daq/block": 10, "/derived/block": 10, "/daq/view": 49, "/end": 1}]);
     assert_eq!(found, expected);
 }
 
