@@ -3,6 +3,7 @@
 //! Every session is the beginning of a recorded one, written again with another manifest.
 //!
 //! `cargo run -p palpate-sessions --example catalog_speed -- [SESSIONS] [FOLDER]`
+#![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::Duration;
 use palpate_sessions::catalog::{Catalog, Condition, Query};
@@ -88,7 +89,7 @@ fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
         by: "palpate".into(),
         reason: "finished, no sample missing".into(),
         change: Change::Verdict {
-            verdict: [Verdict::Valid, Verdict::Suspect][usize::from(number % 9 == 0)],
+            verdict: [Verdict::Valid, Verdict::Suspect][usize::from(number.is_multiple_of(9))],
         },
     };
     Ok(add_edit(&folder, &manifest.session_id, &edit)?)

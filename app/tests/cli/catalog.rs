@@ -21,11 +21,11 @@ fn found(at: &Path, args: &[&str]) -> Vec<String> {
     let output = palpate(at, &all);
     succeeded(&output);
     let object = json(&output);
-    let sessions = object["sessions"].as_array().unwrap();
+    let sessions = object["sessions"].as_array().expect("a list");
     assert_eq!(object["count"], sessions.len());
     let names = sessions
         .iter()
-        .map(|one| one["folder"].as_str().unwrap().to_owned());
+        .map(|one| one["folder"].as_str().expect("a name").to_owned());
     let mut names: Vec<String> = names.collect();
     names.sort();
     names
