@@ -229,23 +229,22 @@ impl Catalog {
     /// Finds sessions. What the catalog does not know yet is not found: see [`Catalog::update`].
     pub fn find(&self, query: &Query) -> Result<Found, CatalogError> {
         let find = || -> rusqlite::Result<Found> {
-            let (meets, mut values) = query.sql();
-            let sql = format!("SELECT count(*) FROM session WHERE {meets}");
-            let mut count = self.db.prepare_cached(&sql)?;
-            let count: i64 = count.query_row(params_from_iter(&values), |row| row.get(0))?;
+            // One state of the catalog for both steps, whoever writes meanwhile.
+            let state = self.db.unchecked_transaction()?;
+            let (meets, values) = query.sql();
             let order = query.order.sql(query.is_reversed);
-            let sql = format!(
-                "SELECT entry, checksum FROM session WHERE {meets} ORDER BY {order} LIMIT ? OFFSET ?"
-            );
-            // SQLite takes a limit below zero for none.
-            let limit = query.limit.and_then(|limit| i64::try_from(limit).ok());
-            values.push(limit.unwrap_or(-1).into());
-            values.push(i64::try_from(query.skip).unwrap_or(i64::MAX).into());
-            let mut statement = self.db.prepare_cached(&sql)?;
-            let rows = statement.query_map(params_from_iter(&values), entry_of)?;
+            let sql = format!("SELECT id FROM session WHERE {meets} ORDER BY {order}");
+            let mut statement = state.prepare_cached(&sql)?;
+            let ids = statement.query_map(params_from_iter(&values), |row| row.get(0))?;
+            let ids: Vec<i64> = ids.collect::<rusqlite::Result<_>>()?;
+            let sql = "SELECT entry, checksum FROM session WHERE id = ?";
+            let mut statement = state.prepare_cached(sql)?;
+            let page = ids.iter().skip(query.skip);
+            let page = page.take(query.limit.unwrap_or(usize::MAX));
+            let entries = page.map(|id| statement.query_row([id], entry_of));
             Ok(Found {
-                count: count.unsigned_abs() as usize,
-                entries: rows.collect::<rusqlite::Result<_>>()?,
+                count: ids.len(),
+                entries: entries.collect::<rusqlite::Result<_>>()?,
             })
         };
         find().map_err(self.failed())
