@@ -221,6 +221,8 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     choose(&mut flow, "Ramp and hold");
     flow.type_into("hold", "1");
     flow.click("Start  F5");
+    // The run before stays on the screen until this one has its folder.
+    wait_for(&mut flow, "the new run", |run| run.outcome.is_none());
     flow.wait_for_phase(Phase::Home);
     flow.click("Stop motion  F12");
     wait_for(&mut flow, "the stop", |run| run.holding.is_some());
