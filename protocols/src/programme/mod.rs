@@ -2,6 +2,7 @@
 //! laboratory goes. Every run is a session of its own; a journal tells where to continue after a crash.
 
 mod calibrating;
+mod conditions;
 mod document;
 mod foreseen;
 mod progress;
@@ -9,6 +10,7 @@ mod run;
 mod told;
 
 pub use calibrating::{CalibratingError, calibration_of};
+pub use conditions::Conditions;
 pub use document::{Programme, ProgrammeError, Task, Validates};
 pub use foreseen::{Foreseen, ForeseenTask, foresee};
 pub use progress::{Entry, Place, Progress, ProgressError};

@@ -1,6 +1,7 @@
 //! Carries a programme out on a runner: every run in its own session folder, every step of the way in the journal.
 
 use super::calibrating::{CalibratingError, calibration_of};
+use super::conditions::Conditions;
 use super::document::Programme;
 use super::progress::{Entry, Place, Progress, ProgressError};
 use crate::engine::{EndingKind, PLAN_COMPLETE};
@@ -137,7 +138,13 @@ pub fn run(
         return Err(RunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
-    let progress = Progress::of(&entries, programme, crc32)?;
+    let conditions = Conditions::of(
+        programme,
+        laboratory.rig,
+        &laboratory.limits,
+        &laboratory.calibration,
+    );
+    let progress = Progress::of(&entries, programme, crc32, &conditions)?;
     let was_continued = !progress.runs.is_empty();
     let mut work = Work {
         programme,
@@ -152,6 +159,7 @@ pub fn run(
             name: programme.name.clone(),
             crc32: crc32.to_owned(),
             at: stamp(wall_now()),
+            conditions: Some(Box::new(conditions)),
         })?;
     }
     for task in 0..programme.tasks.len() {
