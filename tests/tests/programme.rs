@@ -151,7 +151,7 @@ version = 1
 title = "Mine"
 about = "A test."
 source = "none"
-procedure.steps = [{ do = "jog", by = "DISTANCE", speed = "3 mm/s" }]
+procedure.steps = [{ do = "jog", distance = "DISTANCE", speed = "3 mm/s" }]
 "#;
     const TEXT: &str = r#"
 palpate-programme = 1

@@ -7,11 +7,12 @@ mod document;
 mod foreseen;
 mod progress;
 mod run;
+mod sound;
 mod told;
 
 pub use calibrating::{CalibratingError, calibration_of};
 pub use conditions::Conditions;
 pub use document::{Programme, ProgrammeError, Task, Validates};
 pub use foreseen::{Foreseen, ForeseenTask, foresee};
-pub use progress::{Entry, Place, Progress, ProgressError};
+pub use progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
 pub use run::{Done, Event, Laboratory, RunError, run};

@@ -6,6 +6,12 @@ use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
 
+/// How a run ended that did all of its plan, as the journal has it.
+pub const FINISHED: &str = "finish";
+
+/// How a run ended that the rig or its preview refused: it left no session.
+pub const REFUSED: &str = "refused";
+
 /// One line of a programme's journal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(tag = "entry", rename_all = "snake_case")]
@@ -150,7 +156,7 @@ impl Progress {
                 let own = self.attempts(task, repeat);
                 (task, repeat, own)
             })
-            .find(|(_, _, own)| !own.contains(&Some("finish")))
+            .find(|(_, _, own)| !own.contains(&Some(FINISHED)))
             .map(|(task, repeat, own)| Place {
                 task,
                 repeat,
@@ -173,7 +179,7 @@ impl Progress {
         let own = self
             .runs
             .iter()
-            .filter(|(place, _, ending)| place.task == task && ending.as_deref() == Some("finish"));
+            .filter(|(place, _, ending)| place.task == task && ending.as_deref() == Some(FINISHED));
         own.map(|(_, folder, _)| folder).collect()
     }
 }
