@@ -151,7 +151,7 @@ version = 1
 title = "Mine"
 about = "A test."
 source = "none"
-procedure.steps = [{ do = "jog", distance = "DISTANCE", speed = "3 mm/s" }]
+procedure.steps = [{ do = "self-test" }, { do = "jog", distance = "DISTANCE", speed = "3 mm/s" }]
 "#;
     const TEXT: &str = r#"
 palpate-programme = 1
@@ -208,7 +208,12 @@ repeats = 2
             "setting softening was the usual one and is '40' now",
         ),
         ("1 mm", usual, lower, "the rig's limit force_max was '9"),
-        ("1 mm", usual, other, "the calibration was 'thesis"),
+        (
+            "1 mm",
+            usual,
+            other,
+            "the calibration was 'Thesis load cell' (CRC-32",
+        ),
         (
             "2 mm",
             usual,
@@ -302,6 +307,80 @@ validates = "three"
     }
     let text = Programme::read("palpate-programme = 1\nnmae = 3", &|_| Err(String::new()));
     assert!(text.unwrap_err().to_string().starts_with("line 2:"));
+}
+
+#[test]
+fn what_could_never_work_is_refused_with_its_line() {
+    let whole = |first: &str, second: &str| {
+        let text = format!(
+            "palpate-programme = 1\nname = \"x\"\ntitle = \"X\"\n[[task]]\nname = \"one\"\n{first}\n[[task]]\nname = \"two\"\n{second}\n"
+        );
+        Programme::read(&text, &|name| Err(format!("no protocol '{name}'")))
+    };
+    let press = "protocol = \"ramp-hold\"";
+    let compared = "protocol = \"ramp-hold\"\nvalidates = \"one\"";
+    assert!(whole(press, compared).is_ok());
+    assert!(whole("protocol = \"creep\"", compared).is_ok());
+    for (first, second, words) in [
+        (
+            "protocol = \"load-cell-calibration\"\ncalibrates = true",
+            compared,
+            "line 8: validates = \"one\", and that task gives no model to compare with, because task 'one' calibrates",
+        ),
+        (
+            "protocol = \"zeroing\"",
+            compared,
+            "its protocol zeroing presses into nothing",
+        ),
+        (
+            "protocol = \"sine\"",
+            compared,
+            "its protocol sine follows a sine",
+        ),
+        (
+            "protocol = \"preconditioning\"",
+            compared,
+            "its protocol preconditioning has 10 cycles",
+        ),
+        (
+            press,
+            "protocol = \"zeroing\"\nvalidates = \"one\"",
+            "line 7: validates = \"one\", and nothing could be compared",
+        ),
+        (
+            press,
+            "protocol = \"zeroing\"\ncalibrates = true",
+            "line 7: calibrates = true, and its protocol zeroing weighs nothing",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nspecimen = \"two\"",
+            "line 10: specimen cannot be \"two\"; give a whole number without quotes, such as 2; what it is called stands in [specimen.2]",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nspecimen = -1",
+            "line 10: specimen cannot be -1; give a whole number",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nrest_s = \"3 min\"",
+            "line 10: rest_s cannot be \"3 min\"; give a number without quotes",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\ncalibrates = \"yes\"",
+            "line 10: calibrates cannot be \"yes\"; give true or false",
+        ),
+        (
+            press,
+            "protocol = 3",
+            "line 9: protocol cannot be 3; give a text in quotes",
+        ),
+    ] {
+        let told = whole(first, second).unwrap_err().to_string();
+        assert!(told.contains(words), "{words}: {told}");
+    }
 }
 
 #[test]
