@@ -169,7 +169,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
     let labels = labels(how)?;
     if written.plan.name == DAILY_CHECK {
-        output.note(format!(
+        output.note(&format!(
             "this run does not count as the check of the day; only '{HOW}' judges and keeps one"
         ));
     }
