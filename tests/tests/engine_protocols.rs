@@ -468,8 +468,9 @@ fn a_monitor_takes_the_probe_out_of_a_search_too() {
     let outcome = lab.outcome.clone().unwrap();
     assert_eq!(outcome.ending, EndingKind::Stop, "{}", outcome.reason);
     assert!(lab.state().contact().is_none());
-    let positions = || lab.seen.iter().map(|seen| seen.derived.position.0);
-    let (deepest, last) = (positions().fold(0.0, f64::max), positions().last().unwrap());
+    let deepest = lab.seen.iter().map(|seen| seen.derived.position.0);
+    let deepest = deepest.fold(0.0, f64::max);
+    let last = lab.seen.last().unwrap().derived.position.0;
     assert!(deepest - last > 9.0, "{deepest} {last}");
 }
 

@@ -199,7 +199,7 @@ repeats = 2
             "1 mm",
             seed,
             same,
-            "the rig's setting seed was '1' and is '7' now",
+            "the rig's setting seed was '0' and is '7' now",
         ),
         (
             "1 mm",
