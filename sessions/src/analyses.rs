@@ -176,15 +176,14 @@ impl Analyses {
             return Ok(Self::default());
         };
         let chain = chain::read(&path, session_id)?;
-        let record = |(index, body)| {
-            serde_json::from_value(body).map_err(|err| AnalysisError::Unknown {
-                path: path.clone(),
-                line: index + 1,
-                detail: err.to_string(),
-            })
-        };
-        let bodies = chain.bodies.into_iter().enumerate();
-        let all: Vec<Analysis> = bodies.map(record).collect::<Result<_, _>>()?;
+        let all: Vec<Analysis> =
+            chain
+                .records()
+                .map_err(|(line, detail)| AnalysisError::Unknown {
+                    path: path.clone(),
+                    line,
+                    detail,
+                })?;
         let sha256 = if all.is_empty() {
             String::new()
         } else {

@@ -6,6 +6,7 @@
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON
 //! of the body with its keys in alphabetical order.
 
+use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::fs::{File, OpenOptions};
@@ -53,6 +54,16 @@ pub(crate) struct Chain {
     whole: usize,
     /// Whether something follows that was never finished, as a crash leaves it.
     pub is_torn: bool,
+}
+
+impl Chain {
+    /// The bodies as what they are, or the first line, from 1, that is not and why.
+    pub fn records<T: DeserializeOwned>(&self) -> Result<Vec<T>, (usize, String)> {
+        let bodies = self.bodies.iter().enumerate();
+        bodies
+            .map(|(index, body)| T::deserialize(body).map_err(|err| (index + 1, err.to_string())))
+            .collect()
+    }
 }
 
 fn checksum(before: u32, body: &Value) -> u32 {

@@ -205,17 +205,11 @@ impl Edits {
             return Ok(Self::default());
         };
         let chain = chain::read(&path, session_id)?;
-        let edit = |(index, body)| {
-            serde_json::from_value(body).map_err(|err| EditError::Unknown {
-                path: path.clone(),
-                line: index + 1,
-                detail: err.to_string(),
-            })
-        };
-        let all: Result<Vec<Edit>, EditError> =
-            chain.bodies.into_iter().enumerate().map(edit).collect();
+        let all = chain
+            .records()
+            .map_err(|(line, detail)| EditError::Unknown { path, line, detail })?;
         Ok(Self {
-            all: all?,
+            all,
             is_torn: chain.is_torn,
         })
     }

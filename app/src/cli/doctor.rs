@@ -62,14 +62,7 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
     } else {
         args.sessions.clone()
     };
-    let bar = output.count_bar(paths.len() as u64);
-    let mut sessions = Vec::new();
-    for path in &paths {
-        bar.set_message(path.display().to_string());
-        sessions.push(examine(path));
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
+    let sessions = each(&paths, output, |path| Ok(examine(path)))?;
     let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
     let visit = Visit {
         command: "doctor",
@@ -92,6 +85,26 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
         )));
     }
     Ok(())
+}
+
+/// One session after the other, with progress.
+fn each<T>(
+    paths: &[PathBuf],
+    output: &Output,
+    work: impl Fn(&Path) -> Result<T, Failure>,
+) -> Result<Vec<T>, Failure> {
+    let bar = output.count_bar(paths.len() as u64);
+    let done = paths
+        .iter()
+        .map(|path| {
+            bar.set_message(path.display().to_string());
+            let done = work(path);
+            bar.inc(1);
+            done
+        })
+        .collect();
+    bar.finish_and_clear();
+    done
 }
 
 fn is_unwell(patient: &Patient) -> bool {
@@ -164,14 +177,7 @@ pub(super) fn run_recover(args: &RecoverArgs, output: &Output) -> Result<(), Fai
     } else {
         args.sessions.clone()
     };
-    let bar = output.count_bar(paths.len() as u64);
-    let mut sessions = Vec::new();
-    for path in &paths {
-        bar.set_message(path.display().to_string());
-        sessions.push(one(path)?);
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
+    let sessions = each(&paths, output, one)?;
     let recoveries = Recoveries {
         command: "recover",
         sessions,

@@ -173,12 +173,7 @@ fn labels(args: &ImportArgs) -> Result<Labels, Failure> {
         indenter: args.indenter.clone(),
         ..Labels::default()
     };
-    for pair in &args.about {
-        labels
-            .tell_pair(pair)
-            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
-    }
-    labels.check().map_err(Failure::usage)?;
+    super::tell(&mut labels, &args.about)?;
     Ok(labels)
 }
 

@@ -33,6 +33,7 @@ use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
 use palpate_protocols::analysis::SourceError;
+use palpate_sessions::Labels;
 use palpate_sessions::log::ReadError;
 use protocol::ProtocolCommand;
 use std::process::ExitCode;
@@ -238,6 +239,16 @@ fn with(
     };
     let result = run(&output);
     (output, result)
+}
+
+/// Adds what `--about` tells and checks that all of it can stand together.
+fn tell(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
+    for pair in about {
+        labels
+            .tell_pair(pair)
+            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
+    }
+    labels.check().map_err(Failure::usage)
 }
 
 /// A session that cannot be read: not being one, or being newer, is wrong use; damage is a failure.

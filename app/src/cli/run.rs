@@ -295,12 +295,7 @@ fn labels(args: &HowArgs) -> Result<Labels, Failure> {
             .unwrap_or_else(|| USUAL_INDENTER.to_owned()),
         about: About::default(),
     };
-    for pair in &args.about {
-        labels
-            .tell_pair(pair)
-            .map_err(|err| Failure::usage(format!("--about: {err}")))?;
-    }
-    labels.check().map_err(Failure::usage)?;
+    super::tell(&mut labels, &args.about)?;
     Ok(labels)
 }
 

@@ -224,6 +224,11 @@ impl Panel {
         self.frame(svg, names, look, &marks);
     }
 
+    /// Grid, numbers and name of the time alone.
+    pub fn time_axis(&self, svg: &mut Svg, name: &str, look: Look) {
+        self.frame(svg, [name, ""], look, &[marks(self.x, 10.0), Vec::new()]);
+    }
+
     /// The same where the numbers are decimal logarithms.
     pub fn log_axes(&self, svg: &mut Svg, names: [&str; 2], look: Look) {
         let [left, top, right, bottom] = self.place;

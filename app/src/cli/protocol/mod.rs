@@ -371,6 +371,10 @@ pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure
     };
     output.result(&report, || text::preview(&protocol, &written, &preview));
     new_file::write("plot", args.plot.as_deref(), || {
+        // What presses on nothing has no course of depth and force.
+        if preview.force_band[1].0 <= 0.0 {
+            return plan_picture::of_steps(&protocol.title, &preview.steps);
+        }
         let curve = bench.calibration.curve();
         let points = curve.map_or(Vec::new(), |curve| {
             outline(plan, bench.rig.description(), &bench.limits, &curve)
