@@ -103,6 +103,10 @@ fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, Strin
     let (Some((mass_g, volts)), Some(tare)) = (known, tare) else {
         return Err("no known weight was read; make the check again".into());
     };
+    let refusal = calibration.check_refusal(mass_g);
+    if let Some(reason) = refusal.map_err(|err| err.to_string())? {
+        return Err(reason);
+    }
     let result = calibration
         .check(&KnownWeight {
             mass_g,
@@ -183,7 +187,8 @@ impl Gate {
     }
 }
 
-const HOW: &str = "palpate daily-check";
+/// The command that makes a check.
+pub const HOW: &str = "palpate daily-check";
 
 fn none_today(rig: &str) -> String {
     format!("rig {rig} had no daily check today")
@@ -226,8 +231,8 @@ mod tests {
                 .0
         };
         let heaviest = curve.force_range().1.0;
-        // 0 g lies at the first point, 200 g between 140 g and 240 g.
-        let weight_n = 0.2 * 9.80665;
+        // 0 g lies at the first point, 800 g between 740 g and 840 g.
+        let weight_n = 0.8 * 9.80665;
         for (zero_n, error, missed, expected) in [
             (0.0, 0.0, 0, [true, true, true]),
             (0.0099 * heaviest, 0.0, 1, [true, true, true]),
@@ -240,7 +245,7 @@ mod tests {
             let shift = zero_volts - volts(0.0);
             let records = [
                 weighed(0.0, zero_volts),
-                weighed(200.0, volts(weight_n * (1.0 + error)) + shift),
+                weighed(800.0, volts(weight_n * (1.0 + error)) + shift),
                 Record::HomeChecked {
                     missed_pulses: missed,
                 },
@@ -259,6 +264,10 @@ mod tests {
         }
         assert!(zero(&calibration, &[]).is_err());
         assert!(weight(&calibration, &[&weighed(200.0, 1.7)]).is_err());
+        // On the flat stretch even a right reading tells nothing.
+        let right = weighed(500.0, volts(0.5 * 9.80665));
+        let told = weight(&calibration, &[&weighed(0.0, volts(0.0)), &right]).unwrap_err();
+        assert!(told.contains("500 g to 0.501 N only"), "{told}");
         assert!(home(&[]).is_err());
     }
 

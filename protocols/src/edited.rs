@@ -120,11 +120,12 @@ pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
 
 /// The position in a decision that found contact.
 fn found_at(entry: &Entry) -> Option<&Value> {
+    is_record(entry, "contact_found").then(|| entry.body.get("position"))?
+}
+
+fn is_record(entry: &Entry, name: &str) -> bool {
     let body = &entry.body;
-    let is_found = entry.kind == EntryKind::Decision
-        && body.get("effect")? == "record"
-        && body.get("record")? == "contact_found";
-    is_found.then(|| body.get("position"))?
+    entry.kind == EntryKind::Decision && body["effect"] == "record" && body["record"] == name
 }
 
 /// By how much the depths of some samples move.
@@ -162,11 +163,28 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
         let Some((position, edit)) = edits.contact(number) else {
             continue;
         };
-        let until = contacts.get(index + 1).map(|next| next.after_sample);
+        let next = contacts.get(index + 1).map(|next| next.after_sample);
+        let deeper = found.position.depth_from(position);
+        let base = entries.iter_mut().find(|entry| {
+            let at = entry.after_sample;
+            is_record(entry, "base_found")
+                && at > found.after_sample
+                && next.is_none_or(|next| at <= next)
+        });
+        // Depths behind a base count from the base; how thick the specimen is does not.
+        let until = match base {
+            Some(base) => {
+                if let Some(thickness) = base.body["thickness_mm"].as_f64() {
+                    base.body["thickness_mm"] = (thickness + deeper.0).into();
+                }
+                Some(base.after_sample)
+            }
+            None => next,
+        };
         let from = found.after_sample.min(last);
         shifts.push(Shift {
             samples: from..until.unwrap_or(last).clamp(from, last),
-            deeper: found.position.depth_from(position),
+            deeper,
         });
         let mut entries = entries.iter_mut().filter(|entry| found_at(entry).is_some());
         if let Some(at) = entries
@@ -221,6 +239,12 @@ mod tests {
             .unwrap()
             .clone();
         again.after_sample = second as u64;
+        session.entries.push(again.clone());
+        // Then the base behind it: depths count from there.
+        let third = (second + session.rows.len()) / 2;
+        again.after_sample = third as u64;
+        again.body["record"] = "base_found".into();
+        again.body["thickness_mm"] = 20.0.into();
         session.entries.push(again);
         let before = session.clone();
         let edits = Edits {
@@ -229,13 +253,18 @@ mod tests {
         };
         correct(&mut session, &edits);
         for (index, (old, new)) in before.rows.iter().zip(&session.rows).enumerate() {
-            let expected = if index < second { 0.0 } else { -0.5 };
+            let expected = match index >= second && index < third {
+                true => -0.5,
+                false => 0.0,
+            };
             let moved = new.depth.unwrap_or(0.0) - old.depth.unwrap_or(0.0);
             assert!(
                 (moved - expected).abs() < 1e-12 || old.depth.is_none(),
                 "{index}: {moved}"
             );
         }
+        let base = session.entries.last().unwrap();
+        assert_eq!(base.body["thickness_mm"], 19.5);
         let found = contacts(&session.entries);
         assert_eq!(found[0], first[0]);
         assert!((found[1].position.0 - first[0].position.0 - 0.5).abs() < 1e-12);

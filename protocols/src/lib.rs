@@ -7,6 +7,7 @@
 
 pub mod analysed;
 pub mod analysis;
+pub mod base;
 pub mod compliance;
 pub mod cycles;
 pub mod daily;

@@ -39,9 +39,10 @@ impl Document for Calibration {
         }
     }
 
-    /// It must make a curve.
+    /// Its signal must rise and make a curve.
     fn check(&self) -> Result<(), String> {
-        self.curve().map(|_| ()).map_err(|err| err.to_string())
+        let curve = self.check_rise().and_then(|()| self.curve());
+        curve.map(|_| ()).map_err(|err| err.to_string())
     }
 }
 
@@ -87,6 +88,16 @@ mod tests {
         let mut broken = first.clone();
         broken.steps.truncate(1);
         assert!(save(home.path(), &broken).is_err());
+        broken = first.clone();
+        broken.curve = palpate_model::calibration::CurveKind::Polynomial { degree: 1 };
+        broken.steps[1].volts = Volts(1.2);
+        for refusal in [
+            save(home.path(), &broken),
+            supersede(home.path(), &kept.id, &broken),
+        ] {
+            let refusal = refusal.unwrap_err().to_string();
+            assert!(refusal.contains("under 140 g the cell reads"), "{refusal}");
+        }
         broken = Calibration {
             taken_at: Some("yesterday".into()),
             ..first

@@ -223,6 +223,21 @@ fn a_search_that_meets_the_base_is_refused() {
         Some(HandAction::Unmount),
     );
     assert_refused(&found, "force");
+    // A rig that gives way: the base answers like stiff tissue, and is not taken for it.
+    for compliance in ["20", "30", "60"] {
+        let settings = SimSettings {
+            compliance: compliance.parse().expect("a compliance"),
+            ..settings(1, "20", "100")
+        };
+        let found = search(settings, FindContact::default(), Some(HandAction::Unmount));
+        assert_refused(&found, "force");
+        // The way of the brake at 1.5 mm/s over the compliance, and the answer of the engine.
+        assert!(
+            found.force_filtered_max < 2.5,
+            "{compliance}: {}",
+            found.force_filtered_max
+        );
+    }
 }
 
 #[test]

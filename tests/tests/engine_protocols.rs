@@ -461,6 +461,50 @@ fn a_monitor_takes_the_probe_out_also_where_nobody_watches() {
 }
 
 #[test]
+fn a_monitor_takes_the_probe_out_of_a_search_too() {
+    // A search presses to 0.42 N.
+    let mut lab = lab(SimProfile::Ideal, watched(Action::Retract, 0.3));
+    lab.run();
+    let outcome = lab.outcome.clone().unwrap();
+    assert_eq!(outcome.ending, EndingKind::Stop, "{}", outcome.reason);
+    assert!(lab.state().contact().is_none());
+    let deepest = lab.seen.iter().map(|seen| seen.derived.position.0);
+    let deepest = deepest.fold(0.0, f64::max);
+    let last = lab.seen.last().unwrap().derived.position.0;
+    assert!(deepest - last > 9.0, "{deepest} {last}");
+}
+
+#[test]
+fn a_condition_that_comes_back_with_its_step_ends_the_run() {
+    let mut lab = lab(SimProfile::Ideal, watched(Action::Pause, 0.3));
+    lab.operator(Operator::Start);
+    assert!(lab.run_until(Seconds(2000.0), |state| state.holding().is_some()));
+    let reason = &lab.state().holding().unwrap().reason;
+    assert!(reason.contains("3 times already"), "{reason}");
+    let searches = lab
+        .records
+        .iter()
+        .filter(|(_, record)| matches!(record, Record::MonitorTripped { .. }));
+    assert_eq!(searches.count(), 4);
+}
+
+#[test]
+fn a_search_that_presses_beyond_the_limit_is_refused() {
+    let mut plan = plan(Vec::new());
+    plan.limits.force_max = Some(Newtons(0.2));
+    let rig = rig(SimProfile::Ideal);
+    let curve = rig.calibration().curve().unwrap();
+    let limits = plan
+        .limits
+        .tighten(Limits::for_travel(rig.description().travel));
+    let refusals = preview(&plan, rig.description(), &limits, &curve, false).refusals;
+    assert!(
+        refusals.iter().any(|one| one.contains("presses to")),
+        "{refusals:?}"
+    );
+}
+
+#[test]
 fn a_pause_that_cannot_go_on_ends_where_nobody_watches() {
     let rig = rig(SimProfile::Ideal);
     let calibration = rig.calibration();
@@ -536,7 +580,7 @@ fn depth_counts_from_the_base_once_it_is_found() {
         hand: Some(HandAction::Unmount),
     });
     let load = LoadTo {
-        speed: MmPerS(0.03),
+        speed: MmPerS(1.5),
         force: Newtons(2.0),
         depth_max: Depth(1.0),
         brake: None,
@@ -553,6 +597,18 @@ fn depth_counts_from_the_base_once_it_is_found() {
         Record::ForceReached { depth, .. } => Some(depth.0),
         _ => None,
     });
+    // What is elastic gives no time: without the way of the brake in mind 0.2 N too much.
+    let forces: Vec<f64> = lab
+        .seen
+        .iter()
+        .filter(|seen| seen.phase == Phase::Ramp)
+        .map(|seen| seen.derived.force.unwrap().0)
+        .collect();
+    let means = forces
+        .windows(20)
+        .map(|part| part.iter().sum::<f64>() / 20.0);
+    let peak = means.fold(0.0, f64::max);
+    assert!((1.85..2.03).contains(&peak), "{peak}");
     // 0.061 mm/N with the base under 2 N, and a pulse each for the place of the base and for where the load stopped.
     let depth = reached.unwrap();
     assert!((depth - 0.122).abs() < 0.03, "{depth}");

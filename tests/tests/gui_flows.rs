@@ -171,9 +171,8 @@ fn f12_and_escape_stop_with_a_text_field_focused() {
         });
         assert!(!is_motion_possible(flow.window.state().snapshot()));
         assert!(flow.says("State: STOPPED"));
-        // No contact was found yet: the probe stands free and there is nothing to leave.
-        assert!(!flow.is_enabled("Retract  F8"));
-        assert!(flow.says("nothing to retract from"));
+        // No contact was found yet, but a search may have stopped within the tissue.
+        assert!(flow.is_enabled("Retract  F8"));
         assert!(flow.says("retract or close it first"));
         flow.click("Close session");
         let run = flow.wait_for_end();

@@ -2,7 +2,7 @@
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
 use palpate_drivers::Rig;
-use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
@@ -20,9 +20,23 @@ fn programme(text: &str) -> Programme {
 
 /// Carries a programme out in a folder on a rig just switched on.
 fn carry_out(text: &str, folder: &Path) -> Result<Done, RunError> {
-    let rig = SimRig::new(SimSettings::default());
+    let whole = programme(text);
+    carry_out_on(&whole, text, folder, SimSettings::default(), &|_, _| {})
+}
+
+/// As [`carry_out`] on a rig with these settings; `change` may change what the laboratory takes for granted.
+fn carry_out_on(
+    whole: &Programme,
+    text: &str,
+    folder: &Path,
+    settings: SimSettings,
+    change: &dyn Fn(&mut Limits, &mut Calibration),
+) -> Result<Done, RunError> {
+    let rig = SimRig::new(settings);
     let description = rig.description().clone();
-    let calibration = rig.calibration();
+    let mut calibration = rig.calibration();
+    let mut limits = Limits::for_travel(description.travel);
+    change(&mut limits, &mut calibration);
     let (wake, woken) = sync_channel(1);
     let runner = Runner::start(Box::new(rig), TimeScale::Max, None, move || {
         let _ = wake.try_send(());
@@ -32,21 +46,16 @@ fn carry_out(text: &str, folder: &Path) -> Result<Done, RunError> {
         runner: &runner,
         woken: &woken,
         rig: &description,
-        limits: Limits::for_travel(description.travel),
+        limits,
         calibration,
         folder,
         answers: Answers::Confirm,
         gate: &|_| Ok(Vec::new()),
     };
     let mut begun = 0;
-    let done = run(
-        &programme(text),
-        &checksum(text),
-        laboratory,
-        &mut |event| {
-            begun += u32::from(matches!(event, Event::Begun { .. }));
-        },
-    );
+    let done = run(whole, &checksum(text), laboratory, &mut |event| {
+        begun += u32::from(matches!(event, Event::Begun { .. }));
+    });
     assert!(begun > 0 || done.is_err() || done.as_ref().unwrap().was_continued);
     done
 }
@@ -134,6 +143,105 @@ fn another_or_a_changed_programme_is_refused() {
 }
 
 #[test]
+fn under_other_conditions_a_programme_does_not_go_on_and_says_what_changed() {
+    const FILE: &str = r#"
+palpate = 1
+name = "mine"
+version = 1
+title = "Mine"
+about = "A test."
+source = "none"
+procedure.steps = [{ do = "self-test" }, { do = "jog", distance = "DISTANCE", speed = "3 mm/s" }]
+"#;
+    const TEXT: &str = r#"
+palpate-programme = 1
+name = "mine"
+title = "Mine"
+
+[[task]]
+name = "press"
+protocol = "mine.toml"
+repeats = 2
+"#;
+    let with = |distance: &str| {
+        Programme::read(TEXT, &|_| Ok(FILE.replace("DISTANCE", distance))).unwrap()
+    };
+    let folder = tempfile::tempdir().unwrap();
+    let usual = SimSettings::default();
+    let same: &dyn Fn(&mut Limits, &mut Calibration) = &|_, _| {};
+    carry_out_on(&with("1 mm"), TEXT, folder.path(), usual, same).unwrap();
+    // Only its first repeat is known: there is something to go on with.
+    let path = folder.path().join(JOURNAL_FILE);
+    let journal = std::fs::read_to_string(&path).unwrap();
+    let first: String = journal.split_inclusive('\n').take(3).collect();
+    std::fs::write(&path, &first).unwrap();
+
+    let ideal = SimSettings {
+        profile: SimProfile::Ideal,
+        ..usual
+    };
+    let seed = SimSettings { seed: 7, ..usual };
+    let softer = SimSettings {
+        softening: "40".parse().unwrap(),
+        ..usual
+    };
+    let lower: &dyn Fn(&mut Limits, &mut Calibration) = &|limits, _| limits.force_max.0 = 5.0;
+    let other: &dyn Fn(&mut Limits, &mut Calibration) =
+        &|_, calibration| calibration.steps[3].mass_g += 1.0;
+    for (distance, settings, change, words) in [
+        (
+            "1 mm",
+            ideal,
+            same,
+            "the rig's setting profile was 'lab' and is 'ideal' now",
+        ),
+        (
+            "1 mm",
+            seed,
+            same,
+            "the rig's setting seed was '0' and is '7' now",
+        ),
+        (
+            "1 mm",
+            softer,
+            same,
+            "setting softening was the usual one and is '40' now",
+        ),
+        ("1 mm", usual, lower, "the rig's limit force_max was '9"),
+        (
+            "1 mm",
+            usual,
+            other,
+            "the calibration was 'Thesis load cell' (CRC-32",
+        ),
+        (
+            "2 mm",
+            usual,
+            same,
+            "the protocol of task 'press' (by its CRC-32) was",
+        ),
+    ] {
+        let went_on = carry_out_on(&with(distance), TEXT, folder.path(), settings, change);
+        let refusal = went_on.unwrap_err().to_string();
+        assert!(refusal.contains(words), "{words}: {refusal}");
+        assert!(refusal.contains("'mine' was begun here under other conditions"));
+        assert_eq!(
+            std::fs::read_to_string(&path).unwrap(),
+            first,
+            "something ran"
+        );
+    }
+    // A journal of an older palpate knows no conditions, and goes on.
+    let mut lines = first.lines().map(str::to_owned);
+    let mut head: serde_json::Value = serde_json::from_str(&lines.next().unwrap()).unwrap();
+    assert!(head.as_object_mut().unwrap().remove("conditions").is_some());
+    let rest: Vec<String> = lines.collect();
+    std::fs::write(&path, format!("{head}\n{}\n", rest.join("\n"))).unwrap();
+    let done = carry_out_on(&with("1 mm"), TEXT, folder.path(), usual, same).unwrap();
+    assert_eq!(done.progress.finished(0).len(), 2);
+}
+
+#[test]
 fn weights_on_the_simulated_cell_give_its_curve_back() {
     let text = r#"
 palpate-programme = 1
@@ -199,6 +307,80 @@ validates = "three"
     }
     let text = Programme::read("palpate-programme = 1\nnmae = 3", &|_| Err(String::new()));
     assert!(text.unwrap_err().to_string().starts_with("line 2:"));
+}
+
+#[test]
+fn what_could_never_work_is_refused_with_its_line() {
+    let whole = |first: &str, second: &str| {
+        let text = format!(
+            "palpate-programme = 1\nname = \"x\"\ntitle = \"X\"\n[[task]]\nname = \"one\"\n{first}\n[[task]]\nname = \"two\"\n{second}\n"
+        );
+        Programme::read(&text, &|name| Err(format!("no protocol '{name}'")))
+    };
+    let press = "protocol = \"ramp-hold\"";
+    let compared = "protocol = \"ramp-hold\"\nvalidates = \"one\"";
+    assert!(whole(press, compared).is_ok());
+    assert!(whole("protocol = \"creep\"", compared).is_ok());
+    for (first, second, words) in [
+        (
+            "protocol = \"load-cell-calibration\"\ncalibrates = true",
+            compared,
+            "line 8: validates = \"one\", and that task gives no model to compare with, because task 'one' calibrates",
+        ),
+        (
+            "protocol = \"zeroing\"",
+            compared,
+            "its protocol zeroing presses into nothing",
+        ),
+        (
+            "protocol = \"sine\"",
+            compared,
+            "its protocol sine follows a sine",
+        ),
+        (
+            "protocol = \"preconditioning\"",
+            compared,
+            "its protocol preconditioning has 10 cycles",
+        ),
+        (
+            press,
+            "protocol = \"zeroing\"\nvalidates = \"one\"",
+            "line 7: validates = \"one\", and nothing could be compared",
+        ),
+        (
+            press,
+            "protocol = \"zeroing\"\ncalibrates = true",
+            "line 7: calibrates = true, and its protocol zeroing weighs nothing",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nspecimen = \"two\"",
+            "line 10: specimen cannot be \"two\"; give a whole number without quotes, such as 2; what it is called stands in [specimen.2]",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nspecimen = -1",
+            "line 10: specimen cannot be -1; give a whole number",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\nrest_s = \"3 min\"",
+            "line 10: rest_s cannot be \"3 min\"; give a number without quotes",
+        ),
+        (
+            press,
+            "protocol = \"ramp-hold\"\ncalibrates = \"yes\"",
+            "line 10: calibrates cannot be \"yes\"; give true or false",
+        ),
+        (
+            press,
+            "protocol = 3",
+            "line 9: protocol cannot be 3; give a text in quotes",
+        ),
+    ] {
+        let told = whole(first, second).unwrap_err().to_string();
+        assert!(told.contains(words), "{words}: {told}");
+    }
 }
 
 #[test]

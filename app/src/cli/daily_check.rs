@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct DailyCheckArgs {
     /// The known weight in g
-    #[arg(long, value_name = "G", default_value = "200", value_parser = super::run::number)]
+    #[arg(long, value_name = "G", default_value = "800", value_parser = super::run::number)]
     mass: f64,
     #[command(flatten)]
     rig: RigArgs,
@@ -47,9 +47,19 @@ struct Checked<'a> {
 /// Runs the check, judges it and keeps the result.
 pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
-    let plan = plan(args.mass)?;
+    let labels = Labels {
+        operator: args.operator.clone(),
+        specimen: String::new(),
+        indenter: String::new(),
+        about: About::default(),
+    };
+    let plan = plan(args.mass, &labels)?;
     let bench = super::rig::open(&args.rig)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let refusal = bench.calibration.check_refusal(args.mass);
+    if let Some(reason) = refusal.map_err(Failure::usage)? {
+        return Err(Failure::usage(reason));
+    }
     let rig = bench.rig.description().name.clone();
     let calibration = bench.calibration.name.clone();
     let request = RunRequest {
@@ -57,12 +67,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         calibration: bench.calibration,
         limits: bench.limits,
         out: args.out.clone(),
-        labels: Labels {
-            operator: args.operator.clone(),
-            specimen: String::new(),
-            indenter: String::new(),
-            about: About::default(),
-        },
+        labels,
         is_acknowledged: false,
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
@@ -115,17 +120,19 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     }
 }
 
-fn plan(mass_g: f64) -> Result<Plan, Failure> {
+fn plan(mass_g: f64, labels: &Labels) -> Result<Plan, Failure> {
     let values = BTreeMap::from([("mass".to_owned(), format!("{mass_g} g"))]);
-    let plan = built_in(DAILY_CHECK).map(|protocol| protocol.and_then(|one| one.plan(&values)));
-    match plan {
-        Some(Ok(plan)) => Ok(plan),
-        Some(Err(problems)) => {
-            let first = problems.first().map(ToString::to_string);
-            Err(Failure::usage(first.unwrap_or_default()))
-        }
-        None => Err(Failure::failed("this palpate has no daily check built in")),
-    }
+    let Some(protocol) = built_in(DAILY_CHECK) else {
+        return Err(Failure::failed("this palpate has no daily check built in"));
+    };
+    let planned = protocol.and_then(|protocol| Ok((protocol.plan(&values)?, protocol)));
+    let (plan, protocol) = planned.map_err(|problems| {
+        let first = problems.first().map(ToString::to_string);
+        Failure::usage(first.unwrap_or_default())
+    })?;
+    let told = protocol.check_labels(labels);
+    told.map_err(|reason| Failure::usage(format!("{reason}; add --operator")))?;
+    Ok(plan)
 }
 
 fn text(checked: &Checked<'_>) -> String {

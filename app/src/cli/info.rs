@@ -5,6 +5,7 @@ use super::output::Output;
 use clap::Args;
 use palpate_model::rig::SignalFacts;
 use palpate_protocols::analysed;
+use palpate_protocols::base::FoundBase;
 use palpate_sessions::analyses::{Analysis, inputs_of};
 use palpate_sessions::edits::{Change, Edit, Review, Verdict};
 use palpate_sessions::log::Session;
@@ -47,6 +48,8 @@ struct Info<'a> {
     ending: Option<&'a str>,
     reason: Option<&'a str>,
     time_use_s: Option<&'a [(String, f64)]>,
+    #[serde(flatten)]
+    base: FoundBase,
     verdict: Option<Verdict>,
     verdict_reason: Option<&'a str>,
     edits: &'a [Edit],
@@ -88,6 +91,7 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         ending: session.end.as_ref().map(|end| end.outcome.as_str()),
         reason: session.end.as_ref().map(|end| end.reason.as_str()),
         time_use_s: session.end.as_ref().map(|end| end.time_use.as_slice()),
+        base: FoundBase::of_session(&session),
         verdict: edits.verdict().map(|(verdict, _)| verdict),
         verdict_reason: edits.verdict().map(|(_, edit)| edit.reason.as_str()),
         edits: &edits.all,
@@ -173,6 +177,8 @@ fn text(info: &Info<'_>) -> String {
             .collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
+    let facts = info.base.facts();
+    lines.extend(facts.map(|(name, mm, error)| format!("{name:<10} {mm:.3} ± {error:.3} mm")));
     lines.extend(info.edits.iter().map(edit_text));
     if !info.tags.is_empty() {
         lines.push(format!("tags       {}", info.tags.join(", ")));

@@ -4,6 +4,7 @@ use super::Failure;
 use super::output::Output;
 use crate::report::session::fidelity_text;
 use clap::Args;
+use palpate_protocols::base::FoundBase;
 use palpate_protocols::edited;
 use palpate_protocols::fidelity::{Fidelity, of_session};
 use palpate_sessions::Verdict;
@@ -29,6 +30,8 @@ struct Report<'a> {
     verdict: Option<Verdict>,
     verdict_reason: Option<&'a str>,
     #[serde(flatten)]
+    base: FoundBase,
+    #[serde(flatten)]
     fidelity: &'a Fidelity,
 }
 
@@ -47,8 +50,14 @@ pub(super) fn run(args: &ReportArgs, output: &Output) -> Result<(), Failure> {
         reason: end.map(|end| end.reason.as_str()),
         verdict: verdict.map(|(verdict, _)| verdict),
         verdict_reason: verdict.map(|(_, reason)| reason),
+        base: FoundBase::of_session(session),
         fidelity: &fidelity,
     };
-    output.result(&report, || fidelity_text(&fidelity, end, verdict));
+    output.result(&report, || {
+        let told = fidelity_text(&fidelity, end, verdict);
+        let facts = report.base.facts();
+        let base = facts.map(|(name, mm, error)| format!("\n{name:<10} {mm:.3} ± {error:.3} mm"));
+        told + &base.collect::<String>()
+    });
     Ok(())
 }

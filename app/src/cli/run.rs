@@ -7,7 +7,8 @@ use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use clap::Args;
 use palpate_drivers::Rig;
-use palpate_protocols::daily::Gate;
+use palpate_protocols::base::FoundBase;
+use palpate_protocols::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
@@ -142,6 +143,8 @@ struct RunReport {
     duration_s: f64,
     contact_mm: Option<f64>,
     contact_std_error_mm: Option<f64>,
+    #[serde(flatten)]
+    base: FoundBase,
     force_peak_n: Option<f64>,
     verdict: Option<Verdict>,
     verdict_reason: Option<String>,
@@ -165,6 +168,11 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
     let labels = labels(how)?;
+    if written.plan.name == DAILY_CHECK {
+        output.note(&format!(
+            "this run does not count as the check of the day; only '{HOW}' judges and keeps one"
+        ));
+    }
     if !how.preview {
         protocol.check_labels(&labels).map_err(|reason| {
             Failure::usage(format!(
@@ -363,6 +371,7 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         duration_s: view.now.seconds().0,
         contact_mm: view.contact.map(|contact| contact.position.0),
         contact_std_error_mm: view.contact.map(|contact| contact.std_error_mm),
+        base: view.base,
         force_peak_n: view.force_peak.map(|force| force.0),
         verdict: view.verdict.as_ref().map(|(verdict, _)| *verdict),
         verdict_reason: view.verdict.as_ref().map(|(_, reason)| reason.clone()),
@@ -396,6 +405,8 @@ fn run_text(report: &RunReport) -> String {
     if let (Some(at), Some(error)) = (report.contact_mm, report.contact_std_error_mm) {
         lines.push(format!("contact at {at:.3} ± {error:.3} mm from home"));
     }
+    let facts = report.base.facts();
+    lines.extend(facts.map(|(name, mm, error)| format!("{name} {mm:.3} ± {error:.3} mm")));
     if let Some(peak) = report.force_peak_n {
         lines.push(format!("peak force {peak:.3} N"));
     }

@@ -4,14 +4,16 @@ use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
 use super::picture;
 use super::text::{in_columns, parameter_lines};
+use crate::workers::fit::Fitted;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::cycles::predict;
-use palpate_model::fit::{FitOptions, FitReport, fit};
+use palpate_model::fit::{FitOptions, FitReport, Systematic};
+use palpate_model::units::Seconds;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::analysis::{self, Stretch};
+use palpate_protocols::analysis::{self, FitSource, SourceError, Stretch};
 use palpate_protocols::cycles::of_session;
-use palpate_protocols::edited;
-use palpate_protocols::programme::{Programme, Progress, Task, calibration_of};
+use palpate_protocols::edited::{self, Edited};
+use palpate_protocols::programme::{FINISHED, Programme, Progress, REFUSED, Task, calibration_of};
 use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::Path;
@@ -29,16 +31,56 @@ pub struct RunLine {
     pub session: String,
     /// How it ended; none if it broke off.
     pub ending: Option<String>,
+    /// Whether its session is no longer what the journal says it was; none if it is.
+    pub lost: Option<Lost>,
     /// Who ran it, as its session says.
     pub operator: String,
     /// What was indented, as its session says.
     pub specimen: String,
     /// What it is worth, with the reason where it is not valid; none if nobody said.
     pub verdict: Option<String>,
-    /// Session time in s.
-    pub duration_s: f64,
+    /// Session time in s, where the session could be read.
+    pub duration_s: Option<f64>,
     /// Highest force in N, where force was known.
     pub force_peak_n: Option<f64>,
+}
+
+/// What became of a session that was recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lost {
+    /// It is not there.
+    Missing,
+    /// It is there and not as it was written.
+    Damaged,
+}
+
+impl Lost {
+    const fn word(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Damaged => "damaged",
+        }
+    }
+
+    /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
+    fn of(
+        opened: &Result<Edited, SourceError>,
+        path: &Path,
+        ending: Option<&str>,
+    ) -> Option<(Self, String)> {
+        let ending = ending.filter(|ending| *ending != REFUSED)?;
+        match opened {
+            Err(err) if path.exists() => Some((Self::Damaged, err.to_string())),
+            Err(err) => Some((Self::Missing, err.to_string())),
+            // A recording that a full disk cut short ended by abort, and has no end either.
+            Ok(one) if ending == FINISHED && one.session.end.is_none() => Some((
+                Self::Damaged,
+                "it breaks off, and the journal says that it was finished; restore it from a backup".into(),
+            )),
+            Ok(_) => None,
+        }
+    }
 }
 
 /// What sessions tell of one specimen.
@@ -154,7 +196,7 @@ impl Page {
             specimens: Vec::new(),
             tasks: Vec::new(),
         };
-        let mut bodies: Vec<(String, ModifiedKelvin)> = Vec::new();
+        let mut bodies = Bodies::default();
         for (index, task) in programme.tasks.iter().enumerate() {
             tell(&task.name);
             let mut part = TaskPart {
@@ -167,8 +209,12 @@ impl Page {
             };
             for (place, session, ending) in progress.runs.iter().filter(|run| run.0.task == index) {
                 let name = session.display().to_string();
-                let opened = edited::open(&folder.join(session));
-                let verdict = opened.as_ref().ok().and_then(|one| one.edits.verdict());
+                let path = folder.join(session);
+                let opened = edited::open(&path);
+                let lost = Lost::of(&opened, &path, ending.as_deref());
+                // What was said of a session holds for it as it was.
+                let whole = opened.as_ref().ok().filter(|_| lost.is_none());
+                let verdict = whole.and_then(|one| one.edits.verdict());
                 let rejection = opened.as_ref().ok().and_then(|one| one.rejection());
                 let is_rejected = rejection.is_some();
                 let verdict = verdict.map(|(verdict, edit)| match verdict {
@@ -193,16 +239,25 @@ impl Page {
                     attempt: place.attempt,
                     session: name.clone(),
                     ending: ending.clone(),
+                    lost: lost.as_ref().map(|(lost, _)| *lost),
                     operator: word(|manifest| &manifest.operator),
                     specimen: word(|manifest| &manifest.specimen),
                     verdict,
-                    duration_s: end.map_or(0.0, |row| row.host.seconds().0),
+                    duration_s: end.map(|row| row.host.seconds().0),
                     force_peak_n: peak,
                 });
+                let mut leave_out = |reason: &str| {
+                    let line = format!("{name}: {reason}, left out");
+                    bodies.left_out.push((task.name.clone(), line.clone()));
+                    part.line(&line);
+                };
                 match opened {
+                    _ if let Some((lost, reason)) = &lost => {
+                        leave_out(&format!("{} ({reason})", lost.word()));
+                    }
                     // It stays in the count and tells nothing.
-                    Ok(_) if is_rejected => part.line(&format!("{name}: rejected, left out")),
-                    Ok(session) if ending.as_deref() == Some("finish") => {
+                    Ok(_) if is_rejected => leave_out("rejected"),
+                    Ok(session) if ending.as_deref() == Some(FINISHED) => {
                         part.read(task, &name, &session, &mut bodies);
                     }
                     Ok(_) => {}
@@ -230,8 +285,9 @@ impl Page {
             vec![
                 run.task.clone(),
                 format!("{}{attempt}", run.repeat),
-                run.ending.clone().unwrap_or_else(|| "breaking off".into()),
-                format!("{:.1}", run.duration_s),
+                run.ended_by(),
+                run.duration_s
+                    .map_or("-".into(), |duration| format!("{duration:.1}")),
                 run.force_peak_n
                     .map_or("-".into(), |peak| format!("{peak:.3}")),
                 run.session.clone(),
@@ -243,13 +299,34 @@ impl Page {
         in_columns(&lines)
     }
 
+    /// Which finished sessions are missing or damaged, in one sentence; none if all are as they were written.
+    #[must_use]
+    pub fn loss(&self) -> Option<String> {
+        let finished = self.runs.iter();
+        let finished = finished.filter(|run| run.ending.as_deref() == Some(FINISHED));
+        let lost: Vec<String> = finished
+            .filter_map(|run| Some(format!("{} is {}", run.session, run.lost?.word())))
+            .collect();
+        (!lost.is_empty()).then(|| {
+            format!(
+                "of the finished sessions {}, so the page tells nothing of it; restore it from a backup and run the same command, or begin in a new folder",
+                lost.join(", ")
+            )
+        })
+    }
+
     /// The page in HTML, whole in itself.
     #[must_use]
     pub fn html(&self) -> String {
+        let loss = self.loss().map(|loss| {
+            let loss = super::text::capital(&loss);
+            format!("<p><strong>{}.</strong></p>\n", escape(&loss))
+        });
         let mut body = format!(
-            "<h1>{}</h1>\n<p>{}</p>\n<h2>Sessions</h2>\n<pre>{}</pre>\n",
+            "<h1>{}</h1>\n<p>{}</p>\n{}<h2>Sessions</h2>\n<pre>{}</pre>\n",
             escape(&self.title),
             escape(&self.purpose),
+            loss.unwrap_or_default(),
             escape(&self.table())
         );
         if !self.specimens.is_empty() {
@@ -278,6 +355,16 @@ impl Page {
     }
 }
 
+impl RunLine {
+    fn ended_by(&self) -> String {
+        let ending = self.ending.as_deref().unwrap_or("breaking off");
+        match self.lost {
+            Some(lost) => format!("{ending}, now {}", lost.word()),
+            None => ending.to_owned(),
+        }
+    }
+}
+
 impl TaskPart {
     fn line(&mut self, line: &str) {
         self.text += line;
@@ -285,13 +372,7 @@ impl TaskPart {
     }
 
     /// What one session adds: a calibration, cycles, a fit or the error of a prediction.
-    fn read(
-        &mut self,
-        task: &Task,
-        name: &str,
-        session: &Session,
-        bodies: &mut Vec<(String, ModifiedKelvin)>,
-    ) {
+    fn read(&mut self, task: &Task, name: &str, session: &Session, bodies: &mut Bodies) {
         if task.calibrates {
             match calibration_of(session, &task.name) {
                 Ok(calibration) => self.calibration(&calibration),
@@ -309,9 +390,23 @@ impl TaskPart {
         } else if let Ok(samples) = analysis::samples_of(session, Stretch::RampHold)
             && report.cycles.len() == 1
         {
-            match fit(&samples, &FitOptions::default()) {
-                Ok(fitted) => self.fit(task, name, session, (&samples, &fitted), bodies),
-                Err(err) => self.line(&format!("{name}: {err}")),
+            let options = FitOptions::default();
+            let source = FitSource {
+                samples,
+                start: Seconds(0.0),
+                notes: Vec::new(),
+                specimen: None,
+                rig: None,
+                calibration: analysis::calibration_of(session).ok(),
+            };
+            let fitted = Fitted::of(source, &options).with_systematic(&options);
+            match &fitted.result {
+                Ok(report) => self.fit(task, name, (&fitted, report), bodies),
+                Err(err) => {
+                    let line = format!("{name}: {err}");
+                    self.line(&line);
+                    bodies.left_out.push((task.name.clone(), line));
+                }
             }
         }
     }
@@ -331,13 +426,17 @@ impl TaskPart {
         &mut self,
         task: &Task,
         name: &str,
-        session: &Session,
-        (samples, report): (&[palpate_model::fit::FitSample], &FitReport),
-        bodies: &mut Vec<(String, ModifiedKelvin)>,
+        (fitted, report): (&Fitted, &FitReport),
+        bodies: &mut Bodies,
     ) {
+        let samples = fitted.samples.as_slice();
         self.line(&format!("{name}:"));
         for line in parameter_lines(&report.parameters) {
             self.line(&line);
+        }
+        let systematic = fitted.systematic.iter().map(Systematic::sentence);
+        for remark in systematic.chain(fitted.notes.iter().cloned()) {
+            self.line(&format!("  {remark}"));
         }
         self.fits.push(FitLine {
             session: name.to_owned(),
@@ -345,8 +444,11 @@ impl TaskPart {
             rmse_n: report.rmse_n,
         });
         let model = task.validates.as_ref();
-        let body = model.and_then(|model| bodies.iter().find(|(task, _)| *task == model.task));
-        if let Some((fitted, body)) = body {
+        let body = model.map(|model| bodies.of(&model.task));
+        if let Some(Err(reason)) = &body {
+            self.line(&format!("  not compared: {reason}"));
+        }
+        if let Some(Ok((fitted, body))) = body {
             match predict(body, samples) {
                 Ok(found) => {
                     let line = PredictionLine {
@@ -367,17 +469,41 @@ impl TaskPart {
             }
         }
         if self.figures.is_empty() {
-            let calibration =
-                serde_json::from_value::<Calibration>(session.manifest.calibration.clone());
-            let band = calibration
-                .ok()
-                .and_then(|one| ForceUncertainty::of(&one).ok());
+            let calibration = fitted.calibration.as_ref();
+            let band = calibration.and_then(|one| ForceUncertainty::of(one).ok());
             self.figures
                 .push(picture::of_report(name, samples, report, band.as_ref()));
         }
-        if !bodies.iter().any(|(known, _)| *known == task.name) {
-            bodies.push((task.name.clone(), report.body()));
+        if !bodies.known.iter().any(|(known, _)| *known == task.name) {
+            bodies.known.push((task.name.clone(), report.body()));
         }
+    }
+}
+
+/// What fits found, for later tasks to be compared with.
+#[derive(Default)]
+struct Bodies {
+    /// Name of a task and the body of its first session that was fitted.
+    known: Vec<(String, ModifiedKelvin)>,
+    /// Name of a task and why a session of it was not fitted.
+    left_out: Vec<(String, String)>,
+}
+
+impl Bodies {
+    /// The body of a task, or why there is none.
+    fn of(&self, task: &str) -> Result<&(String, ModifiedKelvin), String> {
+        let body = self.known.iter().find(|(known, _)| known == task);
+        body.ok_or_else(|| {
+            let own = self.left_out.iter().filter(|(name, _)| name == task);
+            let reasons: Vec<&str> = own.map(|(_, reason)| reason.as_str()).collect();
+            match reasons.as_slice() {
+                [] => format!("no session of task '{task}' was fitted"),
+                reasons => format!(
+                    "no session of task '{task}' was fitted: {}",
+                    reasons.join("; ")
+                ),
+            }
+        })
     }
 }
 

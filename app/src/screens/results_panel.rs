@@ -82,6 +82,9 @@ fn facts_ui(ui: &mut Ui, run: &RunView) {
         format!("{:.3} ± {:.3} mm", contact.position.0, contact.std_error_mm)
     });
     fact_ui(ui, "contact", contact);
+    for (name, mm, error) in run.base.facts() {
+        fact_ui(ui, name, format!("{mm:.3} ± {error:.3} mm"));
+    }
     let tare = run.tare.map_or_else(not_yet, |tare| {
         format!("{:.4}, noise {:.2} mV", tare.volts, tare.noise.0 * 1e3)
     });

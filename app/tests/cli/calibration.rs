@@ -238,3 +238,39 @@ fn mistakes_get_one_sentence() {
         stdout(&list)
     );
 }
+
+#[test]
+fn a_table_is_read_whole_or_refused_and_a_falling_signal_is_none() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let import = |rows: &str| {
+        fs::write(at.join("cell.csv"), format!("mass_g,volts\n{rows}")).unwrap();
+        let args = [
+            "calibration",
+            "import",
+            "cell.csv",
+            "--name",
+            "bench",
+            "--json",
+        ];
+        palpate(at, &args)
+    };
+    for (rows, words) in [
+        ("0,1.2\n140,1,600\n", "line 3 has 3 cells"),
+        ("0,1.2\n100,1.1\n200,1.9\n300,1.7\n", "check the wiring"),
+    ] {
+        let refused = import(rows);
+        assert_eq!(refused.status.code(), Some(2), "{rows}");
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+    assert!(!at.join("library/calibrations").exists());
+    let read = import("0,\"1,280\"\n140,\"1,600\"\n240,\"2,730\"\n340,\"3,78\"\n");
+    succeeded(&read);
+    let read = json(&read);
+    let points = read["quality"]["points"].as_array().unwrap();
+    let volts: Vec<f64> = points
+        .iter()
+        .map(|one| one["signal_v"].as_f64().unwrap())
+        .collect();
+    assert_eq!(volts, [1.28, 1.6, 2.73, 3.78]);
+}

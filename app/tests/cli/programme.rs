@@ -313,3 +313,162 @@ fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     );
     assert!(!at.join("day").exists(), "something ran");
 }
+
+const PAIR: &str = r#"
+palpate-programme = 1
+name = "pair"
+title = "Two tasks, one compared with the other"
+
+[[task]]
+name = "first"
+protocol = "ramp-hold"
+set = { depth = "10 mm", hold = "1 s", speed = "3 mm/s" }
+repeats = 2
+
+[[task]]
+name = "second"
+protocol = "ramp-hold"
+set = { depth = "10 mm", hold = "1 s", speed = "3 mm/s" }
+validates = "first"
+"#;
+
+#[test]
+fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    fs::write(at.join("pair.toml"), PAIR).unwrap();
+    let run = ["run", "pair.toml", "--out", "day", "--time-scale", "max"];
+    let as_json = || palpate(at, &[&run[..], &["--json"]].concat());
+    let page = || fs::read_to_string(at.join("day/summary.html")).unwrap();
+    let done = as_json();
+    succeeded(&done);
+    let report = json(&done);
+    let predictions = |report: &serde_json::Value| {
+        let lines = report["tasks"][1]["predictions"].as_array();
+        lines.map_or(0, Vec::len)
+    };
+    assert_eq!(predictions(&report), 1, "{report}");
+    // Number for number what 'palpate fit' says, the calibration's part among it.
+    let fit = palpate(at, &["fit", "day/first/01", "--json"]);
+    succeeded(&fit);
+    let (alone, own) = (json(&fit), &report["tasks"][0]["fits"][0]);
+    assert!(alone["parameters"][0]["systematic_error"].as_f64() > Some(0.0));
+    assert_eq!(own["parameters"], alone["parameters"]);
+    let text = report["tasks"][0]["text"].as_str().unwrap();
+    assert!(text.contains(" calibration\n"), "{text}");
+    assert!(page().contains(" calibration\n") && page().contains("one standard uncertainty"));
+
+    // Without a session to compare with the page says why it does not.
+    for session in ["day/first/01", "day/first/02"] {
+        let verdict = ["verdict", session, "rejected", "--reason", "a hair"];
+        succeeded(&palpate(at, &verdict));
+    }
+    let again = as_json();
+    succeeded(&again);
+    assert_eq!(predictions(&json(&again)), 0);
+    let words = "not compared: no session of task 'first' was fitted: first/01: rejected";
+    assert!(page().contains(words), "{}", page());
+
+    // One is gone, and one is noise; what was said of it was said of something else.
+    fs::remove_dir_all(at.join("day/first/02")).unwrap();
+    let log = at.join("day/second/01").join(palpate_sessions::LOG_FILE);
+    let length = fs::metadata(&log).unwrap().len() as usize;
+    let noise: Vec<u8> = (0..length).map(|i| (i * 7919 % 251) as u8).collect();
+    let sound = fs::read(&log).unwrap();
+    for damaged in [
+        noise.clone(),
+        [&sound[..length / 2], &noise[length / 2..]].concat(),
+    ] {
+        fs::write(&log, damaged).unwrap();
+        let told = palpate(at, &run);
+        assert_eq!(told.status.code(), Some(1), "{}", stdout(&told));
+        let row = |start: &str| {
+            let text = stdout(&told);
+            let mut rows = text.lines().map(str::to_owned);
+            rows.find(|row| row.starts_with(start) && !row.contains("first/01"))
+        };
+        assert!(row("first").unwrap().contains("finish, now missing  -"));
+        let second = row("second").unwrap();
+        assert!(
+            second.contains("now damaged") && !second.contains("valid"),
+            "{second}"
+        );
+        assert!(
+            stderr(&told).contains("first/02 is missing, second/01 is damaged"),
+            "{}",
+            stderr(&told)
+        );
+        for words in [
+            "first/02 is missing",
+            "first/02: missing",
+            "second/01: damaged",
+        ] {
+            assert!(page().contains(words), "{words}: {}", page());
+        }
+        let told = palpate(at, &[&run[..], &["--json"]].concat());
+        let line = stdout(&told).lines().next().unwrap().to_owned();
+        let report: serde_json::Value = serde_json::from_str(&line).unwrap();
+        let run = &report["runs"][1];
+        assert_eq!(
+            (&run["lost"], run["duration_s"].is_null()),
+            (&"missing".into(), true)
+        );
+        assert_eq!(report["runs"][2]["lost"], "damaged");
+        assert!(report["runs"][2]["verdict"].is_null(), "{report}");
+    }
+}
+
+#[test]
+fn a_programme_goes_on_only_on_the_rig_and_with_the_protocols_it_was_begun_with() {
+    const JOGS: &str = r#"
+palpate-programme = 1
+name = "jogs"
+title = "Jogs"
+
+[[task]]
+name = "jog"
+protocol = "jog.toml"
+"#;
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let shown = palpate(at, &["protocol", "show", "free-jog"]);
+    succeeded(&shown);
+    fs::write(at.join("jog.toml"), stdout(&shown)).unwrap();
+    fs::write(at.join("jogs.toml"), JOGS).unwrap();
+    let run = |more: &[&str]| {
+        let run = ["run", "jogs.toml", "--out", "day", "--time-scale"];
+        palpate(at, &[&run[..], more].concat())
+    };
+    succeeded(&run(&["max"]));
+    // Pace and operator change no sample.
+    succeeded(&run(&["50", "--operator", "Ada"]));
+    for (more, words) in [
+        (
+            ["max", "--profile", "ideal"],
+            "setting profile was 'lab' and is 'ideal' now",
+        ),
+        (
+            ["max", "--seed", "2"],
+            "setting seed was '1' and is '2' now",
+        ),
+        (["max", "--clock", "galil"], "setting clock was"),
+        (
+            ["max", "--compliance", "100"],
+            "setting compliance was the usual one",
+        ),
+    ] {
+        let refused = run(&more);
+        assert_eq!(refused.status.code(), Some(2), "{words}");
+        let told = stderr(&refused);
+        assert!(
+            told.contains(words) && told.trim_end().lines().count() == 1,
+            "{told}"
+        );
+    }
+    let longer = stdout(&shown).replace("default = \"5 mm\"", "default = \"6 mm\"");
+    fs::write(at.join("jog.toml"), longer).unwrap();
+    let refused = run(&["max"]);
+    assert_eq!(refused.status.code(), Some(2));
+    let told = stderr(&refused);
+    assert!(told.contains("the protocol of task 'jog'"), "{told}");
+}

@@ -310,7 +310,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let failed = check(&["--profile", "ideal", "--calibration", "thesis"]);
     assert_eq!(failed.status.code(), Some(1));
     assert!(
-        stderr(&failed).contains("200 g reads"),
+        stderr(&failed).contains("800 g reads"),
         "{}",
         stderr(&failed)
     );
@@ -351,4 +351,79 @@ fn a_jog_is_motion_and_has_no_cycles() {
         told.contains("no cycles to analyse") && !told.contains("fit"),
         "{told}"
     );
+}
+
+#[test]
+fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let check = ["daily-check", "--time-scale", "max"];
+    for (more, words) in [
+        (&[][..], "asks before it starts for: operator"),
+        (
+            &["--operator", "Ada", "--mass", "500"],
+            "the force of 500 g to 0.501 N only",
+        ),
+    ] {
+        let refused = palpate(at, &[&check[..], more].concat());
+        assert_eq!(refused.status.code(), Some(2), "{more:?}");
+        assert!(stderr(&refused).contains(words), "{}", stderr(&refused));
+    }
+    // The same steps without a judgement keep no check, and say so.
+    let run = [
+        "run",
+        "daily-check",
+        "--time-scale",
+        "max",
+        "--operator",
+        "Ada",
+    ];
+    let run = palpate(at, &run);
+    succeeded(&run);
+    assert!(
+        stderr(&run).contains("only 'palpate daily-check' judges and keeps one"),
+        "{}",
+        stderr(&run)
+    );
+    assert!(!at.join("library/checks").exists());
+}
+
+#[test]
+fn a_thickness_is_told_by_the_run_and_by_its_session() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = [
+        "run",
+        "zeroing",
+        "--set",
+        "thickness=true",
+        "--thickness",
+        "20",
+        "--compliance",
+        "20",
+    ];
+    let how = ["--time-scale", "max", "--out", "thick", "--json"];
+    let run = palpate(at, &[&run[..], &how].concat());
+    succeeded(&run);
+    let run = json(&run);
+    let number = |name: &str| run[name].as_f64().unwrap();
+    let (thickness, error) = (number("thickness_mm"), number("thickness_std_error_mm"));
+    // Four standard errors, and a pulse for the rig that gives way at the contact.
+    assert!((thickness - 20.0).abs() < 4.0 * error + 0.015, "{run}");
+    let between = number("base_mm") - number("contact_mm");
+    assert!((between - thickness).abs() < 1e-9, "{run}");
+    let line = format!("thickness  {thickness:.3} ± {error:.3} mm");
+    for command in ["info", "report"] {
+        let told = json(&palpate(at, &[command, "thick", "--json"]));
+        for name in [
+            "base_mm",
+            "base_std_error_mm",
+            "thickness_mm",
+            "thickness_std_error_mm",
+        ] {
+            assert_eq!(told[name], run[name], "{command} {name}");
+        }
+        let text = stdout(&palpate(at, &[command, "thick"]));
+        assert!(text.contains(&line), "{text}");
+    }
 }

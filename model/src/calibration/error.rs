@@ -60,6 +60,22 @@ pub enum CalibrationError {
         /// The signal of the step before in V.
         before_volts: f64,
     },
+    /// A series falls where weight is added, by more than repeats differ.
+    #[error(
+        "under {mass_g} g the cell reads {volts} V in {way}, less than the {before_volts} V under {before_g} g; the signal must rise with every weight, check the wiring and take the weights again"
+    )]
+    SignalFalls {
+        /// The mass in g.
+        mass_g: f64,
+        /// Mean signal there in V.
+        volts: f64,
+        /// The next smaller mass of the same direction in g.
+        before_g: f64,
+        /// Mean signal there in V.
+        before_volts: f64,
+        /// Loading or unloading.
+        way: &'static str,
+    },
     /// Next to no rise between two weights.
     #[error(
         "between two weights the signal rises by less than a millionth of its own uncertainty, so no force can be told there; leave one of them out or take the steps again"

@@ -250,15 +250,19 @@ fn findings(quality: &Quality, uncertainty: &ForceUncertainty) -> Vec<String> {
                 ", and the calibration alone leaves up to {sigma:.2} N (one standard uncertainty)"
             )
         });
+        // A fall within its repeatability has no such ratio.
+        let less = match flat.rise_v > 0.0 {
+            true => format!("{:.1} times less than elsewhere", flat.ratio),
+            false => "which is no rise".to_owned(),
+        };
         findings.push(format!(
-            "from {:.0} g to {:.0} g ({:.2} to {:.2} N) the cell moves only {} V for {:.0} g, {:.1} times less than elsewhere: a signal error of 1 mV there is up to {:.3} N{own}",
+            "from {:.0} g to {:.0} g ({:.2} to {:.2} N) the cell moves only {} V for {:.0} g, {less}: a signal error of 1 mV there is up to {:.3} N{own}",
             flat.from_g,
             flat.to_g,
             flat.from_n,
             flat.to_n,
             (flat.rise_v * 1e4).round() / 1e4,
             flat.to_g - flat.from_g,
-            flat.ratio,
             flat.worst_n_per_mv,
         ));
     }

@@ -75,6 +75,48 @@ fn a_line_is_a_line_and_a_falling_line_is_refused() {
 }
 
 #[test]
+fn a_signal_that_falls_by_more_than_it_repeats_is_refused() {
+    use Direction::{Loading, Unloading};
+    let falls = |series: &[Taken<'_>]| {
+        let refusal = document(series).check_rise().err();
+        refusal.map(|err| err.to_string())
+    };
+    let wired: &[_] = &[(0.0, 1.2), (100.0, 1.1), (200.0, 1.9), (300.0, 1.7)];
+    let told = falls(&[(Loading, 1, wired)]).unwrap();
+    assert!(
+        told.starts_with(
+            "under 100 g the cell reads 1.1 V in loading, less than the 1.2 V under 0 g"
+        ) && told.contains("check the wiring"),
+        "{told}"
+    );
+    // One line through all of them rises and would hide it.
+    let line = CurveKind::Polynomial { degree: 1 };
+    assert!(
+        line.through(&document(&[(Loading, 1, wired)]).points().unwrap())
+            .is_ok()
+    );
+    // Hysteresis, and masses of one direction only, are no fall.
+    let up: &[_] = &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3), (300.0, 1.31)];
+    let down: &[_] = &[(200.0, 1.35), (0.0, 1.01)];
+    assert_eq!(falls(&[(Loading, 1, up), (Unloading, 1, down)]), None);
+    // The repeats of 0 g differ by 4 mV: 2.8 mV of spread there, 2 mV over both masses.
+    let again = |fall: f64| {
+        let one = [(0.0, 1.0), (100.0, 1.002 - fall)];
+        let two = [(0.0, 1.004), (100.0, 1.002 - fall)];
+        falls(&[(Loading, 1, &one), (Loading, 2, &two)])
+    };
+    assert_eq!(again(0.0019), None);
+    assert!(again(0.0021).is_some());
+    // The thesis's table rises everywhere, and a last digit is no fall.
+    assert_eq!(Calibration::thesis().check_rise(), Ok(()));
+    let mut digits = Calibration::thesis();
+    digits.steps[5].volts = Volts(1.785);
+    assert_eq!(digits.check_rise(), Ok(()));
+    digits.steps[5].volts = Volts(1.77);
+    assert!(digits.check_rise().is_err());
+}
+
+#[test]
 fn old_and_new_documents_survive_json() {
     let up: &[(f64, f64)] = &[(0.0, 1.0), (100.0, 1.2), (200.0, 1.3)];
     let mut whole = document(&[(Direction::Loading, 1, up)]);
@@ -489,4 +531,27 @@ fn a_known_weight_passes_within_one_percent() {
         result.is_passed && result.doubts[0].contains("says little here"),
         "{result:?}"
     );
+}
+
+#[test]
+fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
+    let thesis = Calibration::thesis();
+    for mass_g in [200.0, 500.0] {
+        let told = thesis.check_refusal(mass_g).unwrap().unwrap();
+        assert!(
+            told.contains(&format!("the force of {mass_g} g to"))
+                && told.ends_with("such as 950 g"),
+            "{told}"
+        );
+    }
+    for mass_g in [800.0, 950.0] {
+        assert_eq!(thesis.check_refusal(mass_g), Ok(None));
+    }
+    // Nothing is stated of a straight line.
+    let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(50.0));
+    assert_eq!(line.check_refusal(200.0), Ok(None));
+    let mut coarse = thesis;
+    coarse.resolution = Some(Volts(0.2));
+    let told = coarse.check_refusal(800.0).unwrap().unwrap();
+    assert!(told.contains("take a new calibration"), "{told}");
 }

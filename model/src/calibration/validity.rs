@@ -1,7 +1,8 @@
 //! Whether a calibration may be relied on today: its age and its rig, and a check with one known weight.
 
+use super::quality::repeatability;
 use super::uncertainty::ForceUncertainty;
-use super::{Calibration, CalibrationError, newtons_of};
+use super::{Calibration, CalibrationError, Direction, newtons_of};
 use crate::units::{Newtons, Volts};
 use serde::Serialize;
 use thiserror::Error;
@@ -136,6 +137,65 @@ impl Calibration {
             ));
         }
         doubts
+    }
+
+    /// Whether the cell can be trusted with a curve at all: within each direction the mean signal must not fall
+    /// from a mass to the next by more than one reading repeats itself, nor by more than its last digit. Curves
+    /// that do not go through every point would hide such a fall.
+    pub fn check_rise(&self) -> Result<(), CalibrationError> {
+        let points = self.points()?;
+        let spread = repeatability(&points).unwrap_or(Volts(0.0)).0;
+        let digit = self.reading_resolution().unwrap_or(Volts(0.0)).0;
+        let allowed = spread.max(digit);
+        for direction in [Direction::Loading, Direction::Unloading] {
+            let mean = |point: &super::Point| Some((point.mass_g, point.mean(direction)?.0));
+            let taken: Vec<(f64, f64)> = points.iter().filter_map(mean).collect();
+            let fall = taken
+                .windows(2)
+                .find(|pair| pair[0].1 - pair[1].1 > allowed);
+            if let Some(&[(before_g, before_volts), (mass_g, volts)]) = fall {
+                return Err(CalibrationError::SignalFalls {
+                    mass_g,
+                    volts,
+                    before_g,
+                    before_volts,
+                    way: direction.word(),
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// Why a check with a weight of that mass in g would tell nothing: the calibration itself knows the force
+    /// less well than [`CHECK_LIMIT_PERCENT`]. `None` where it can be told, or where no uncertainty is stated.
+    pub fn check_refusal(&self, mass_g: f64) -> Result<Option<String>, CalibrationError> {
+        let uncertainty = ForceUncertainty::of(self)?;
+        let limit = |mass_g: f64| CHECK_LIMIT_PERCENT / 100.0 * newtons_of(mass_g).0;
+        let sigma = |mass_g: f64| uncertainty.sigma(newtons_of(mass_g)).map(|sigma| sigma.0);
+        let Some(own) = sigma(mass_g).filter(|sigma| *sigma > limit(mass_g)) else {
+            return Ok(None);
+        };
+        let heaviest = self.points()?.last().map_or(0.0, |point| point.mass_g);
+        // Round masses, which weight sets have: of a cell up to 1 kg every 50 g.
+        let step = 10f64.powf(heaviest.log10().floor()) / 20.0;
+        let share =
+            |mass_g: &f64| sigma(*mass_g).map_or(f64::INFINITY, |sigma| sigma / limit(*mass_g));
+        let best = (1..=200)
+            .map(|i| f64::from(i) * step)
+            .take_while(|mass_g| *mass_g <= heaviest)
+            .filter(|mass_g| share(mass_g) <= 1.0)
+            .min_by(|a, b| share(a).total_cmp(&share(b)));
+        let advice = best.map_or_else(
+            || {
+                "no weight up to the heaviest can be told by it, so take a new calibration"
+                    .to_owned()
+            },
+            |best| format!("take a weight where the cell is more sensitive, such as {best} g"),
+        );
+        Ok(Some(format!(
+            "the calibration knows the force of {mass_g} g to {own:.3} N only (one standard uncertainty), worse than the limit of {:.3} N, so a check with it tells nothing; {advice}",
+            limit(mass_g)
+        )))
     }
 
     /// Whether a known weight reads what it weighs.

@@ -288,6 +288,19 @@ impl ContactSearch {
                 "the force reached {filtered:.2} before contact was certain"
             ));
         }
+        // Tissue leaves time to stop. What does not is a base or a holder, whatever the fit would say of it.
+        let is_stopping = matches!(
+            self.stage,
+            Stage::ApproachBraking
+                | Stage::Dwell { .. }
+                | Stage::SlowBraking
+                | Stage::SlowDwell { .. }
+        );
+        if is_stopping && filtered > FORCE_MAX {
+            return Err(format!(
+                "the force rose to {filtered:.2} while the axis stopped: what was met is no tissue, or too hard for this speed; look what stands before the probe"
+            ));
+        }
         if self.plan.press.is_some() && self.stage == Stage::Approach && fast >= FORCE_FAST_MAX {
             return Err(format!(
                 "the force rose to {fast:.2} at once: what was met is too hard for this speed; approach more slowly"

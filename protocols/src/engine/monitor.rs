@@ -15,7 +15,12 @@ pub(super) struct Condition {
     is_tripped: bool,
     /// Since when it is past again.
     past_since: Option<Nanos>,
+    /// How often it has paused the step of this index.
+    pauses: (usize, u32),
 }
+
+/// A condition that pauses one step more often comes back with the step, and each time the tissue is touched anew.
+const PAUSES_MAX: u32 = 3;
 
 /// Judges all of them. They act only while the plan runs or is paused.
 pub(super) fn judge(cx: &mut Context<'_>, reading: &Reading) {
@@ -47,10 +52,15 @@ pub(super) fn judge(cx: &mut Context<'_>, reading: &Reading) {
 fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     let monitor = &cx.state.config.plan.monitors[index];
     let (action, message) = (monitor.action, monitor.message.clone());
-    cx.state.monitors[index] = Condition {
-        is_tripped: true,
-        past_since: None,
-    };
+    let step_index = cx.state.step_index;
+    let condition = &mut cx.state.monitors[index];
+    condition.is_tripped = true;
+    condition.past_since = None;
+    if condition.pauses.0 != step_index {
+        condition.pauses = (step_index, 0);
+    }
+    condition.pauses.1 += u32::from(action == Action::Pause);
+    let is_endless = condition.pauses.1 > PAUSES_MAX;
     cx.record(Record::MonitorTripped {
         index,
         value,
@@ -58,6 +68,10 @@ fn trip(cx: &mut Context<'_>, index: usize, value: f64) {
     });
     match action {
         Action::Note => {}
+        Action::Pause if is_endless => {
+            let reason = format!("{message}; this has paused the step {PAUSES_MAX} times already");
+            stop::begin(cx, EndingKind::Stop, reason);
+        }
         Action::Pause => pause::now(cx, By::Monitor, message),
         Action::Stop => stop::begin(cx, EndingKind::Stop, message),
         Action::Retract => {
@@ -83,7 +97,8 @@ fn judge_past(cx: &mut Context<'_>, index: usize, value: f64) {
     if now.since(since).seconds() < settle {
         return;
     }
-    *condition = Condition::default();
+    condition.is_tripped = false;
+    condition.past_since = None;
     cx.record(Record::MonitorPast { index, value });
     let is_another_tripped = cx
         .state

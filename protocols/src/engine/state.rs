@@ -388,9 +388,6 @@ impl State {
             Activity::Holding { ending } if ending.ending == EndingKind::Halt || !self.is_homed => {
                 Err("the position is no longer known; move the probe by hand, then home")
             }
-            Activity::Holding { .. } if self.contact.is_none() => {
-                Err("no contact was found, so there is nothing to retract from")
-            }
             Activity::Holding { .. } => Ok(()),
             _ => Err("retract follows a stop"),
         }

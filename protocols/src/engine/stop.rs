@@ -109,7 +109,12 @@ pub(super) fn on_time(cx: &mut Context<'_>) {
         // A plan that wanted the probe out has its wish once the axis rests.
         Activity::Holding { .. } if cx.state.leaves_after_stop => {
             cx.state.leaves_after_stop = false;
-            retract(cx);
+            match cx.state.can_retract() {
+                Ok(()) => retract(cx),
+                Err(reason) => cx.record(Record::Refused {
+                    reason: format!("the probe stays where it is: {reason}"),
+                }),
+            }
         }
         _ => {}
     }
@@ -135,13 +140,13 @@ pub(super) fn on_motor_enabled(cx: &mut Context<'_>) {
     if !matches!(cx.state.activity, Activity::Retracting { .. }) || cx.state.power != Power::Reset {
         return;
     }
-    let Some(contact) = cx.state.contact else {
-        return;
-    };
     cx.state.power = Power::Enabled;
-    let target = Depth(-RETRACT_CLEARANCE_MM).position_from(contact.position);
+    // Where no contact is known, a search may have stopped within the tissue: from where the probe stands.
+    let here = cx.state.derived.position;
+    let surface = cx.state.contact.map_or(here, |contact| contact.position);
+    let target = Depth(-RETRACT_CLEARANCE_MM).position_from(surface);
     // A way out never leads further in.
-    let out = target.0.clamp(0.0, cx.state.derived.position.0.max(0.0));
+    let out = target.0.clamp(0.0, here.0.max(0.0));
     if let Err(reason) = cx.move_to(Position(out), RETRACT_SPEED) {
         begin(cx, EndingKind::Abort, reason);
     }

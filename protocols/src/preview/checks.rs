@@ -11,9 +11,15 @@ const PRESS_MAX: Newtons = Newtons(0.42);
 impl Walk<'_> {
     pub(super) fn check_press(&mut self, press: &Press) {
         self.check_span(press.dwell);
+        let most = self.limits.force_max;
         if !(press.force.0 > 0.0 && press.force <= PRESS_MAX) {
             self.refusals.push(format!(
                 "finding contact cannot press to {}; give above 0 and up to {PRESS_MAX}",
+                press.force
+            ));
+        } else if press.force >= most {
+            self.refusals.push(format!(
+                "finding contact presses to {}, where the limit of {most} ends every run; allow more force or press less",
                 press.force
             ));
         }

@@ -117,6 +117,7 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
         ..Calibration::default()
     }
     .with_stacked_weights(TOLERANCE_G)?;
+    calibration.check_rise()?;
     let curve = calibration.best_curve()?;
     Ok(Calibration {
         curve,

@@ -1,5 +1,6 @@
 //! The file of a programme.
 
+use super::sound::doubts;
 use super::told::Told;
 use crate::file::{Problem, Protocol, built_in};
 use crate::plans::{OnTimeout, Plan, Prompt, Step};
@@ -140,10 +141,8 @@ impl Programme {
     ) -> Result<Self, ProgrammeError> {
         let whole: Text = toml::from_str(text).map_err(|err| {
             let line = err.span().map_or(1, |span| line_of(text, span.start));
-            ProgrammeError(vec![Problem::error(
-                line,
-                err.message().replace('\n', ", "),
-            )])
+            let message = in_words(err.message(), key_at(text, line));
+            ProgrammeError(vec![Problem::error(line, message)])
         })?;
         let mut problems = Vec::new();
         if whole.language != LANGUAGE {
@@ -295,7 +294,7 @@ fn read_task(
             if !problems.is_empty() {
                 return Err(problems);
             }
-            Ok(Task {
+            let task = Task {
                 name,
                 protocol,
                 values,
@@ -305,7 +304,12 @@ fn read_task(
                 calibrates: text.calibrates,
                 validates: text.validates.map(|task| Validates { task }),
                 line,
-            })
+            };
+            let doubts = doubts(&task, before);
+            match doubts.is_empty() {
+                true => Ok(task),
+                false => Err(doubts),
+            }
         }
         Err(wrong) => {
             let named = |problem| format!("protocol '{}': {problem}", text.protocol);
@@ -339,6 +343,41 @@ fn as_text(value: &Value) -> String {
         Value::Array(items) => items.iter().map(as_text).collect::<Vec<_>>().join(", "),
         Value::Datetime(_) | Value::Table(_) => String::new(),
     }
+}
+
+/// The key that a line sets; empty if it sets none.
+fn key_at(text: &str, line: u32) -> &str {
+    let line = text.lines().nth(line.saturating_sub(1) as usize);
+    let pair = line.and_then(|line| line.split_once('='));
+    pair.map_or("", |(key, _)| key.trim())
+}
+
+/// What the parser says of a value of the wrong kind, as somebody would say it who does not write programs.
+fn in_words(message: &str, key: &str) -> String {
+    let rest = message
+        .strip_prefix("invalid type: ")
+        .or_else(|| message.strip_prefix("invalid value: "));
+    let told = rest.and_then(|rest| rest.split_once(", expected "));
+    let wanted = told.and_then(|(_, wanted)| match wanted.trim() {
+        "u32" | "u64" => Some("a whole number without quotes, such as 2"),
+        "f64" => Some("a number without quotes, such as 2.5"),
+        "a boolean" => Some("true or false, without quotes"),
+        "a string" => Some("a text in quotes"),
+        "a map" => Some("values in braces, as in { depth = \"20 mm\" }"),
+        _ => None,
+    });
+    let (Some((found, _)), Some(wanted), false) = (told, wanted, key.is_empty()) else {
+        return message.replace('\n', ", ");
+    };
+    // The parser names the kind first and puts numbers in back quotes.
+    let kinds = ["string ", "integer ", "floating point ", "boolean "];
+    let kind = kinds.iter().find_map(|kind| found.strip_prefix(kind));
+    let found = kind.unwrap_or(found).replace('`', "");
+    let hint = match key {
+        "specimen" => "; what it is called stands in [specimen.2] as name",
+        _ => "",
+    };
+    format!("{key} cannot be {found}; give {wanted}{hint}")
 }
 
 fn line_of(text: &str, at: usize) -> u32 {

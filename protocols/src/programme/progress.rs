@@ -1,9 +1,16 @@
 //! How far a programme is, from its journal alone.
 
+use super::conditions::Conditions;
 use super::document::Programme;
 use serde::{Deserialize, Serialize};
 use std::path::PathBuf;
 use thiserror::Error;
+
+/// How a run ended that did all of its plan, as the journal has it.
+pub const FINISHED: &str = "finish";
+
+/// How a run ended that the rig or its preview refused: it left no session.
+pub const REFUSED: &str = "refused";
 
 /// One line of a programme's journal.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,6 +24,9 @@ pub enum Entry {
         crc32: String,
         /// When, RFC 3339.
         at: String,
+        /// Under which conditions; none in a journal of a palpate that did not write them down.
+        #[serde(default, skip_serializing_if = "Option::is_none")]
+        conditions: Option<Box<Conditions>>,
     },
     /// A run began; without its end it was interrupted.
     Begun {
@@ -67,17 +77,30 @@ pub enum ProgressError {
         "the programme '{0}' was changed since it was begun here; restore it, or begin in a new folder"
     )]
     Changed(String),
+    /// Rig, limits, calibration or protocols are others.
+    #[error(
+        "the programme '{programme}' was begun here under other conditions: {}; go on under those it was begun under, or begin in a new folder",
+        .changes.join(", ")
+    )]
+    Conditions {
+        /// Its name.
+        programme: String,
+        /// What changed, each with what it was.
+        changes: Vec<String>,
+    },
     /// No sense in it.
     #[error("the journal does not begin with its programme; choose a new folder")]
     Headless,
 }
 
 impl Progress {
-    /// Reads a journal's entries; `crc32` is that of the programme's text now.
+    /// Reads a journal's entries; `crc32` is that of the programme's text now, `conditions` are those it would go
+    /// on under. A journal without conditions is from an older palpate, and nothing is compared.
     pub fn of(
         entries: &[Entry],
         programme: &Programme,
         crc32: &str,
+        conditions: &Conditions,
     ) -> Result<Self, ProgressError> {
         let mut progress = Self::default();
         let Some((first, rest)) = entries.split_first() else {
@@ -90,6 +113,16 @@ impl Progress {
             Entry::Programme {
                 name, crc32: begun, ..
             } if begun != crc32 => return Err(ProgressError::Changed(name.clone())),
+            Entry::Programme {
+                name,
+                conditions: Some(begun),
+                ..
+            } if **begun != *conditions => {
+                return Err(ProgressError::Conditions {
+                    programme: name.clone(),
+                    changes: begun.changes(conditions),
+                });
+            }
             Entry::Programme { .. } => {}
             _ => return Err(ProgressError::Headless),
         }
@@ -123,7 +156,7 @@ impl Progress {
                 let own = self.attempts(task, repeat);
                 (task, repeat, own)
             })
-            .find(|(_, _, own)| !own.contains(&Some("finish")))
+            .find(|(_, _, own)| !own.contains(&Some(FINISHED)))
             .map(|(task, repeat, own)| Place {
                 task,
                 repeat,
@@ -146,7 +179,7 @@ impl Progress {
         let own = self
             .runs
             .iter()
-            .filter(|(place, _, ending)| place.task == task && ending.as_deref() == Some("finish"));
+            .filter(|(place, _, ending)| place.task == task && ending.as_deref() == Some(FINISHED));
         own.map(|(_, folder, _)| folder).collect()
     }
 }

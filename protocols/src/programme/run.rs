@@ -1,8 +1,9 @@
 //! Carries a programme out on a runner: every run in its own session folder, every step of the way in the journal.
 
 use super::calibrating::{CalibratingError, calibration_of};
+use super::conditions::Conditions;
 use super::document::Programme;
-use super::progress::{Entry, Place, Progress, ProgressError};
+use super::progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
 use crate::engine::{EndingKind, PLAN_COMPLETE};
 use crate::plans::Plan;
 use crate::preview::preview;
@@ -137,7 +138,13 @@ pub fn run(
         return Err(RunError::Folder(reason));
     }
     let (journal, entries) = Journal::open(laboratory.folder)?;
-    let progress = Progress::of(&entries, programme, crc32)?;
+    let conditions = Conditions::of(
+        programme,
+        laboratory.rig,
+        &laboratory.limits,
+        &laboratory.calibration,
+    );
+    let progress = Progress::of(&entries, programme, crc32, &conditions)?;
     let was_continued = !progress.runs.is_empty();
     let mut work = Work {
         programme,
@@ -152,6 +159,7 @@ pub fn run(
             name: programme.name.clone(),
             crc32: crc32.to_owned(),
             at: stamp(wall_now()),
+            conditions: Some(Box::new(conditions)),
         })?;
     }
     for task in 0..programme.tasks.len() {
@@ -238,14 +246,14 @@ impl Work<'_> {
             Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
                 self.journal.push(&Entry::Ended {
                     place: place.clone(),
-                    outcome: "refused".into(),
+                    outcome: REFUSED.into(),
                     reason: reason.clone(),
                 })?;
                 return Err(refused(reason));
             }
             Err(_) => return Err(RunError::NoRunner),
         }
-        let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some("finish");
+        let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some(FINISHED);
         let done = self.progress.runs.iter().filter(finished).count() as u32;
         (self.tell)(Event::Begun {
             place: &place,
@@ -260,7 +268,7 @@ impl Work<'_> {
         if let Some(run) = self.progress.runs.last_mut() {
             run.2 = Some(ending.clone());
         }
-        if ending != "finish" {
+        if ending != FINISHED {
             return Err(RunError::Ended {
                 task: task.name.clone(),
                 repeat: place.repeat,

@@ -3,8 +3,9 @@
 use super::clock::wall_now;
 use super::snapshot::{LogLine, PromptView, RunView};
 use super::start::{AfterStop, Answers};
+use crate::base::FoundBase;
 use crate::engine::{
-    self, Config, Effect, EndingKind, Input, Operator, Outcome, PauseView, Record, State,
+    self, Config, Contact, Effect, EndingKind, Input, Operator, Outcome, PauseView, Record, State,
 };
 use crate::fidelity::{FidelityMeter, first_verdict};
 use crate::plans::Step;
@@ -49,6 +50,9 @@ pub(super) struct ActiveRun {
     live: LiveFeed,
     trace: Arc<LiveTrace>,
     force_peak: Option<Newtons>,
+    /// Where the tissue was found, should depths count from a base by now.
+    tissue: Option<Contact>,
+    base: FoundBase,
     events: VecDeque<LogLine>,
     phases: Arc<Vec<(f64, Phase)>>,
     cycle_starts: Arc<Vec<(f64, u32)>>,
@@ -92,6 +96,8 @@ impl ActiveRun {
             live,
             trace: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
             force_peak: None,
+            tissue: None,
+            base: FoundBase::default(),
             events: VecDeque::new(),
             phases: Arc::new(Vec::new()),
             cycle_starts: Arc::new(Vec::new()),
@@ -312,6 +318,21 @@ impl ActiveRun {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((now.seconds().0, *phase));
         }
+        if let Record::ContactFound {
+            position,
+            std_error_mm,
+        } = record
+        {
+            self.tissue = Some(Contact {
+                position: *position,
+                std_error_mm: *std_error_mm,
+            });
+        }
+        if let Some(base) = FoundBase::of(record) {
+            // Without a thickness no tissue is known in front of it.
+            self.tissue = self.tissue.filter(|_| base.thickness_mm.is_some());
+            self.base = base;
+        }
         let is_alarm = match record {
             Record::InterlockTripped { .. } => true,
             Record::EndingStarted { ending, .. } => is_alarming(*ending),
@@ -322,6 +343,15 @@ impl ActiveRun {
             text: record.to_string(),
             is_alarm,
         });
+    }
+
+    /// Where the tissue begins, though depths may count from the base behind it.
+    fn contact(&self, state: &State) -> Option<Contact> {
+        let counted = state.contact()?;
+        match self.base.base_mm == Some(counted.position.0) {
+            true => self.tissue,
+            false => Some(counted),
+        }
     }
 
     fn note(&mut self, line: LogLine) {
@@ -390,7 +420,8 @@ impl ActiveRun {
             fraction,
             derived: *state.derived(),
             tare: state.tare(),
-            contact: state.contact(),
+            contact: self.contact(state),
+            base: self.base,
             force_peak: self.force_peak,
             live: state.live().cloned(),
             trace: Arc::clone(&self.trace),

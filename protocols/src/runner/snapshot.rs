@@ -1,5 +1,6 @@
 //! What the runner shows the world: one immutable value, swapped as a whole.
 
+use crate::base::FoundBase;
 use crate::engine::{Contact, Derived, Outcome, PauseView, Power, Tare};
 use crate::preview::StepPreview;
 use palpate_model::Nanos;
@@ -64,6 +65,8 @@ pub struct RunView {
     pub tare: Option<Tare>,
     /// Where the tissue begins.
     pub contact: Option<Contact>,
+    /// The base behind it and the thickness between, once found.
+    pub base: FoundBase,
     /// Highest force so far.
     pub force_peak: Option<Newtons>,
     /// Newest live fit.

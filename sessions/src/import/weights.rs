@@ -1,5 +1,7 @@
 //! A table of weights and voltages: what somebody wrote down at the rig.
 
+use super::cells::{delimiter_of, split};
+use super::foreign::decimal::{self, Decimal, Evidence};
 use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, Direction, Series, SeriesStep};
 use palpate_model::units::Volts;
 use std::io;
@@ -47,6 +49,19 @@ pub enum WeightsError {
         /// What should.
         wanted: &'static str,
     },
+    /// A row that is not as wide as the first line, or a quote that does not end.
+    #[error("{0}")]
+    Row(String),
+    /// A comma in a number that may be a decimal one or stand between thousands.
+    #[error(
+        "line {line} has \"{cell}\", in which the comma may be a decimal one or stand between thousands; write every number of the table with a decimal point"
+    )]
+    Comma {
+        /// Line, counted from 1.
+        line: usize,
+        /// What stands there.
+        cell: String,
+    },
     /// Falling masses without a direction.
     #[error(
         "line {line} has {mass_g} g after {before_g} g; add a column direction that says loading or unloading"
@@ -78,21 +93,20 @@ pub fn read_weights(path: &Path) -> Result<Calibration, WeightsError> {
     parse_weights(&text)
 }
 
-/// As [`read_weights`], from text. Cells stand between commas, semicolons or tabs; lines that are empty or
-/// begin with `#` do not count.
+/// As [`read_weights`], from text. Cells stand between commas, semicolons or tabs and may be quoted; decimals
+/// have a point or, in the whole table, a comma; lines that are empty or begin with `#` do not count.
 pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
     let lines = text.trim_start_matches('\u{feff}').lines().enumerate();
     let mut lines = lines
         .map(|(index, line)| (index + 1, line.trim()))
         .filter(|(_, line)| !line.is_empty() && !line.starts_with('#'));
-    let head = lines.next().map_or("", |(_, line)| line);
-    let mark = ['\t', ';', ',']
-        .into_iter()
-        .find(|mark| head.contains(*mark));
-    let mark = mark.unwrap_or(',');
-    let names: Vec<String> = head
-        .split(mark)
-        .map(|name| name.trim().trim_matches('"').to_ascii_lowercase())
+    let (number, head) = lines.next().unwrap_or((1, ""));
+    // Without a delimiter there is one column, and another is missed below.
+    let mark = delimiter_of(head).unwrap_or(',');
+    let names: Vec<String> = split(head, mark, number)
+        .map_err(WeightsError::Row)?
+        .iter()
+        .map(|name| name.to_ascii_lowercase())
         .collect();
     let place = |known: &[&str]| names.iter().position(|name| known.contains(&name.as_str()));
     let (Some(mass), Some(volts)) = (place(MASS), place(VOLTS)) else {
@@ -104,34 +118,42 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
         return Err(WeightsError::NoColumn { wanted });
     };
     let optional = [DIRECTION, REPEAT, NOISE, SAMPLES, WAITED].map(place);
-    let mut rows = Vec::new();
+    let mut table = Vec::new();
     for (line, text) in lines {
-        let cells: Vec<&str> = text
-            .split(mark)
-            .map(|cell| cell.trim().trim_matches('"'))
-            .collect();
-        let cell = |place: usize| cells.get(place).copied().unwrap_or("");
+        let cells = split(text, mark, line).map_err(WeightsError::Row)?;
+        if cells.len() > names.len() {
+            return Err(WeightsError::Row(format!(
+                "line {line} has {} cells where the first line names {} columns; quote a number with a decimal comma, or write it with a point",
+                cells.len(),
+                names.len()
+            )));
+        }
+        table.push((line, cells));
+    }
+    let reals = [Some(mass), Some(volts), optional[2], optional[4]];
+    let decimal = decimal_of(&table, &reals)?;
+    let rows = table.iter().map(|(line, cells)| {
+        let line = *line;
+        let cell = |place: usize| cells.get(place).map_or("", String::as_str);
         let filled = |k: usize| optional[k].map(cell).filter(|cell| !cell.is_empty());
-        let real = |column, cell| number::<f64>(line, column, cell, "a number");
+        let real = |column, cell| {
+            decimal::parse(cell, decimal).ok_or_else(|| wrong(line, column, cell, "a number"))
+        };
         let direction = match filled(0).map(str::to_ascii_lowercase).as_deref() {
             None => None,
             Some("loading" | "up") => Some(Direction::Loading),
             Some("unloading" | "down") => Some(Direction::Unloading),
-            Some(other) => {
-                return Err(WeightsError::Cell {
-                    line,
-                    column: DIRECTION[0],
-                    cell: other.to_owned(),
-                    wanted: "loading or unloading",
-                });
-            }
+            Some(other) => return Err(wrong(line, DIRECTION[0], other, "loading or unloading")),
         };
         let count = |k: usize, column| {
-            let parse = |cell| number::<u32>(line, column, cell, "a whole number");
+            let parse = |cell: &str| {
+                let read = cell.parse::<u32>();
+                read.map_err(|_| wrong(line, column, cell, "a whole number"))
+            };
             filled(k).map(parse).transpose()
         };
         let optional_real = |k: usize, column| filled(k).map(|cell| real(column, cell)).transpose();
-        rows.push(Row {
+        Ok(Row {
             line,
             direction,
             repeat: count(1, REPEAT[0])?,
@@ -143,27 +165,54 @@ pub fn parse_weights(text: &str) -> Result<Calibration, WeightsError> {
                 waited_s: optional_real(4, WAITED[0])?,
                 ..SeriesStep::default()
             },
-        });
-    }
+        })
+    });
     Ok(Calibration {
         format: CALIBRATION_FORMAT,
-        series: series_of(rows)?,
+        series: series_of(rows.collect::<Result<_, _>>()?)?,
         ..Calibration::default()
     })
 }
 
-fn number<T: std::str::FromStr>(
-    line: usize,
-    column: &'static str,
-    cell: &str,
-    wanted: &'static str,
-) -> Result<T, WeightsError> {
-    cell.parse().map_err(|_| WeightsError::Cell {
+/// The decimal sign of the numbers in those columns: a point where no number has a comma, else the one sign
+/// that explains every number.
+fn decimal_of(
+    table: &[(usize, Vec<String>)],
+    reals: &[Option<usize>],
+) -> Result<Decimal, WeightsError> {
+    let cells = table.iter().flat_map(|(line, cells)| {
+        let own = reals.iter().filter_map(|place| cells.get((*place)?));
+        own.map(|cell| (*line, cell))
+    });
+    let with_comma = |(_, cell): &(usize, &String)| {
+        cell.contains(',') && decimal::evidence(cell) != Evidence::None
+    };
+    let Some((line, cell)) = cells.clone().find(with_comma) else {
+        return Ok(Decimal::Point);
+    };
+    let has = |sign| {
+        let only = Evidence::Only(sign);
+        cells
+            .clone()
+            .any(|(_, cell)| decimal::evidence(cell) == only)
+    };
+    match (has(Decimal::Point), has(Decimal::Comma)) {
+        (true, false) => Ok(Decimal::Point),
+        (false, true) => Ok(Decimal::Comma),
+        _ => Err(WeightsError::Comma {
+            line,
+            cell: cell.clone(),
+        }),
+    }
+}
+
+fn wrong(line: usize, column: &'static str, cell: &str, wanted: &'static str) -> WeightsError {
+    WeightsError::Cell {
         line,
         column,
         cell: cell.to_owned(),
         wanted,
-    })
+    }
 }
 
 /// Rows into series: a new one where direction or repeat change, or where the masses begin again.
@@ -245,6 +294,21 @@ mod tests {
     }
 
     #[test]
+    fn quoted_and_decimal_comma_cells_are_read_whole() {
+        let volts = |text: &str| -> Vec<f64> {
+            let read = parse_weights(text).unwrap();
+            read.series_steps().map(|(_, step)| step.volts.0).collect()
+        };
+        let quoted = "mass_g,volts\n0,\"1,280\"\n140,\"1,600\"\n240,\"2,730\"\n340,\"3,78\"\n";
+        assert_eq!(volts(quoted), [1.28, 1.6, 2.73, 3.78]);
+        assert_eq!(volts("mass_g;volts\n0;1,28\n1.040;2,5\n"), [1.28, 2.5]);
+        // Thousands where every other number has a point, and three decimals as they always were.
+        let thousands = parse_weights("mass_g,volts\n0,1.28\n\"1,040\",2.84\n").unwrap();
+        assert_eq!(thousands.series[0].steps[1].mass_g, 1040.0);
+        assert_eq!(volts("mass_g,volts\n0,1.280\n140,1.600\n"), [1.28, 1.6]);
+    }
+
+    #[test]
     fn mistakes_name_line_and_cell() {
         for (text, words) in [
             ("", "no column mass_g"),
@@ -263,6 +327,20 @@ mod tests {
                 "line 4 has 50 g after 100 g; add a column direction",
             ),
             ("mass_g,volts,repeat\n0,1,-1", "\"-1\" for repeat"),
+            (
+                "mass_g,volts\n0,1.2\n140,1,600",
+                "line 3 has 3 cells where the first line names 2 columns",
+            ),
+            (
+                "mass_g,volts\n0,\"1,280\"\n140,\"1,600\"",
+                "line 2 has \"1,280\", in which the comma may be",
+            ),
+            (
+                "mass_g;volts\n0;1.28\n140;1,6",
+                "line 3 has \"1,6\", in which the comma may be",
+            ),
+            ("mass_g,volts\n0,\"1.2", "line 2: a quote is not closed"),
+            ("mass_g,volts\n0,nan", "\"nan\" for volts"),
         ] {
             let refusal = parse_weights(text).unwrap_err().to_string();
             assert!(refusal.contains(words), "{text}: {refusal}");

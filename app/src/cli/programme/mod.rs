@@ -206,5 +206,6 @@ fn leave(
         lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
         lines.join("\n")
     });
-    Ok(())
+    page.loss()
+        .map_or(Ok(()), |loss| Err(Failure::failed(loss)))
 }

@@ -45,7 +45,7 @@ impl std::str::FromStr for Decimal {
 }
 
 /// The number in a cell. The other sign may only stand between groups of three digits.
-pub(super) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
+pub(in crate::import) fn parse(cell: &str, decimal: Decimal) -> Option<f64> {
     let is_of_number = |c: char| c.is_ascii_digit() || "+-.,eE".contains(c);
     if cell.is_empty() || !cell.chars().all(is_of_number) {
         return None;
@@ -88,7 +88,7 @@ pub(super) fn looks_numeric(cell: &str) -> bool {
 
 /// What a cell says of the decimal sign.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(super) enum Evidence {
+pub(in crate::import) enum Evidence {
     /// Nothing: it has no such sign, or is no number.
     None,
     /// It can only be read with this one.
@@ -97,7 +97,7 @@ pub(super) enum Evidence {
     Either,
 }
 
-pub(super) fn evidence(cell: &str) -> Evidence {
+pub(in crate::import) fn evidence(cell: &str) -> Evidence {
     let readings = [Decimal::Point, Decimal::Comma].map(|decimal| parse(cell, decimal));
     match readings {
         [Some(_), None] => Evidence::Only(Decimal::Point),

@@ -4,7 +4,7 @@
 //! Start at [`open_foreign`]; [`keep`] makes a session of a part.
 
 mod columns;
-mod decimal;
+pub(super) mod decimal;
 mod encoding;
 mod keep;
 mod layout;
