@@ -234,14 +234,23 @@ pub fn read_analysed(
             reason: reason.to_owned(),
         });
     }
-    let session = edited.session;
+    of_session(edited.session, stretch, &left_out_s)
+}
+
+/// What a fit takes of a session that was read, without the forces in these stretches of time, in s since the
+/// first sample.
+pub fn of_session(
+    session: Session,
+    stretch: Stretch,
+    left_out_s: &[[f64; 2]],
+) -> Result<FitSource, SourceError> {
     if session.manifest.imported.is_some() {
         let mut source = source_of_imported(session, stretch);
-        leave_out(&left_out_s, Seconds(0.0), &mut source.samples);
+        leave_out(left_out_s, Seconds(0.0), &mut source.samples);
         return Ok(source);
     }
     let mut samples = samples_of(&session, stretch)?;
-    leave_out(&left_out_s, since_first(&session, stretch), &mut samples);
+    leave_out(left_out_s, since_first(&session, stretch), &mut samples);
     let start = start_of(&session);
     let calibration = Some(calibration_of(&session)?);
     let mut notes = session.notes;

@@ -4,11 +4,12 @@
 //! decision that found it. The log itself stays as it is.
 
 use crate::analysis::SourceError;
-use palpate_model::units::Position;
+use palpate_model::units::{Depth, Position};
 use palpate_sessions::edits::{Edits, Verdict};
-use palpate_sessions::log::Session;
-use palpate_sessions::record::{Entry, EntryKind};
+use palpate_sessions::log::{Outline, ReadError, Session};
+use palpate_sessions::record::{Block, Entry, EntryKind, Row};
 use serde_json::Value;
+use std::ops::Range;
 use std::path::Path;
 
 /// A session with its edits made.
@@ -36,16 +37,64 @@ pub fn open(path: &Path) -> Result<Edited, SourceError> {
     let mut session = Session::open(path)?;
     let edits = Edits::read(path, &session.manifest.session_id)?;
     correct(&mut session, &edits);
+    session.notes.extend(doubts(&edits));
+    Ok(Edited { session, edits })
+}
+
+/// What of the edits a user of the data must know, apart from corrections.
+fn doubts(edits: &Edits) -> Vec<String> {
+    let mut notes = Vec::new();
     if edits.is_torn {
-        let note = "the last edit was begun and never finished; it does not count";
-        session.notes.push(note.into());
+        notes.push("the last edit was begun and never finished; it does not count".into());
     }
     if let Some((verdict @ (Verdict::Suspect | Verdict::Rejected), edit)) = edits.verdict() {
-        session
-            .notes
-            .push(format!("{verdict}, says {}: {}", edit.by, edit.reason));
+        notes.push(format!("{verdict}, says {}: {}", edit.by, edit.reason));
     }
-    Ok(Edited { session, edits })
+    notes
+}
+
+/// A session with its edits made, whose samples pass by and are never all in memory.
+#[derive(Clone, Debug)]
+pub struct Passing {
+    /// All but the samples, its notes telling what was corrected and doubted.
+    pub outline: Outline,
+    /// The edits.
+    pub edits: Edits,
+    shifts: Vec<Shift>,
+}
+
+/// Reads a session through, so that it is known to be whole, and keeps all but its samples.
+pub fn outline(path: &Path) -> Result<Passing, SourceError> {
+    let mut outline = Session::scan(path, &mut |_block| {})?;
+    let edits = Edits::read(path, &outline.manifest.session_id)?;
+    let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
+    outline.notes.extend(notes);
+    outline.notes.extend(doubts(&edits));
+    Ok(Passing {
+        outline,
+        edits,
+        shifts,
+    })
+}
+
+impl Passing {
+    /// Hands out every sample that was there when the session was first read, edits made, in order.
+    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&Row)) -> Result<(), ReadError> {
+        let mut index = 0;
+        let mut each = |block: &Block| {
+            for mut row in block.rows() {
+                // One that is being recorded may have grown.
+                if index < self.outline.samples {
+                    for shift in &self.shifts {
+                        shift.apply(index, &mut row);
+                    }
+                    visit(&row);
+                }
+                index += 1;
+            }
+        };
+        Session::scan(path, &mut each).map(|_outline| ())
+    }
 }
 
 /// A contact that a session found.
@@ -57,10 +106,10 @@ pub struct FoundContact {
     pub position: Position,
 }
 
-/// Every contact a session found, in order.
+/// Every contact among a session's entries, in order.
 #[must_use]
-pub fn contacts(session: &Session) -> Vec<FoundContact> {
-    let found = session.entries.iter().filter_map(|entry| {
+pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
+    let found = entries.iter().filter_map(|entry| {
         Some(FoundContact {
             after_sample: entry.after_sample,
             position: Position(found_at(entry)?.as_f64()?),
@@ -79,8 +128,36 @@ fn is_record(entry: &Entry, name: &str) -> bool {
     entry.kind == EntryKind::Decision && body["effect"] == "record" && body["record"] == name
 }
 
+/// By how much the depths of some samples move.
+#[derive(Clone, Debug)]
+struct Shift {
+    samples: Range<u64>,
+    deeper: Depth,
+}
+
+impl Shift {
+    fn apply(&self, index: u64, row: &mut Row) {
+        if let Some(depth) = row.depth.as_mut().filter(|_| self.samples.contains(&index)) {
+            *depth += self.deeper.0;
+        }
+    }
+}
+
 fn correct(session: &mut Session, edits: &Edits) {
-    let contacts = contacts(session);
+    let (shifts, notes) = shifts(&mut session.entries, session.rows.len() as u64, edits);
+    for shift in &shifts {
+        let samples = shift.samples.start as usize..shift.samples.end as usize;
+        for (row, index) in session.rows[samples].iter_mut().zip(shift.samples.start..) {
+            shift.apply(index, row);
+        }
+    }
+    session.notes.extend(notes);
+}
+
+/// Corrects contacts among the entries; what that does to the depths, and a sentence on each.
+fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<String>) {
+    let contacts = contacts(entries);
+    let (mut shifts, mut notes) = (Vec::new(), Vec::new());
     for (index, found) in contacts.iter().enumerate() {
         let number = index as u32 + 1;
         let Some((position, edit)) = edits.contact(number) else {
@@ -88,7 +165,7 @@ fn correct(session: &mut Session, edits: &Edits) {
         };
         let next = contacts.get(index + 1).map(|next| next.after_sample);
         let deeper = found.position.depth_from(position);
-        let base = session.entries.iter_mut().find(|entry| {
+        let base = entries.iter_mut().find(|entry| {
             let at = entry.after_sample;
             is_record(entry, "base_found")
                 && at > found.after_sample
@@ -104,30 +181,24 @@ fn correct(session: &mut Session, edits: &Edits) {
             }
             None => next,
         };
-        let last = session.rows.len();
-        let until = until.map_or(last, |until| until as usize).min(last);
-        let range = (found.after_sample as usize).min(until)..until;
-        for depth in session.rows[range]
-            .iter_mut()
-            .filter_map(|row| row.depth.as_mut())
-        {
-            *depth += deeper.0;
-        }
-        let mut entries = session
-            .entries
-            .iter_mut()
-            .filter(|entry| found_at(entry).is_some());
+        let from = found.after_sample.min(last);
+        shifts.push(Shift {
+            samples: from..until.unwrap_or(last).clamp(from, last),
+            deeper,
+        });
+        let mut entries = entries.iter_mut().filter(|entry| found_at(entry).is_some());
         if let Some(at) = entries
             .nth(index)
             .and_then(|entry| entry.body.get_mut("position"))
         {
             *at = position.0.into();
         }
-        session.notes.push(format!(
+        notes.push(format!(
             "contact {number} was corrected from {:.3} to {:.3} mm by {}: {}; depths count from there",
             found.position.0, position.0, edit.by, edit.reason
         ));
     }
+    (shifts, notes)
 }
 
 #[cfg(test)]
@@ -152,7 +223,7 @@ mod tests {
     fn of_several_contacts_only_the_corrected_one_moves_its_depths() {
         let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
         let mut session = Session::open(&sessions.join("ramp-hold-lab")).unwrap();
-        let first = contacts(&session);
+        let first = contacts(&session.entries);
         assert_eq!(first.len(), 1);
         let known = |row: &palpate_sessions::record::Row| row.depth.is_some();
         assert_eq!(
@@ -194,7 +265,7 @@ mod tests {
         }
         let base = session.entries.last().unwrap();
         assert_eq!(base.body["thickness_mm"], 19.5);
-        let found = contacts(&session);
+        let found = contacts(&session.entries);
         assert_eq!(found[0], first[0]);
         assert!((found[1].position.0 - first[0].position.0 - 0.5).abs() < 1e-12);
         assert_eq!(session.notes.len(), before.notes.len() + 1);

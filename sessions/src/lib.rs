@@ -23,6 +23,7 @@ pub mod folder;
 pub mod import;
 pub mod imported;
 pub mod journal;
+pub mod lake;
 mod lock;
 pub mod log;
 pub mod manifest;
@@ -40,7 +41,7 @@ pub use calibrations::{Kept, Shelf, read_calibration};
 pub use catalog::{Catalog, CatalogError};
 pub use chain::ChainError;
 pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
-pub use export::{ExportError, export_csv, export_parquet};
+pub use export::{ExportError, Format, Selection};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,

@@ -1,25 +1,55 @@
 //! `palpate export`: a session's samples as a table.
 
 use super::output::Output;
-use super::{Failure, compliance};
+use super::{Failure, compliance, lake, read_failure, source_failure};
 use clap::{Args, ValueEnum};
-use palpate_protocols::analysed;
+use palpate_model::rig::Phase;
 use palpate_protocols::compliance::columns;
-use palpate_sessions::export::{Beside, ExportError, export_csv, export_parquet};
+use palpate_protocols::{analysed, edited};
+use palpate_sessions::export::{
+    Beside, ExportError, Feed, Format, Selection, Table, dictionary_path,
+};
 use palpate_sessions::log::Session;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate export`.
 #[derive(Debug, Args)]
 pub struct ExportArgs {
-    /// Session folder
-    session: PathBuf,
+    /// Session folder; several for a lake
+    #[arg(required = true, value_name = "SESSION")]
+    sessions: Vec<PathBuf>,
     /// Kind of table
-    #[arg(long, value_enum)]
-    format: Format,
+    #[arg(long, value_enum, required_unless_present = "lake")]
+    format: Option<Kind>,
+    /// Add the sessions to this lake, a folder of Parquet files that DuckDB, polars and 'palpate fit' read;
+    /// it is made if there is none
+    #[arg(long, value_name = "FOLDER", conflicts_with_all = ["format", "to", "delimiter", "phase", "cycle", "from", "until", "columns", "decimate", "analysis", "compliance"])]
+    lake: Option<PathBuf>,
     /// Folder to write to; the file takes the session folder's name
     #[arg(long, value_name = "DIR", default_value = ".")]
     to: PathBuf,
+    /// Character between the cells of CSV, such as ';' or tab
+    #[arg(long, value_name = "CHARACTER", default_value = ",", value_parser = delimiter)]
+    delimiter: u8,
+    /// Only samples of these phases, as in ramp,hold
+    #[arg(long, value_name = "NAMES", value_delimiter = ',', value_parser = phase)]
+    phase: Vec<Phase>,
+    /// Only samples of these cycles, as in 1,2; 0 is outside cycles
+    #[arg(long, value_name = "NUMBERS", value_delimiter = ',')]
+    cycle: Vec<u32>,
+    /// Only samples at or after this time since the first one
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
+    from: Option<f64>,
+    /// Only samples at or before this time
+    #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
+    until: Option<f64>,
+    /// Only these columns, in this order, as in t_s,force_N; also session_id, specimen, sample, tick,
+    /// host_ns and status
+    #[arg(long, alias = "channel", value_name = "NAMES", value_delimiter = ',')]
+    columns: Vec<String>,
+    /// Only every so many of the samples that are left, none averaged; the file's name says so
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(2..))]
+    decimate: Option<u64>,
     /// Write the session as this analysis of it reads it: with another calibration, or with stretches
     /// left out, whose forces are empty
     #[arg(long, value_name = "NAME")]
@@ -34,49 +64,190 @@ pub struct ExportArgs {
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
-enum Format {
+enum Kind {
     /// Comma-separated text, units in the column names
     Csv,
     /// Parquet, units in the file metadata
     Parquet,
+    /// Arrow IPC file, units in the schema metadata
+    Arrow,
+}
+
+fn delimiter(text: &str) -> Result<u8, String> {
+    match text.as_bytes() {
+        b"tab" => Ok(b'\t'),
+        [one @ (b',' | b';' | b'|' | b'\t' | b':')] => Ok(*one),
+        _ => Err("choose , ; | : or tab, which no number contains".into()),
+    }
+}
+
+fn phase(text: &str) -> Result<Phase, String> {
+    let found = Phase::ALL.iter().find(|phase| phase.name() == text);
+    found.copied().ok_or_else(|| {
+        let names: Vec<&str> = Phase::ALL.iter().map(|phase| phase.name()).collect();
+        format!("the phases are {}", names.join(", "))
+    })
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|number: &f64| number.is_finite());
+    number.ok_or_else(|| "give a number of seconds".into())
+}
+
+impl ExportArgs {
+    fn format(&self) -> Format {
+        match self.format {
+            // Without a lake there is always a format.
+            Some(Kind::Csv) | None => Format::Csv(self.delimiter),
+            Some(Kind::Parquet) => Format::Parquet,
+            Some(Kind::Arrow) => Format::Arrow,
+        }
+    }
+
+    fn selection(&self) -> Result<Selection, Failure> {
+        if let (Some(from), Some(until)) = (self.from, self.until)
+            && from > until
+        {
+            return Err(Failure::usage(format!(
+                "--from {from} is after --until {until}; give the earlier time first"
+            )));
+        }
+        Ok(Selection {
+            phases: self.phase.clone(),
+            cycles: self.cycle.clone(),
+            columns: self.columns.clone(),
+            from_s: self.from,
+            to_s: self.until,
+            every: self.decimate,
+        })
+    }
 }
 
 pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
-    let opened = analysed::open(&args.session, args.analysis.as_deref());
-    let mut opened = opened.map_err(super::source_failure)?;
-    opened.blank();
-    let session = opened.edited.session;
-    session.notes.iter().for_each(|note| output.note(note));
-    let name = args
-        .session
-        .canonicalize()
-        .ok()
-        .and_then(|path| {
-            path.file_stem()
-                .map(|name| name.to_string_lossy().into_owned())
-        })
-        .unwrap_or_else(|| session.manifest.session_id.clone());
-    let (compliance, beside) = beside(args, &session)?;
-    let (extension, write): (_, fn(&Session, &Beside, &Path) -> _) = match args.format {
-        Format::Csv => ("csv", export_csv),
-        Format::Parquet => ("parquet", export_parquet),
+    if let Some(lake) = &args.lake {
+        return lake::run(lake, &args.sessions, output);
+    }
+    let [session] = args.sessions.as_slice() else {
+        return Err(Failure::usage(
+            "a table is of one session; name one, or add several to a lake with --lake FOLDER",
+        ));
     };
-    let path = args.to.join(format!("{name}.{extension}"));
-    write(&session, &beside, &path).map_err(|err| match err {
-        ExportError::Exists { .. } => Failure::usage(err),
-        _ => Failure::failed(err),
-    })?;
+    let selection = args.selection()?;
+    let mut told = Told::default();
+    if args.analysis.is_some() || args.compliance.is_some() {
+        let opened = analysed::open(session, args.analysis.as_deref());
+        let mut opened = opened.map_err(source_failure)?;
+        opened.blank();
+        let read = opened.edited.session;
+        let beside;
+        (told.compliance, beside) = self::beside(args, &read)?;
+        let table = Table {
+            manifest: &read.manifest,
+            notes: &read.notes,
+            beside: &beside,
+            selection: &selection,
+        };
+        let all = read.rows.len() as u64;
+        told.write(args, &table, all, output, &mut |visit| {
+            read.rows.iter().for_each(visit);
+            Ok(())
+        })?;
+    } else {
+        // What needs no more than a look at each sample does not keep them.
+        let passing = edited::outline(session).map_err(source_failure)?;
+        let table = Table {
+            manifest: &passing.outline.manifest,
+            notes: &passing.outline.notes,
+            beside: &Beside::default(),
+            selection: &selection,
+        };
+        let all = passing.outline.samples;
+        told.write(args, &table, all, output, &mut |visit| {
+            passing.rows(session, visit)
+        })?;
+    }
     let object = serde_json::json!({
-        "command": "export", "file": path, "rows": session.rows.len(), "format": extension, "compliance": compliance,
+        "command": "export", "file": told.path, "rows": told.rows, "format": args.format().ending(),
+        "dictionary": dictionary_path(&told.path), "is_part": selection.is_part(),
+        "every": selection.every.unwrap_or(1), "compliance": told.compliance,
     });
     output.result(&object, || {
-        let corrected = compliance.as_ref().map_or(String::new(), |id| {
+        let corrected = told.compliance.as_ref().map_or(String::new(), |id| {
             format!(", depths corrected with {id} beside the raw ones")
         });
-        let rows = session.rows.len();
-        format!("{rows} rows written to {}{corrected}", path.display())
+        let every = selection.every.map_or(String::new(), |every| {
+            format!(", every {every}th of those selected")
+        });
+        format!(
+            "{} rows written to {}{every}{corrected}",
+            told.rows,
+            told.path.display()
+        )
     });
     Ok(())
+}
+
+/// What is told of an export.
+#[derive(Default)]
+struct Told {
+    path: PathBuf,
+    rows: u64,
+    compliance: Option<String>,
+}
+
+impl Told {
+    fn write(
+        &mut self,
+        args: &ExportArgs,
+        table: &Table,
+        samples: u64,
+        output: &Output,
+        feed: Feed,
+    ) -> Result<(), Failure> {
+        table.notes.iter().for_each(|note| output.note(note));
+        let name = table
+            .selection
+            .file_name(&stem(args, table), args.format().ending());
+        self.path = args.to.join(name);
+        let bar = output.share_bar(samples);
+        let mut done = 0u64;
+        let mut feed = |visit: &mut dyn FnMut(&_)| {
+            feed(&mut |row| {
+                done += 1;
+                if done.is_multiple_of(1 << 16) {
+                    bar.set_position(done);
+                }
+                visit(row);
+            })
+        };
+        let written = table.write(args.format(), &self.path, &mut feed);
+        bar.finish_and_clear();
+        self.rows = written.map_err(failure)?;
+        Ok(())
+    }
+}
+
+/// A file takes the session folder's name.
+fn stem(args: &ExportArgs, table: &Table) -> String {
+    let whole = args
+        .sessions
+        .first()
+        .and_then(|path| path.canonicalize().ok());
+    let stem = whole.as_deref().and_then(Path::file_stem);
+    stem.map_or_else(
+        || table.manifest.session_id.clone(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+pub(super) fn failure(err: ExportError) -> Failure {
+    match err {
+        ExportError::Exists { .. } | ExportError::Columns(_) | ExportError::BadName { .. } => {
+            Failure::usage(err)
+        }
+        ExportError::Read(err) => read_failure(err),
+        _ => Failure::failed(err),
+    }
 }
 
 /// The columns asked for beside the session's own, and the compliance they are made with.
@@ -87,10 +258,10 @@ fn beside(args: &ExportArgs, session: &Session) -> Result<(Option<String>, Besid
     let corrections = compliance::corrections(Some(name))?;
     let rig = session.manifest.rig.as_ref().map(|rig| rig.name.as_str());
     let kept = corrections.of_rig(rig);
-    let kept = kept.map_err(|err| super::source_failure(err.into()))?;
+    let kept = kept.map_err(|err| source_failure(err.into()))?;
     let Some((kept, _)) = kept else {
         return Ok((None, Beside::default()));
     };
-    let columns = columns(session, kept).map_err(super::source_failure)?;
+    let columns = columns(session, kept).map_err(source_failure)?;
     Ok((Some(kept.id.clone()), columns))
 }

@@ -14,6 +14,7 @@ mod fit;
 mod history;
 mod import;
 mod info;
+mod lake;
 mod last_fit;
 mod new_file;
 mod output;
@@ -26,6 +27,7 @@ mod review;
 mod rig;
 mod run;
 mod select;
+mod shell;
 mod trade;
 mod verdict;
 
@@ -83,7 +85,7 @@ enum Command {
     Compliance(compliance::ComplianceArgs),
     /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
     Import(Box<import::ImportArgs>),
-    /// Write a session's samples as a table
+    /// Write a session's samples as a table, or add sessions to a lake
     Export(export::ExportArgs),
     /// Find sessions of the library
     Find(Box<find::FindArgs>),
@@ -110,6 +112,10 @@ enum Command {
     Mask(analysis::MaskArgs),
     /// Let an analysis count no more; its record stays
     Withdraw(analysis::WithdrawArgs),
+    /// Print what completes palpate's commands in a shell
+    Completions(shell::CompletionsArgs),
+    /// Print the manual page, or write one for every command
+    Man(shell::ManArgs),
 }
 
 /// Why a command did not do what was asked.
@@ -218,6 +224,11 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
         Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
+        Some(Command::Completions(args)) => with(args.json, |out| {
+            shell::completions(&args, out);
+            Ok(())
+        }),
+        Some(Command::Man(args)) => with(args.json, |out| shell::man(&args, out)),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,

@@ -104,7 +104,7 @@ pub(super) fn verdict(args: &VerdictArgs, output: &Output) -> Result<(), Failure
 /// Says where contact really was.
 pub(super) fn correct(args: &CorrectArgs, output: &Output) -> Result<(), Failure> {
     let edited = edited::open(&args.session).map_err(super::source_failure)?;
-    let found = edited::contacts(&edited.session);
+    let found = edited::contacts(&edited.session.entries);
     let number = match (args.contact, found.len()) {
         (_, 0) => {
             return Err(Failure::usage(

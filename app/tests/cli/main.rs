@@ -9,6 +9,7 @@ mod doctor;
 mod extremes;
 mod fit;
 mod import;
+mod lake;
 mod plan;
 mod programme;
 mod protocol;

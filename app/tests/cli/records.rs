@@ -94,7 +94,9 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     let info = json(&palpate(at, &["info", "run", "--json"]));
     assert_eq!(info["edits"].as_array().unwrap().len(), 1);
     let before = Session::open(&at.join("run")).unwrap();
-    let found = palpate_protocols::edited::contacts(&before)[0].position.0;
+    let found = palpate_protocols::edited::contacts(&before.entries)[0]
+        .position
+        .0;
     let log = fs::read(at.join("run/000.mcap")).unwrap();
     let position = format!("{}", found - 0.25);
     let correct = |position: &str, reason: &str| {

@@ -1,18 +1,69 @@
-//! The canonical columns of every export.
+//! The columns of every table of samples: what they are called and mean, and how they are filled.
 
-use crate::log::Session;
-use polars::prelude::{Column, DataFrame, NamedFrom, PolarsResult, Series};
+use crate::manifest::Manifest;
+use crate::record::Row;
+use polars::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PolarsResult, Series};
+use polars::prelude::{NamedFrom, StringChunked};
 
-/// Name and unit of every column, in order. `1` is a plain count.
-pub const COLUMNS: [(&str, &str); 8] = [
-    ("t_s", "s"),
-    ("depth_mm", "mm"),
-    ("force_N", "N"),
-    ("signal_V", "V"),
-    ("counts", "1"),
-    ("pulses", "1"),
-    ("phase", ""),
-    ("cycle", "1"),
+/// What stands in a column.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Field {
+    SessionId,
+    Specimen,
+    Sample,
+    Time,
+    Depth,
+    Force,
+    Signal,
+    Counts,
+    Pulses,
+    Phase,
+    Cycle,
+    Tick,
+    Host,
+    Status,
+    /// One of [`Beside`], by number.
+    Beside(usize),
+    /// The number of the sample, in a table that holds every so many only.
+    EveryNth,
+}
+
+/// A column, as a reader is told of it.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct ColumnInfo {
+    field: Field,
+    /// Its name, with the unit where it has one.
+    pub name: String,
+    /// Its unit; `1` is a plain count, empty is text.
+    pub unit: &'static str,
+    /// Its type.
+    pub kind: &'static str,
+    /// What it means.
+    pub meaning: String,
+    /// Where it comes from.
+    pub how: &'static str,
+}
+
+/// Columns of every table, in order.
+const USUAL: [Field; 8] = [
+    Field::Time,
+    Field::Depth,
+    Field::Force,
+    Field::Signal,
+    Field::Counts,
+    Field::Pulses,
+    Field::Phase,
+    Field::Cycle,
+];
+
+/// Columns that can be asked for by name.
+const MORE: [Field; 6] = [
+    Field::SessionId,
+    Field::Specimen,
+    Field::Sample,
+    Field::Tick,
+    Field::Host,
+    Field::Status,
 ];
 
 /// Columns that stand beside the session's own, such as corrected depths.
@@ -20,53 +71,235 @@ pub const COLUMNS: [(&str, &str); 8] = [
 pub struct Beside {
     /// Name, unit and values, one for each sample and none where it is not known.
     pub columns: Vec<(&'static str, &'static str, Vec<Option<f64>>)>,
-    /// What a reader must know of them: keys and texts of a Parquet file's metadata.
+    /// What a reader must know of them: keys and texts of the file's metadata.
     pub metadata: Vec<(String, String)>,
 }
 
-/// The samples as a frame: `t_s` is controller time since the first sample in true seconds, depth
-/// is null before contact is known, force before tare, counts on a rig without a converter,
-/// signal and pulses in an imported session.
-pub(super) fn frame(session: &Session, beside: &Beside) -> PolarsResult<DataFrame> {
-    let rows = &session.rows;
-    let first_tick = rows.first().map_or(0, |row| row.tick);
-    // A controller that restarted counts from zero again: its time is negative, not a failure.
-    let t: Vec<f64> = rows
-        .iter()
-        .map(|row| {
-            let ticks = row.tick.wrapping_sub(first_tick) as i64;
-            session.manifest.time_of(ticks).0
+impl Field {
+    fn told(self) -> ColumnInfo {
+        let (name, unit, kind, meaning, how) = match self {
+            Self::SessionId => (
+                "session_id",
+                "",
+                "text",
+                "name of the session",
+                "given at the start, sorts by time",
+            ),
+            Self::Specimen => (
+                "specimen",
+                "",
+                "text",
+                "what was indented",
+                "typed by the operator",
+            ),
+            Self::Sample => (
+                "sample",
+                "1",
+                "whole number",
+                "number of the sample in the session, from 0",
+                "counted",
+            ),
+            Self::Time => (
+                "t_s",
+                "s",
+                "number",
+                "time since the session's first sample; negative after a restart of the controller",
+                "controller ticks times the true length of a tick",
+            ),
+            Self::Depth => (
+                "depth_mm",
+                "mm",
+                "number",
+                "depth below contact, positive into the tissue; empty before contact is known",
+                "pulses times the length of a pulse, from the contact found or corrected",
+            ),
+            Self::Force => (
+                "force_N",
+                "N",
+                "number",
+                "force on the probe above tare, positive in compression; empty before the tare and where left out",
+                "signal through the load-cell calibration, less the tare",
+            ),
+            Self::Signal => (
+                "signal_V",
+                "V",
+                "number",
+                "load-cell signal; empty in an imported session without one",
+                "as received",
+            ),
+            Self::Counts => (
+                "counts",
+                "1",
+                "whole number",
+                "converter counts; empty on a rig without a converter",
+                "as received",
+            ),
+            Self::Pulses => (
+                "pulses",
+                "1",
+                "whole number",
+                "commanded position in motor pulses from home; empty in an imported session",
+                "as received",
+            ),
+            Self::Phase => (
+                "phase",
+                "",
+                "text",
+                "what the run was doing",
+                "decided by the engine",
+            ),
+            Self::Cycle => (
+                "cycle",
+                "1",
+                "whole number",
+                "indentation cycle, from 1; 0 outside cycles",
+                "decided by the engine",
+            ),
+            Self::Tick => (
+                "tick",
+                "1",
+                "whole number",
+                "the controller's clock in its own counts; picoseconds in an imported session",
+                "as received",
+            ),
+            Self::Host => (
+                "host_ns",
+                "ns",
+                "whole number",
+                "arrival on the computer, since the start of the session",
+                "the computer's monotonic clock",
+            ),
+            Self::Status => (
+                "status",
+                "1",
+                "whole number",
+                "bits of the axis' status",
+                "as received",
+            ),
+            // Named by those who make them.
+            Self::Beside(_) | Self::EveryNth => ("", "", "", "", ""),
+        };
+        ColumnInfo {
+            field: self,
+            name: name.into(),
+            unit,
+            kind,
+            meaning: meaning.into(),
+            how,
+        }
+    }
+}
+
+/// The columns of one table and what is the same in every row.
+pub(super) struct Layout<'a> {
+    pub columns: Vec<ColumnInfo>,
+    beside: &'a Beside,
+    manifest: &'a Manifest,
+}
+
+/// A sample of the table: its number in the session, its time in s and itself.
+pub(super) type Numbered = (u64, f64, Row);
+
+impl<'a> Layout<'a> {
+    /// The usual columns and those beside, or those that are named, in that order; or the name there is no
+    /// column of. A table of every `every`-th sample begins with the numbers of its samples.
+    pub fn new(
+        manifest: &'a Manifest,
+        beside: &'a Beside,
+        wanted: &[String],
+        every: u64,
+    ) -> Result<Self, String> {
+        let mut known: Vec<ColumnInfo> = USUAL.map(Field::told).into();
+        known.extend(
+            beside
+                .columns
+                .iter()
+                .enumerate()
+                .map(|(number, (name, unit, _))| ColumnInfo {
+                    field: Field::Beside(number),
+                    name: (*name).into(),
+                    unit,
+                    kind: "number",
+                    meaning: "beside the session's own columns; empty where it is not known".into(),
+                    how: "computed at export; how is in the file's metadata",
+                }),
+        );
+        let usual = known.len();
+        known.extend(MORE.map(Field::told));
+        let mut columns = Vec::new();
+        if every > 1 {
+            columns.push(ColumnInfo {
+                name: format!("sample_every_{every}"),
+                meaning: format!(
+                    "number of the sample in the session, from 0; only every {every}th of those selected is here, none is averaged"
+                ),
+                field: Field::EveryNth,
+                ..Field::Sample.told()
+            });
+        }
+        if wanted.is_empty() {
+            known.truncate(usual);
+            columns.append(&mut known);
+        }
+        for name in wanted {
+            let found = known.iter().find(|one| one.name == *name);
+            let Some(found) = found else {
+                let all: Vec<&str> = known.iter().map(|one| one.name.as_str()).collect();
+                return Err(format!(
+                    "there is no column {name}; the columns are {}",
+                    all.join(", ")
+                ));
+            };
+            if columns.contains(found) {
+                return Err(format!("column {name} is named twice; name it once"));
+            }
+            columns.push(found.clone());
+        }
+        Ok(Self {
+            columns,
+            beside,
+            manifest,
         })
-        .collect();
-    let depth: Vec<Option<f64>> = rows.iter().map(|row| row.depth).collect();
-    let force: Vec<Option<f64>> = rows.iter().map(|row| row.force).collect();
-    let signal: Vec<Option<f64>> = rows.iter().map(|row| row.volts).collect();
-    let counts: Vec<Option<i32>> = rows.iter().map(|row| row.counts).collect();
-    let pulses: Vec<Option<i64>> = rows.iter().map(|row| row.pulses).collect();
-    let phase: Vec<&str> = rows.iter().map(|row| row.phase.name()).collect();
-    let cycle: Vec<u32> = rows.iter().map(|row| row.cycle).collect();
-    let [
-        n_t,
-        n_depth,
-        n_force,
-        n_signal,
-        n_counts,
-        n_pulses,
-        n_phase,
-        n_cycle,
-    ] = COLUMNS.map(|(name, _)| name.into());
-    let own = [
-        Series::new(n_t, t),
-        Series::new(n_depth, depth),
-        Series::new(n_force, force),
-        Series::new(n_signal, signal),
-        Series::new(n_counts, counts),
-        Series::new(n_pulses, pulses),
-        Series::new(n_phase, phase),
-        Series::new(n_cycle, cycle),
-    ];
-    let more = beside.columns.iter();
-    let more = more.map(|(name, _, values)| Series::new((*name).into(), values));
-    let columns: Vec<Column> = own.into_iter().chain(more).map(Column::from).collect();
-    DataFrame::new(rows.len(), columns)
+    }
+
+    /// Some samples as a frame.
+    pub fn frame(&self, rows: &[Numbered]) -> PolarsResult<DataFrame> {
+        let columns = self
+            .columns
+            .iter()
+            .map(|column| self.series(column, rows).into());
+        DataFrame::new(rows.len(), columns.collect::<Vec<Column>>())
+    }
+
+    fn series(&self, column: &ColumnInfo, rows: &[Numbered]) -> Series {
+        let name = column.name.as_str().into();
+        let same = |text: &str| StringChunked::full(name, text, rows.len()).into_series();
+        let name = column.name.as_str().into();
+        macro_rules! each {
+            ($kind:ty, $of:expr) => {
+                Series::new(name, rows.iter().map($of).collect::<Vec<$kind>>())
+            };
+        }
+        match column.field {
+            Field::SessionId => same(&self.manifest.session_id),
+            Field::Specimen => same(&self.manifest.specimen),
+            Field::Sample | Field::EveryNth => each!(u64, |(number, _, _)| *number),
+            Field::Time => each!(f64, |(_, t, _)| *t),
+            Field::Depth => each!(Option<f64>, |(_, _, row)| row.depth),
+            Field::Force => each!(Option<f64>, |(_, _, row)| row.force),
+            Field::Signal => each!(Option<f64>, |(_, _, row)| row.volts),
+            Field::Counts => each!(Option<i32>, |(_, _, row)| row.counts),
+            Field::Pulses => each!(Option<i64>, |(_, _, row)| row.pulses),
+            Field::Phase => each!(&str, |(_, _, row)| row.phase.name()),
+            Field::Cycle => each!(u32, |(_, _, row)| row.cycle),
+            Field::Tick => each!(u64, |(_, _, row)| row.tick),
+            Field::Host => each!(u64, |(_, _, row)| row.host.0),
+            Field::Status => each!(u32, |(_, _, row)| row.status),
+            Field::Beside(one) => {
+                let values = &self.beside.columns[one].2;
+                let of = |(number, _, _): &Numbered| *values.get(*number as usize)?;
+                each!(Option<f64>, of)
+            }
+        }
+    }
 }

@@ -1,17 +1,36 @@
-//! A session's samples as a table in a foreign format. Polars lives only here.
+//! A session's samples as a table in a foreign format. Polars lives only here and in [`crate::lake`].
 
-mod atomic;
+pub(crate) mod atomic;
 mod columns;
-mod parquet;
+mod dictionary;
+mod encode;
+mod harmless;
+mod select;
 
-pub use columns::{Beside, COLUMNS};
-pub use parquet::export_parquet;
+pub use atomic::Kept;
+pub use columns::Beside;
+pub use dictionary::dictionary_path;
+pub use encode::Format;
+pub use harmless::harmless;
+pub use select::Selection;
 
-use crate::log::Session;
-use polars::prelude::{CsvWriter, DataFrame, PolarsError, SerWriter};
-use std::io;
+use crate::log::ReadError;
+use crate::manifest::Manifest;
+use crate::record::Row;
+use crate::text::sha256;
+use columns::{Layout, Numbered};
+use encode::{Encoder, Metadata};
+use polars::prelude::{PolarsError, PolarsResult};
+use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+
+/// Version of the tables: their columns, units and metadata. It rises when a column changes its meaning.
+pub const TABLE_VERSION: u32 = 1;
+
+/// Samples in a frame and in a row group: a reader of part of a session decodes little more than that
+/// part, and a writer holds no more in memory.
+const FRAME_ROWS: usize = 1 << 18;
 
 /// A table could not be written.
 #[derive(Debug, Error)]
@@ -23,6 +42,24 @@ pub enum ExportError {
         /// The file.
         path: PathBuf,
     },
+    /// Files of a lake never change.
+    #[error("{} exists already and holds something else, and files of a lake never change; use another lake, or move the file away if it is the wrong one", path.display())]
+    Different {
+        /// The file.
+        path: PathBuf,
+    },
+    /// No column has that name.
+    #[error("{0}")]
+    Columns(String),
+    /// The session's name cannot be that of a file.
+    #[error("the session's name {name:?} cannot be that of a file in a lake; export it as a table")]
+    BadName {
+        /// The name.
+        name: String,
+    },
+    /// The session could not be read to its end.
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// The disk refused.
     #[error("cannot write {} ({source}); choose a folder that may be written and has room", path.display())]
     Io {
@@ -41,18 +78,181 @@ pub enum ExportError {
     },
 }
 
-/// Writes the samples as comma-separated text: names with units in the header, `.` as decimal
-/// mark, shortest digits that read back to the same number, empty cells for missing values.
-pub fn export_csv(session: &Session, beside: &Beside, path: &Path) -> Result<(), ExportError> {
-    let mut frame = frame(session, beside, path)?;
-    atomic::write(path, |file| {
-        CsvWriter::new(file).include_header(true).finish(&mut frame)
-    })
+/// What is exported.
+#[derive(Clone, Copy, Debug)]
+pub struct Table<'a> {
+    /// What the session says about itself.
+    pub manifest: &'a Manifest,
+    /// What a user of the data must know.
+    pub notes: &'a [String],
+    /// Columns beside the session's own.
+    pub beside: &'a Beside,
+    /// Which samples and columns.
+    pub selection: &'a Selection,
 }
 
-fn frame(session: &Session, beside: &Beside, path: &Path) -> Result<DataFrame, ExportError> {
-    columns::frame(session, beside).map_err(|source| ExportError::Table {
-        path: path.to_owned(),
-        source,
-    })
+/// Gives every sample of a session in order to what it is handed.
+pub type Feed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&Row)) -> Result<(), ReadError>;
+
+impl Table<'_> {
+    /// Writes the table and, beside it, its data dictionary ([`dictionary_path`]), and tells how many rows
+    /// it has. Both are new files. Samples pass by: no more than a frame of them is in memory.
+    ///
+    /// The metadata of Parquet and Arrow carries the units (`palpate.columns`, JSON from column to unit),
+    /// where the numbers come from (`palpate.session`, `palpate.software`, `palpate.record_version`,
+    /// `palpate.calibration_sha256`), of what (`palpate.specimen`, `palpate.about`, a JSON object), what is
+    /// in it (`palpate.table_version`, `palpate.selection`, a JSON object), what a reader must know
+    /// (`palpate.notes`, a JSON list of sentences), and what is told of the columns beside.
+    pub fn write(&self, format: Format, path: &Path, feed: Feed) -> Result<u64, ExportError> {
+        let layout = self.layout()?;
+        let beside = dictionary_path(path);
+        atomic::check_new(&beside)?;
+        let rows = atomic::write(path, |file| self.encode(&layout, format, path, file, feed))?;
+        let text = dictionary::dictionary(
+            path,
+            self.manifest,
+            self.notes,
+            &layout.columns,
+            self.selection,
+        );
+        atomic::write(&beside, |file| {
+            file.write_all(text.as_bytes())
+                .map_err(atomic::io_error(&beside))
+        })?;
+        Ok(rows)
+    }
+
+    /// Writes the table as Parquet of a lake: without a dictionary, and a file that is there may stay if it
+    /// is the same.
+    pub(crate) fn write_to_lake(&self, path: &Path, feed: Feed) -> Result<Kept, ExportError> {
+        let layout = self.layout()?;
+        atomic::write_or_same(path, |file| {
+            self.encode(&layout, Format::Parquet, path, file, feed)
+                .map(|_rows| ())
+        })
+    }
+
+    fn layout(&self) -> Result<Layout<'_>, ExportError> {
+        let (columns, every) = (&self.selection.columns, self.selection.step());
+        Layout::new(self.manifest, self.beside, columns, every).map_err(ExportError::Columns)
+    }
+
+    fn encode(
+        &self,
+        layout: &Layout,
+        format: Format,
+        path: &Path,
+        file: impl Write,
+        feed: Feed,
+    ) -> Result<u64, ExportError> {
+        let failed = |source| ExportError::Table {
+            path: path.to_owned(),
+            source,
+        };
+        let mut filling = Filling::new(self, layout, format, file).map_err(failed)?;
+        feed(&mut |row| filling.take(row))?;
+        filling.finish().map_err(failed)
+    }
+
+    fn metadata(&self, layout: &Layout) -> Metadata {
+        let units: serde_json::Map<String, serde_json::Value> = layout
+            .columns
+            .iter()
+            .map(|one| (one.name.clone(), one.unit.into()))
+            .collect();
+        let manifest = self.manifest;
+        let mut pairs = vec![
+            ("columns", serde_json::Value::Object(units).to_string()),
+            ("session", manifest.session_id.clone()),
+            ("software", manifest.software_version.clone()),
+            ("record_version", manifest.record_version.to_string()),
+            ("table_version", TABLE_VERSION.to_string()),
+            ("specimen", manifest.specimen.clone()),
+            ("about", serde_json::json!(manifest.about).to_string()),
+            ("notes", serde_json::json!(self.notes).to_string()),
+            ("selection", self.selection.told()),
+        ];
+        if !manifest.calibration.is_null() {
+            let hash = sha256(manifest.calibration.to_string().as_bytes());
+            pairs.push(("calibration_sha256", hash));
+        }
+        let own = pairs
+            .into_iter()
+            .map(|(key, text)| (format!("palpate.{key}"), text));
+        own.chain(self.beside.metadata.iter().cloned()).collect()
+    }
+}
+
+/// A table that is being filled.
+struct Filling<'a, W: Write> {
+    table: &'a Table<'a>,
+    layout: &'a Layout<'a>,
+    encoder: Encoder<W>,
+    frame: Vec<Numbered>,
+    /// Samples seen so far, those selected of them, and those written.
+    seen: u64,
+    selected: u64,
+    written: u64,
+    first_tick: Option<u64>,
+    /// The first failure; nothing is written after it.
+    failure: Option<PolarsError>,
+}
+
+impl<'a, W: Write> Filling<'a, W> {
+    fn new(
+        table: &'a Table<'a>,
+        layout: &'a Layout<'a>,
+        format: Format,
+        file: W,
+    ) -> PolarsResult<Self> {
+        let empty = layout.frame(&[])?;
+        Ok(Self {
+            table,
+            layout,
+            encoder: Encoder::new(format, file, &empty, table.metadata(layout))?,
+            frame: Vec::new(),
+            seen: 0,
+            selected: 0,
+            written: 0,
+            first_tick: None,
+            failure: None,
+        })
+    }
+
+    fn take(&mut self, row: &Row) {
+        let first_tick = *self.first_tick.get_or_insert(row.tick);
+        // A controller that restarted counts from zero again: its time is negative, not a failure.
+        let ticks = row.tick.wrapping_sub(first_tick) as i64;
+        let one = (self.seen, self.table.manifest.time_of(ticks).0, *row);
+        self.seen += 1;
+        if self.failure.is_some() || !self.table.selection.takes(&one) {
+            return;
+        }
+        if self.selected.is_multiple_of(self.table.selection.step()) {
+            self.frame.push(one);
+        }
+        self.selected += 1;
+        if self.frame.len() == FRAME_ROWS {
+            self.failure = self.flush().err();
+        }
+    }
+
+    fn flush(&mut self) -> PolarsResult<()> {
+        let frame = self.layout.frame(&self.frame)?;
+        self.written += self.frame.len() as u64;
+        self.frame.clear();
+        self.encoder.write(frame)
+    }
+
+    fn finish(mut self) -> PolarsResult<u64> {
+        if let Some(failure) = self.failure.take() {
+            return Err(failure);
+        }
+        // A table without rows has its columns all the same.
+        if !self.frame.is_empty() || self.written == 0 {
+            self.flush()?;
+        }
+        self.encoder.finish()?;
+        Ok(self.written)
+    }
 }

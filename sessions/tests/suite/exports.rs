@@ -1,11 +1,31 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
-use palpate_sessions::export::Beside;
-use palpate_sessions::{ExportError, Session, export_csv, export_parquet, read_table};
+use palpate_sessions::export::{Beside, Format, Selection, Table, dictionary_path};
+use palpate_sessions::{ExportError, Row, Session, read_table};
 use polars::prelude::{ParquetReader, SerReader};
 use std::path::Path;
 use std::process::Command;
+
+const CSV: Format = Format::Csv(b',');
+
+fn export(
+    session: &Session,
+    format: Format,
+    selection: &Selection,
+    path: &Path,
+) -> Result<u64, ExportError> {
+    let table = Table {
+        manifest: &session.manifest,
+        notes: &session.notes,
+        beside: &Beside::default(),
+        selection,
+    };
+    table.write(format, path, &mut |visit| {
+        session.rows.iter().for_each(visit);
+        Ok(())
+    })
+}
 
 fn session() -> Session {
     let mut rows = rows(3000, 41);
@@ -23,7 +43,10 @@ fn csv_holds_every_digit_and_reads_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.csv");
     let session = session();
-    export_csv(&session, &Beside::default(), &path).unwrap();
+    assert_eq!(
+        export(&session, CSV, &Selection::default(), &path).unwrap(),
+        3000
+    );
     let text = std::fs::read_to_string(&path).unwrap();
     let mut lines = text.lines();
     assert_eq!(
@@ -71,7 +94,9 @@ fn parquet_holds_the_same_with_units() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("one.parquet");
     let session = session();
-    export_parquet(&session, &Beside::default(), &path).unwrap();
+    let all = Selection::default();
+    export(&session, Format::Parquet, &all, &path).unwrap();
+    assert_eq!(value_of_hash(&session).len(), 64);
     let mut reader = ParquetReader::new(std::fs::File::open(&path).unwrap());
     let metadata = reader.get_metadata().unwrap().clone();
     let pairs = metadata.key_value_metadata().clone().unwrap();
@@ -86,6 +111,8 @@ fn parquet_holds_the_same_with_units() {
     assert_eq!(value("palpate.session"), session.manifest.session_id);
     assert_eq!(value("palpate.software"), "0.1.0");
     assert_eq!(value("palpate.record_version"), "2");
+    assert_eq!(value("palpate.table_version"), "1");
+    assert_eq!(value("palpate.calibration_sha256"), value_of_hash(&session));
 
     let frame = reader.finish().unwrap();
     let column = |name: &str| frame.column(name).unwrap().clone();
@@ -108,6 +135,12 @@ fn parquet_holds_the_same_with_units() {
         assert_eq!(phase.str().unwrap().get(i), Some(row.phase.name()));
     }
     python_agrees(&path, &session);
+}
+
+/// SHA-256 of the calibration, as every record of the library has it.
+fn value_of_hash(session: &Session) -> String {
+    let calibration = &session.manifest.calibration;
+    palpate_sessions::text::sha256(calibration.to_string().as_bytes())
 }
 
 /// Another implementation reads the same, where one is installed.
@@ -209,22 +242,239 @@ print(json.dumps([session, topics]))
 fn exports_never_replace_a_file() {
     let folder = tempfile::tempdir().unwrap();
     let session = session();
-    type Export = fn(&Session, &Beside, &Path) -> Result<(), ExportError>;
-    for (name, export) in [
-        ("one.csv", export_csv as Export),
-        ("one.parquet", export_parquet as Export),
+    for (name, format) in [
+        ("one.csv", CSV),
+        ("one.parquet", Format::Parquet),
+        ("one.arrow", Format::Arrow),
     ] {
         let path = folder.path().join(name);
+        let all = Selection::default();
         std::fs::write(&path, "mine").unwrap();
-        let refusal = export(&session, &Beside::default(), &path).unwrap_err();
+        let refusal = export(&session, format, &all, &path).unwrap_err();
         assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
         assert_eq!(std::fs::read(&path).unwrap(), b"mine");
         let nowhere = folder.path().join("no/such/folder").join(name);
         assert!(matches!(
-            export(&session, &Beside::default(), &nowhere),
+            export(&session, format, &all, &nowhere),
             Err(ExportError::Io { .. })
         ));
+        // Nor a dictionary that somebody wrote.
+        let path = folder.path().join(format!("two.{name}"));
+        std::fs::write(dictionary_path(&path), "mine").unwrap();
+        let refusal = export(&session, format, &all, &path).unwrap_err();
+        assert!(matches!(refusal, ExportError::Exists { .. }), "{refusal}");
+        assert!(!path.exists());
     }
     // No temporary file is left behind.
-    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 2);
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 6);
+}
+
+/// The samples of a CSV file, cell by cell, without its header.
+fn cells(path: &Path) -> Vec<Vec<String>> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let lines = text.lines().skip(1);
+    lines
+        .map(|line| line.split(',').map(String::from).collect())
+        .collect()
+}
+
+#[test]
+fn a_selection_is_what_a_plain_filter_finds() {
+    let folder = tempfile::tempdir().unwrap();
+    let session = session();
+    let found = |selection: &Selection, name: &str| -> Vec<usize> {
+        let path = folder.path().join(selection.file_name(name, "csv"));
+        let written = export(&session, CSV, selection, &path).unwrap();
+        let cells = cells(&path);
+        assert_eq!(cells.len() as u64, written);
+        cells.iter().map(|row| row[0].parse().unwrap()).collect()
+    };
+    let filtered = |takes: &dyn Fn(usize, &Row) -> bool| -> Vec<usize> {
+        let rows = session.rows.iter().enumerate();
+        rows.filter(|(i, row)| takes(*i, row))
+            .map(|(i, _)| i)
+            .collect()
+    };
+    let numbers = Selection {
+        columns: vec!["sample".into(), "force_N".into()],
+        ..Selection::default()
+    };
+    let phases = [session.rows[10].phase, session.rows[2000].phase];
+    let by_phase = Selection {
+        phases: phases.into(),
+        ..numbers.clone()
+    };
+    let expected = filtered(&|_, row| phases.contains(&row.phase));
+    assert!(!expected.is_empty() && expected.len() < 3000);
+    assert_eq!(found(&by_phase, "phase"), expected);
+
+    let cycle = session.rows[1500].cycle;
+    let by_cycle = Selection {
+        cycles: vec![cycle],
+        ..numbers.clone()
+    };
+    let expected = filtered(&|_, row| row.cycle == cycle);
+    assert!(!expected.is_empty() && expected.len() < 3000);
+    assert_eq!(found(&by_cycle, "cycle"), expected);
+
+    let (from, to) = (time_of(&session, 700), time_of(&session, 2100));
+    let by_time = Selection {
+        from_s: Some(from),
+        to_s: Some(to),
+        ..numbers.clone()
+    };
+    let within = |i: usize| (from..=to).contains(&time_of(&session, i));
+    assert_eq!(found(&by_time, "time"), filtered(&|i, _| within(i)));
+
+    // Thinned after the selection, and the name and the first column say so.
+    let thinned = Selection {
+        every: Some(7),
+        ..by_time
+    };
+    let expected: Vec<usize> = filtered(&|i, _| within(i)).into_iter().step_by(7).collect();
+    assert_eq!(found(&thinned, "thin"), expected);
+    let text = std::fs::read_to_string(folder.path().join("thin.every7.csv")).unwrap();
+    assert!(
+        text.starts_with("sample_every_7,sample,force_N\n"),
+        "{text:.60}"
+    );
+
+    let nothing = Selection {
+        from_s: Some(1e9),
+        ..numbers
+    };
+    assert_eq!(found(&nothing, "nothing"), [0usize; 0]);
+    let text = std::fs::read_to_string(folder.path().join("nothing.csv")).unwrap();
+    assert_eq!(text, "sample,force_N\n");
+    let unknown = Selection {
+        columns: vec!["force".into()],
+        ..Selection::default()
+    };
+    let path = folder.path().join("unknown.csv");
+    let refusal = export(&session, CSV, &unknown, &path).unwrap_err();
+    assert!(refusal.to_string().contains("force_N"), "{refusal}");
+    assert!(!path.exists());
+}
+
+#[test]
+fn text_that_looks_like_a_formula_is_harmless_and_numbers_stay_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = session();
+    session.rows.truncate(2);
+    session.rows[1].force = Some(-1.5);
+    for (hostile, expected) in [
+        ("=1+1", "'=1+1"),
+        ("+41 44", "'+41 44"),
+        ("-2", "'-2"),
+        ("@SUM(A1)", "'@SUM(A1)"),
+        ("\tx", "'\tx"),
+        ("\rx", "\"'\rx\""),
+        ("=\"a\";b", "\"'=\"\"a\"\";b\""),
+        ("liver 3", "liver 3"),
+    ] {
+        session.manifest.specimen = hostile.into();
+        let selection = Selection {
+            columns: vec!["specimen".into(), "force_N".into()],
+            from_s: Some(time_of(&session, 1)),
+            ..Selection::default()
+        };
+        let path = folder.path().join("one.csv");
+        export(&session, Format::Csv(b';'), &selection, &path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(text, format!("specimen;force_N\n{expected};-1.5\n"));
+        std::fs::remove_file(dictionary_path(&path)).unwrap();
+        std::fs::remove_file(path).unwrap();
+    }
+}
+
+#[test]
+fn the_dictionary_tells_every_column_of_the_table() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut session = session();
+    session.notes.push("a | b\nc".into());
+    for (name, selection) in [
+        ("all.csv", Selection::default()),
+        (
+            "some.csv",
+            Selection {
+                columns: vec!["status".into(), "t_s".into()],
+                every: Some(100),
+                ..Selection::default()
+            },
+        ),
+    ] {
+        let path = folder.path().join(name);
+        export(&session, CSV, &selection, &path).unwrap();
+        let text = std::fs::read_to_string(&path).unwrap();
+        let header: Vec<&str> = text.lines().next().unwrap().split(',').collect();
+        let told = std::fs::read_to_string(dictionary_path(&path)).unwrap();
+        let rows: Vec<Vec<&str>> = told
+            .lines()
+            .filter(|line| line.starts_with("| "))
+            .skip(1)
+            .map(|line| line.trim_matches('|').split('|').map(str::trim).collect())
+            .collect();
+        let names: Vec<&str> = rows.iter().map(|row| row[0]).collect();
+        assert_eq!(names, header);
+        // Every column has a type, a meaning and an origin.
+        assert!(
+            rows.iter()
+                .all(|row| row.len() == 5 && !row[2..].contains(&""))
+        );
+        assert!(told.contains("a \\| b c"), "{told}");
+        assert_eq!(told.contains("every 100th"), selection.every.is_some());
+    }
+}
+
+#[test]
+fn another_reader_finds_the_same_in_arrow() {
+    const SCRIPT: &str = "
+import json, sys
+try:
+    import pyarrow as pa
+except ImportError:
+    print('no pyarrow'); sys.exit(0)
+t = pa.ipc.open_file(sys.argv[1]).read_all()
+m = t.schema.metadata
+print(json.dumps([t.num_rows, t.column_names, json.loads(m[b'palpate.columns'])['force_N'], m[b'palpate.calibration_sha256'].decode(),
+    t['force_N'].to_pylist(), t['phase'].to_pylist(), t['pulses'].to_pylist(), t['t_s'].to_pylist()]))
+";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("one.arrow");
+    let session = session();
+    export(&session, Format::Arrow, &Selection::default(), &path).unwrap();
+    let run = Command::new("python3")
+        .args(["-c", SCRIPT])
+        .arg(&path)
+        .output();
+    let output = match run {
+        Ok(output) => output,
+        Err(err) => return println!("skipped: python3 does not run ({err})"),
+    };
+    let text = String::from_utf8_lossy(&output.stdout);
+    if text.trim() == "no pyarrow" {
+        return println!("skipped: python3 has no pyarrow");
+    }
+    let found: serde_json::Value = serde_json::from_str(&text)
+        .unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr)));
+    fn each<T: serde::Serialize>(
+        session: &Session,
+        of: impl Fn(usize, &Row) -> T,
+    ) -> serde_json::Value {
+        let rows = session.rows.iter().enumerate();
+        let all: Vec<T> = rows.map(|(i, row)| of(i, row)).collect();
+        serde_json::to_value(all).unwrap()
+    }
+    let names = "t_s depth_mm force_N signal_V counts pulses phase cycle";
+    let expected = serde_json::json!([
+        3000,
+        names.split(' ').collect::<Vec<_>>(),
+        "N",
+        value_of_hash(&session),
+        each(&session, |_, row| row.force),
+        each(&session, |_, row| row.phase.name()),
+        each(&session, |_, row| row.pulses),
+        each(&session, |i, _| time_of(&session, i)),
+    ]);
+    assert!(found == expected, "{text:.400}");
 }

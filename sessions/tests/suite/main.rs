@@ -13,6 +13,8 @@ mod foreign;
 #[cfg(test)]
 mod foreign_damage;
 #[cfg(test)]
+mod lake;
+#[cfg(test)]
 mod pace;
 #[cfg(test)]
 mod recovery;

@@ -126,7 +126,7 @@ pub(super) fn run(
 }
 
 /// The first signal ends after what is under way, the second at once.
-fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
+pub(super) fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure> {
     let is_ending = Arc::clone(is_ending);
     ctrlc::set_handler(move || {
         if is_ending.swap(true, Ordering::Relaxed) {

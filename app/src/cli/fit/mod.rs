@@ -4,6 +4,7 @@ mod batch;
 mod family;
 mod intervals;
 mod joint;
+mod lake;
 mod saved;
 pub(super) mod sources;
 
@@ -17,9 +18,10 @@ use clap::Args;
 use intervals::Intervals;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitOptions, FitReport, Systematic};
-use palpate_protocols::analysis::{self, SourceError, Stretch, Wanted};
+use palpate_protocols::analysis::{self, FitSource, SourceError, Stretch, Wanted};
 use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_sessions::import::ColumnNames;
+use palpate_sessions::lake::{Shard, is_lake};
 use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
@@ -28,7 +30,7 @@ use std::path::{Path, PathBuf};
 #[derive(Debug, Args)]
 pub struct FitArgs {
     /// Session folders, delimited tables with columns for time, depth and force, or folders in
-    /// which every session and table (.csv, .tsv, .mcap) is fitted
+    /// which every session and table (.csv, .tsv, .mcap) is fitted; or one lake, which keeps its fits
     #[arg(required = true, value_name = "SOURCE")]
     sources: Vec<PathBuf>,
     /// Hold a parameter, as NAME=VALUE; may be repeated
@@ -80,6 +82,9 @@ pub struct FitArgs {
     /// session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
+    /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
+    #[arg(long, value_name = "I/N", conflicts_with_all = ["share", "family"])]
+    shard: Option<Shard>,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
@@ -124,7 +129,11 @@ impl Recipe {
 
     fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
         let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
-        let mut source = analysis::read_analysed(path, columns, self.wanted, name)?;
+        self.finish(analysis::read_analysed(path, columns, self.wanted, name)?)
+    }
+
+    /// Fits what was read.
+    fn finish(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
         let compliance = self.corrections.apply(&mut source)?;
         let fitted = Fitted {
             compliance,
@@ -173,6 +182,14 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         analysis: args.analysis.clone(),
         corrections: args.corrections()?,
     };
+    if let [lake] = args.sources.as_slice()
+        && (is_lake(lake) || args.shard.is_some())
+    {
+        return lake::run(lake, args, &recipe, output);
+    }
+    if args.shard.is_some() {
+        return Err(Failure::usage("--shard is for a lake; name one lake"));
+    }
     if let Some(shared) = &args.share {
         return joint::run(&args.sources, shared, &recipe, output);
     }

@@ -75,6 +75,20 @@ pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     Ok(found)
 }
 
+/// Every session named, and every one in the folders named; tables are none.
+pub(in crate::cli) fn find_sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+    let is_table = |path: &PathBuf| path.is_file() && !has_ending(path, &[LOG]);
+    if let Some(table) = paths.iter().find(|path| is_table(path)) {
+        return Err(Failure::usage(format!(
+            "{} is no session; 'palpate import' makes one of a table",
+            table.display()
+        )));
+    }
+    let mut found = find(paths)?;
+    found.retain(|path| !is_table(path));
+    Ok(found)
+}
+
 /// A source that is looked at together with others.
 pub(in crate::cli) struct Recording {
     /// Its path, as given.

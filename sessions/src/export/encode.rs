@@ -1,0 +1,112 @@
+//! A table written frame by frame in one of the formats, so that memory does not grow with it.
+
+use super::harmless::harmless_frame;
+use polars::io::{csv, parquet};
+use polars::prelude::{
+    CompatLevel, CsvWriter, DataFrame, KeyValueMetadata, ParquetCompression, ParquetWriter,
+    PolarsError, PolarsResult, SchemaExt, SerWriter,
+};
+use polars_arrow::io::ipc::write::{FileWriter, WriteOptions};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::sync::{Arc, PoisonError};
+
+/// The format of a table.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Text with a header (RFC 4180), cells apart by this character: `.` as decimal mark, shortest digits
+    /// that read back to the same number, empty cells for missing values. A text that a spreadsheet
+    /// would take for a formula begins with `'`.
+    Csv(u8),
+    /// Apache Parquet, zstd.
+    Parquet,
+    /// An Apache Arrow IPC file, not compressed, which programs map into memory.
+    Arrow,
+}
+
+impl Format {
+    /// The ending of its files' names.
+    #[must_use]
+    pub fn ending(self) -> &'static str {
+        match self {
+            Self::Csv(_) => "csv",
+            Self::Parquet => "parquet",
+            Self::Arrow => "arrow",
+        }
+    }
+}
+
+/// Keys and texts about a table.
+pub(super) type Metadata = Vec<(String, String)>;
+
+pub(super) enum Encoder<W: Write> {
+    Csv(csv::write::BatchedWriter<W>),
+    Parquet(Box<parquet::write::BatchedWriter<W>>, Metadata),
+    Arrow(FileWriter<W>),
+}
+
+impl<W: Write> Encoder<W> {
+    /// Begins a table whose frames are like `empty`. CSV has no place for metadata.
+    pub fn new(
+        format: Format,
+        file: W,
+        empty: &DataFrame,
+        metadata: Metadata,
+    ) -> PolarsResult<Self> {
+        Ok(match format {
+            Format::Csv(delimiter) => {
+                let writer = CsvWriter::new(file).with_separator(delimiter);
+                let empty = harmless_frame(empty.clone())?;
+                Self::Csv(writer.batched(empty.schema())?)
+            }
+            Format::Parquet => {
+                let writer = ParquetWriter::new(file)
+                    .with_compression(ParquetCompression::Zstd(None))
+                    .batched(empty.schema())?;
+                Self::Parquet(Box::new(writer), metadata)
+            }
+            Format::Arrow => {
+                let schema = empty.schema().to_arrow(CompatLevel::oldest());
+                let options = WriteOptions { compression: None };
+                let mut writer = FileWriter::new(file, Arc::new(schema), None, options);
+                let pairs = metadata
+                    .iter()
+                    .map(|(key, text)| (key.as_str().into(), text.as_str().into()));
+                writer.set_custom_schema_metadata(Arc::new(pairs.collect::<BTreeMap<_, _>>()));
+                writer.start()?;
+                Self::Arrow(writer)
+            }
+        })
+    }
+
+    pub fn write(&mut self, frame: DataFrame) -> PolarsResult<()> {
+        match self {
+            Self::Csv(writer) => writer.write_batch(&harmless_frame(frame)?),
+            Self::Parquet(writer, _) => writer.write_batch(&frame),
+            Self::Arrow(writer) => frame
+                .iter_chunks(CompatLevel::oldest(), true)
+                .try_for_each(|chunk| writer.write(&chunk, None)),
+        }
+    }
+
+    pub fn finish(self) -> PolarsResult<()> {
+        match self {
+            Self::Csv(mut writer) => writer.finish(),
+            Self::Parquet(writer, metadata) => {
+                // The footer is written here and not by `finish`, which adds the frame's Arrow schema:
+                // with one in the file, Arrow readers show its metadata, which is empty, instead of ours
+                // (Arrow issue 8980). All our types are told by Parquet's own.
+                let KeyValueMetadata::Static(pairs) = KeyValueMetadata::from_static(metadata)
+                else {
+                    return Err(PolarsError::ComputeError("metadata is not static".into()));
+                };
+                let mut footer = writer
+                    .get_writer()
+                    .lock()
+                    .unwrap_or_else(PoisonError::into_inner);
+                footer.end(Some(pairs)).map(|_bytes| ())
+            }
+            Self::Arrow(mut writer) => writer.finish(),
+        }
+    }
+}

@@ -1,0 +1,99 @@
+//! Which samples a table holds.
+
+use super::columns::Numbered;
+use palpate_model::rig::Phase;
+use serde::Serialize;
+
+/// Which samples and columns are wanted. The default is all samples and the usual columns.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Selection {
+    /// Phases; empty for all.
+    pub phases: Vec<Phase>,
+    /// Cycles; empty for all.
+    pub cycles: Vec<u32>,
+    /// Names of columns; empty for the usual ones.
+    pub columns: Vec<String>,
+    /// Earliest time in s since the session's first sample.
+    pub from_s: Option<f64>,
+    /// Latest time in s.
+    pub to_s: Option<f64>,
+    /// Only every so many of the samples that are left; `None` for each. None is averaged.
+    pub every: Option<u64>,
+}
+
+#[derive(Serialize)]
+struct Told<'a> {
+    phases: Vec<&'a str>,
+    cycles: &'a [u32],
+    from_s: Option<f64>,
+    to_s: Option<f64>,
+    every: u64,
+}
+
+impl Selection {
+    /// Whether a sample is wanted, apart from [`Self::every`].
+    pub(super) fn takes(&self, (_, t, row): &Numbered) -> bool {
+        (self.phases.is_empty() || self.phases.contains(&row.phase))
+            && (self.cycles.is_empty() || self.cycles.contains(&row.cycle))
+            && self.from_s.is_none_or(|from| *t >= from)
+            && self.to_s.is_none_or(|to| *t <= to)
+    }
+
+    /// Whether some samples are left out.
+    #[must_use]
+    pub fn is_part(&self) -> bool {
+        let all = Self {
+            columns: self.columns.clone(),
+            ..Self::default()
+        };
+        *self != all
+    }
+
+    pub(super) fn step(&self) -> u64 {
+        self.every.unwrap_or(1).max(1)
+    }
+
+    /// The name of a table: a thinned one says so.
+    #[must_use]
+    pub fn file_name(&self, stem: &str, ending: &str) -> String {
+        match self.step() {
+            1 => format!("{stem}.{ending}"),
+            every => format!("{stem}.every{every}.{ending}"),
+        }
+    }
+
+    /// As one JSON object, for metadata.
+    pub(super) fn told(&self) -> String {
+        let told = Told {
+            phases: self.phases.iter().map(|phase| phase.name()).collect(),
+            cycles: &self.cycles,
+            from_s: self.from_s,
+            to_s: self.to_s,
+            every: self.step(),
+        };
+        serde_json::json!(told).to_string()
+    }
+
+    /// One sentence for people.
+    pub(super) fn sentence(&self) -> String {
+        let mut parts = Vec::new();
+        if !self.phases.is_empty() {
+            let names: Vec<&str> = self.phases.iter().map(|phase| phase.name()).collect();
+            parts.push(format!("phases {}", names.join(", ")));
+        }
+        if !self.cycles.is_empty() {
+            let numbers: Vec<String> = self.cycles.iter().map(u32::to_string).collect();
+            parts.push(format!("cycles {}", numbers.join(", ")));
+        }
+        parts.extend(self.from_s.map(|from| format!("from {from} s")));
+        parts.extend(self.to_s.map(|to| format!("to {to} s")));
+        if self.step() > 1 {
+            let every = self.step();
+            parts.push(format!("every {every}th sample of these, none averaged"));
+        }
+        match parts.is_empty() {
+            true => "All samples of the session.".into(),
+            false => format!("A part of the session: {}.", parts.join("; ")),
+        }
+    }
+}

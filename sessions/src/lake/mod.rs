@@ -1,0 +1,23 @@
+//! A lake: many sessions as Parquet files that other programs query as one table, and that can be made
+//! sessions again to the bit.
+//!
+//! ```text
+//! v1/samples/rig=R/month=YYYY-MM/ID.parquet     one row per sample
+//! v1/sessions/rig=R/month=YYYY-MM/ID.parquet    one row: what the session says about itself
+//! v1/events/rig=R/month=YYYY-MM/ID.parquet      one row per input, decision and fit
+//! v1/fits/model=M/ID.json                       one fit
+//! ```
+//!
+//! The session's name is a column and the name of the file, never a folder: there are too many. Files
+//! appear whole under their names and never change.
+
+mod fits;
+mod layout;
+mod read;
+mod rows;
+mod write;
+
+pub use fits::{FitFile, FitState, keep_fit, state_of_fit};
+pub use layout::{LAKE_VERSION, Shard, ShardError, is_lake};
+pub use read::{InLake, LakeError, read_session, sessions};
+pub use write::{Added, Told, add};

@@ -1,0 +1,217 @@
+//! Sessions out of a lake.
+
+use super::layout::{Part, is_lake, part};
+use super::rows::rows;
+use super::write::kind_name;
+use crate::log::Session;
+use crate::manifest::{Manifest, RECORD_VERSION};
+use crate::record::{Entry, EntryKind};
+use palpate_model::Nanos;
+use polars::prelude::{DataFrame, ParquetReader, PolarsError, PolarsResult, SerReader};
+use std::fs::{self, File};
+use std::io;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// A lake, or a session in it, could not be read.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LakeError {
+    /// The folder is none.
+    #[error("{} is not a lake: it has no v1/samples and v1/sessions; make one with 'palpate export SESSION... --lake FOLDER'", path.display())]
+    NoLake {
+        /// The folder.
+        path: PathBuf,
+    },
+    /// A file holds something else than a lake's.
+    #[error("{} cannot be read ({reason}); export its session again to another lake", path.display())]
+    Bad {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// It was written by a newer version.
+    #[error("{} is a session of record version {version}, newer than this program; update palpate", path.display())]
+    Newer {
+        /// The file.
+        path: PathBuf,
+        /// Its version.
+        version: u32,
+    },
+    /// The system refused.
+    #[error("cannot read {} ({source}); check its permissions", path.display())]
+    Io {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
+}
+
+/// A session of a lake.
+#[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct InLake {
+    /// Its name.
+    pub id: String,
+    /// Its folder below that of each part.
+    place: PathBuf,
+}
+
+/// Every session of a lake, by name. Files that are being written are not listed.
+pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
+    if !is_lake(lake) {
+        return Err(LakeError::NoLake { path: lake.into() });
+    }
+    let top = part(lake, Part::Sessions);
+    let mut found = Vec::new();
+    // rig=R, then month=YYYY-MM.
+    for rig in names(&top)? {
+        let rig_folder = top.join(&rig);
+        for month in folders(&rig_folder)? {
+            let place = Path::new(&rig).join(&month);
+            for name in names(&top.join(&place))? {
+                let id = name.strip_suffix(".parquet");
+                found.extend(id.map(|id| InLake {
+                    id: id.to_owned(),
+                    place: place.clone(),
+                }));
+            }
+        }
+    }
+    found.sort();
+    Ok(found)
+}
+
+fn folders(folder: &Path) -> Result<Vec<String>, LakeError> {
+    match folder.is_dir() {
+        true => names(folder),
+        false => Ok(Vec::new()),
+    }
+}
+
+/// Names in a folder that are not hidden.
+fn names(folder: &Path) -> Result<Vec<String>, LakeError> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let failed = |source| LakeError::Io {
+        path: folder.into(),
+        source,
+    };
+    let mut found = Vec::new();
+    for one in fs::read_dir(folder).map_err(failed)? {
+        let name = one.map_err(failed)?.file_name();
+        let name = name.to_str().filter(|name| !name.starts_with('.'));
+        found.extend(name.map(str::to_owned));
+    }
+    Ok(found)
+}
+
+/// A session as it was put in, its edits made, and why it was rejected, if it was.
+pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String>), LakeError> {
+    let path = |of| {
+        let folder = part(lake, of).join(&one.place);
+        folder.join(format!("{}.parquet", one.id))
+    };
+    let about = path(Part::Sessions);
+    let (manifest, mut session, rejection) = with(&about, |frame| {
+        session_of(frame).map_err(|err| err.to_string())
+    })?;
+    if manifest.record_version > RECORD_VERSION {
+        return Err(LakeError::Newer {
+            path: about,
+            version: manifest.record_version,
+        });
+    }
+    let samples = path(Part::Samples);
+    let rows = with(&samples, |frame| rows(frame).map_err(|err| err.to_string()))?;
+    if rows.len() as u64 != session.samples {
+        return Err(LakeError::Bad {
+            reason: format!("{} samples of {}", rows.len(), session.samples),
+            path: samples,
+        });
+    }
+    let entries = with(&path(Part::Events), |frame| {
+        entries(frame).map_err(|err| err.to_string())
+    })?;
+    let session = Session {
+        path: samples,
+        manifest,
+        rows,
+        entries,
+        end: session.end.take(),
+        notes: session.notes,
+    };
+    Ok((session, rejection))
+}
+
+fn with<T>(
+    path: &Path,
+    take: impl FnOnce(&DataFrame) -> Result<T, String>,
+) -> Result<T, LakeError> {
+    let file = File::open(path).map_err(|source| LakeError::Io {
+        path: path.into(),
+        source,
+    })?;
+    let frame = ParquetReader::new(file)
+        .finish()
+        .map_err(|err| err.to_string());
+    frame
+        .and_then(|frame| take(&frame))
+        .map_err(|reason| LakeError::Bad {
+            path: path.into(),
+            reason,
+        })
+}
+
+/// What the sessions table tells beside the manifest.
+struct About {
+    samples: u64,
+    end: Option<crate::record::EndRecord>,
+    notes: Vec<String>,
+}
+
+fn bad(reason: impl ToString) -> PolarsError {
+    PolarsError::ComputeError(reason.to_string().into())
+}
+
+fn session_of(frame: &DataFrame) -> PolarsResult<(Manifest, About, Option<String>)> {
+    if frame.height() != 1 {
+        return Err(bad(format!("it has {} rows, not one", frame.height())));
+    }
+    let text = |name: &str| -> PolarsResult<Option<&str>> { Ok(frame.column(name)?.str()?.get(0)) };
+    let needed = |name: &str| text(name)?.ok_or_else(|| bad(format!("it has no {name}")));
+    let manifest = serde_json::from_str(needed("manifest")?).map_err(bad)?;
+    let about = About {
+        samples: frame.column("samples")?.u64()?.get(0).unwrap_or(0),
+        end: serde_json::from_str(needed("end")?).map_err(bad)?,
+        notes: serde_json::from_str(needed("notes")?).map_err(bad)?,
+    };
+    let is_rejected = text("verdict")? == Some("rejected");
+    let reason = text("verdict_reason")?.unwrap_or_default().to_owned();
+    Ok((manifest, about, is_rejected.then_some(reason)))
+}
+
+fn entries(frame: &DataFrame) -> PolarsResult<Vec<Entry>> {
+    let (kind, body) = (frame.column("kind")?.str()?, frame.column("body")?.str()?);
+    let number = |name: &str| frame.column(name)?.u64();
+    let (order, now) = (number("order")?, number("now_ns")?);
+    let after = number("after_sample")?;
+    let each = |index: usize| {
+        let value = |column: &polars::prelude::UInt64Chunked| {
+            column.get(index).ok_or_else(|| bad("a number is missing"))
+        };
+        let kind = kind.get(index).unwrap_or_default();
+        let kinds = [EntryKind::Input, EntryKind::Decision, EntryKind::Fit];
+        let found = kinds.into_iter().find(|known| kind_name(*known) == kind);
+        Ok(Entry {
+            kind: found.ok_or_else(|| bad(format!("kind {kind:?} is unknown")))?,
+            order: value(order)?,
+            after_sample: value(after)?,
+            now: Nanos(value(now)?),
+            body: serde_json::from_str(body.get(index).unwrap_or_default()).map_err(bad)?,
+        })
+    };
+    (0..frame.height()).map(each).collect()
+}

@@ -1,0 +1,149 @@
+//! A session into a lake.
+
+use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
+use super::rows::SAMPLE_COLUMNS;
+use crate::edits::Verdict;
+use crate::export::atomic::write_or_same;
+use crate::export::{Beside, ExportError, Feed, Kept, Selection, Table};
+use crate::log::Outline;
+use crate::record::{Entry, EntryKind};
+use crate::text::sha256;
+use polars::prelude::{
+    Column, DataFrame, IntoColumn, NamedFrom, ParquetCompression, ParquetWriter, PolarsResult,
+    Series,
+};
+use serde_json::json;
+use std::fs;
+use std::path::{Path, PathBuf};
+
+/// What is told of a session beside what it holds.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Told<'a> {
+    /// What it is worth, by whom and why.
+    pub verdict: Option<(Verdict, &'a str)>,
+}
+
+/// What became of a session.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Added {
+    /// File of its samples.
+    pub samples: PathBuf,
+    /// Whether every file of it was there before, and the same.
+    pub was_there: bool,
+}
+
+/// Adds a session to a lake. What is there already is the same, or the session is refused.
+pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Added, ExportError> {
+    let manifest = &outline.manifest;
+    let id = &manifest.session_id;
+    if !is_file_name(id) {
+        return Err(ExportError::BadName { name: id.clone() });
+    }
+    let place = |of| -> Result<PathBuf, ExportError> {
+        let folder = part(lake, of).join(partition(manifest));
+        fs::create_dir_all(&folder).map_err(|source| ExportError::Io {
+            path: folder.clone(),
+            source,
+        })?;
+        Ok(folder.join(format!("{id}.parquet")))
+    };
+    let samples = place(Part::Samples)?;
+    let table = Table {
+        manifest,
+        notes: &outline.notes,
+        beside: &Beside {
+            columns: Vec::new(),
+            metadata: vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())],
+        },
+        selection: &Selection {
+            columns: SAMPLE_COLUMNS.map(String::from).into(),
+            ..Selection::default()
+        },
+    };
+    let mut kept = vec![table.write_to_lake(&samples, feed)?];
+    kept.push(write_frame(&place(Part::Events)?, events(outline))?);
+    // The last, for it is what a reader goes by: a session that is listed is there with all its files.
+    kept.push(write_frame(
+        &place(Part::Sessions)?,
+        session(outline, told),
+    )?);
+    Ok(Added {
+        samples,
+        was_there: kept.iter().all(|one| *one == Kept::Same),
+    })
+}
+
+fn write_frame(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Kept, ExportError> {
+    let failed = |source| ExportError::Table {
+        path: path.to_owned(),
+        source,
+    };
+    let mut frame = frame.map_err(failed)?;
+    write_or_same(path, |file| {
+        let writer = ParquetWriter::new(file).with_compression(ParquetCompression::Zstd(None));
+        writer.finish(&mut frame).map_err(failed).map(|_bytes| ())
+    })
+}
+
+/// The name of a kind of entry.
+pub(super) const fn kind_name(kind: EntryKind) -> &'static str {
+    match kind {
+        EntryKind::Input => "input",
+        EntryKind::Decision => "decision",
+        EntryKind::Fit => "fit",
+    }
+}
+
+fn events(outline: &Outline) -> PolarsResult<DataFrame> {
+    let entries = &outline.entries;
+    let id = outline.manifest.session_id.as_str();
+    fn each<T>(entries: &[Entry], of: impl Fn(&Entry) -> T) -> Vec<T> {
+        entries.iter().map(of).collect()
+    }
+    let columns = [
+        Series::new("session_id".into(), vec![id; entries.len()]),
+        Series::new("kind".into(), each(entries, |one| kind_name(one.kind))),
+        Series::new("order".into(), each(entries, |one| one.order)),
+        Series::new("after_sample".into(), each(entries, |one| one.after_sample)),
+        Series::new("now_ns".into(), each(entries, |one| one.now.0)),
+        Series::new("body".into(), each(entries, |one| one.body.to_string())),
+    ];
+    DataFrame::new(entries.len(), columns.map(Column::from).into())
+}
+
+fn session(outline: &Outline, told: Told) -> PolarsResult<DataFrame> {
+    let manifest = &outline.manifest;
+    let text = |name: &str, text: &str| Series::new(name.into(), [text]).into_column();
+    let word = |name: &str, text: Option<&str>| Series::new(name.into(), [text]).into_column();
+    let number = |name: &str, value: u64| Series::new(name.into(), [value]).into_column();
+    let named = |value: &serde_json::Value| value["name"].as_str().map(str::to_owned);
+    let calibration = &manifest.calibration;
+    let hash = (!calibration.is_null()).then(|| sha256(calibration.to_string().as_bytes()));
+    let end = outline.end.as_ref();
+    let ended = end.map(|end| end.ended_at.seconds().0);
+    let verdict = told.verdict.map(|(verdict, _)| verdict.to_string());
+    let columns = vec![
+        text("session_id", &manifest.session_id),
+        text("started_at", &manifest.started_at_text()),
+        text("operator", &manifest.operator),
+        text("specimen", &manifest.specimen),
+        text("indenter", &manifest.indenter),
+        word("protocol", named(&manifest.plan).as_deref()),
+        number("samples", outline.samples),
+        Series::new("duration_s".into(), [ended]).into_column(),
+        word("outcome", end.map(|end| end.outcome.as_str())),
+        word("verdict", verdict.as_deref()),
+        word("verdict_reason", told.verdict.map(|(_, reason)| reason)),
+        word("calibration", named(calibration).as_deref()),
+        word("calibration_sha256", hash.as_deref()),
+        text("software_version", &manifest.software_version),
+        number("record_version", manifest.record_version.into()),
+        number("lake_version", LAKE_VERSION.into()),
+        // JSON, from which the session can be made again.
+        text("about", &json!(manifest.about).to_string()),
+        text("notes", &json!(outline.notes).to_string()),
+        text("manifest", &json!(manifest).to_string()),
+        text("end", &json!(outline.end).to_string()),
+    ];
+    DataFrame::new(1, columns)
+}

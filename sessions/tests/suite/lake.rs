@@ -1,0 +1,202 @@
+use crate::support::{end, log_bytes, open_bytes, rows};
+use palpate_model::Nanos;
+use palpate_sessions::edits::Verdict;
+use palpate_sessions::export::ExportError;
+use palpate_sessions::lake::{
+    Added, FitFile, FitState, LakeError, Told, add, is_lake, keep_fit, read_session, sessions,
+    state_of_fit,
+};
+use palpate_sessions::{Entry, EntryKind, Outline, Session};
+use std::fs;
+use std::path::{Path, PathBuf};
+
+fn session() -> Session {
+    let mut rows = rows(3000, 43);
+    rows[5].counts = None;
+    rows[6].volts = Some(1e-300);
+    rows[7].volts = None;
+    rows[8].pulses = None;
+    rows[9].force = Some(-0.0);
+    let entries = [
+        Entry {
+            kind: EntryKind::Input,
+            order: 0,
+            after_sample: 3,
+            now: Nanos(17),
+            body: serde_json::json!({"start": 0.1 + 0.2, "why": "µ \"q\"\n"}),
+        },
+        Entry {
+            kind: EntryKind::Decision,
+            order: 1,
+            after_sample: 4,
+            now: Nanos(18),
+            body: serde_json::json!({"effect": "record", "value": 1e-300}),
+        },
+    ];
+    open_bytes(&log_bytes(&rows, &entries, Some(end(Nanos(5_000_000_000))))).unwrap()
+}
+
+fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError> {
+    let outline = Outline {
+        path: session.path.clone(),
+        manifest: session.manifest.clone(),
+        samples: session.rows.len() as u64,
+        entries: session.entries.clone(),
+        end: session.end.clone(),
+        notes: session.notes.clone(),
+    };
+    add(lake, &outline, told, &mut |visit| {
+        session.rows.iter().for_each(visit);
+        Ok(())
+    })
+}
+
+fn files(folder: &Path) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    for entry in fs::read_dir(folder).unwrap() {
+        let path = entry.unwrap().path();
+        match path.is_dir() {
+            true => found.extend(files(&path)),
+            false => found.push(path),
+        }
+    }
+    found.sort();
+    found
+}
+
+#[test]
+fn a_session_comes_out_of_a_lake_as_it_went_in() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path();
+    let session = session();
+    assert!(!is_lake(lake));
+    assert!(matches!(sessions(lake), Err(LakeError::NoLake { .. })));
+    let verdict = Some((Verdict::Rejected, "slipped"));
+    let added = put(lake, &session, Told { verdict }).unwrap();
+    assert!(!added.was_there);
+    let id = &session.manifest.session_id;
+    let expected = ["events", "samples", "sessions"]
+        .map(|part| lake.join(format!("v1/{part}/rig=sim/month=2026-03/{id}.parquet")));
+    assert_eq!(files(lake), expected);
+    assert_eq!(added.samples, expected[1]);
+
+    let listed = sessions(lake).unwrap();
+    assert_eq!(listed.len(), 1);
+    assert_eq!(listed[0].id, *id);
+    let (mut back, rejection) = read_session(lake, &listed[0]).unwrap();
+    assert_eq!(rejection.as_deref(), Some("slipped"));
+    back.path.clone_from(&session.path);
+    assert!(back == session, "the session is another one");
+    let sign = back.rows[9].force.unwrap().is_sign_negative();
+    assert!(sign, "minus zero lost its sign");
+}
+
+#[test]
+fn files_of_a_lake_never_change() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path();
+    let session = session();
+    put(lake, &session, Told::default()).unwrap();
+    let before: Vec<Vec<u8>> = files(lake)
+        .iter()
+        .map(|path| fs::read(path).unwrap())
+        .collect();
+    // What a killed writer left, longer than what comes.
+    let samples = &files(lake)[1];
+    let name = samples.file_name().unwrap().to_string_lossy();
+    fs::write(
+        samples.with_file_name(format!(".{name}.tmp")),
+        vec![7; 1 << 20],
+    )
+    .unwrap();
+    assert!(put(lake, &session, Told::default()).unwrap().was_there);
+    let mut other = session.clone();
+    other.rows[100].force = Some(1.0);
+    let refusal = put(lake, &other, Told::default()).unwrap_err();
+    assert!(
+        matches!(refusal, ExportError::Different { .. }),
+        "{refusal}"
+    );
+    let after: Vec<Vec<u8>> = files(lake)
+        .iter()
+        .map(|path| fs::read(path).unwrap())
+        .collect();
+    assert!(before == after, "something changed or was left behind");
+}
+
+#[test]
+fn a_name_or_a_rig_never_leads_out_of_the_lake() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path().join("lake");
+    let mut session = session();
+    session.manifest.rig.as_mut().unwrap().name = "../../Rig 1".into();
+    put(&lake, &session, Told::default()).unwrap();
+    assert_eq!(sessions(&lake).unwrap().len(), 1);
+    assert!(
+        files(&lake)[0]
+            .to_string_lossy()
+            .contains("rig=..%2F..%2FRig%201/")
+    );
+    session.manifest.session_id = "../../evil".into();
+    let refusal = put(&lake, &session, Told::default()).unwrap_err();
+    assert!(matches!(refusal, ExportError::BadName { .. }), "{refusal}");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_damaged_lake_is_refused_in_words() {
+    let folder = tempfile::tempdir().unwrap();
+    let lake = folder.path();
+    put(lake, &session(), Told::default()).unwrap();
+    let one = sessions(lake).unwrap().remove(0);
+    for file in files(lake) {
+        let whole = fs::read(&file).unwrap();
+        for cut in [0, 4, whole.len() / 2, whole.len() - 1] {
+            fs::write(&file, &whole[..cut]).unwrap();
+            let refusal = read_session(lake, &one).unwrap_err();
+            assert!(matches!(refusal, LakeError::Bad { .. }), "{refusal}");
+        }
+        fs::remove_file(&file).unwrap();
+        let refusal = read_session(lake, &one).unwrap_err();
+        assert!(matches!(refusal, LakeError::Io { .. }), "{refusal}");
+        fs::write(&file, whole).unwrap();
+    }
+    read_session(lake, &one).unwrap();
+}
+
+#[test]
+fn a_fit_is_kept_once_and_made_with_other_settings_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = serde_json::json!({"fixed": ["f_offset=0"]});
+    let others = serde_json::json!({"fixed": []});
+    let file = FitFile {
+        lake: folder.path(),
+        model: "kelvin/3",
+        session_id: "20260305T141507Z-0badcafe",
+        settings: &settings,
+    };
+    assert_eq!(state_of_fit(&file).unwrap(), FitState::Missing);
+    keep_fit(&file, &serde_json::json!({"r2": 0.5})).unwrap();
+    assert_eq!(state_of_fit(&file).unwrap(), FitState::There);
+    let path = folder
+        .path()
+        .join("v1/fits/model=kelvin%2F3/20260305T141507Z-0badcafe.json");
+    assert_eq!(files(folder.path()), [path]);
+    let other = FitFile {
+        settings: &others,
+        ..file
+    };
+    assert!(matches!(
+        state_of_fit(&other),
+        Err(ExportError::Different { .. })
+    ));
+    assert!(keep_fit(&other, &serde_json::json!({"r2": 0.5})).is_err());
+    let evil = FitFile {
+        session_id: "../evil",
+        ..file
+    };
+    assert!(matches!(
+        keep_fit(&evil, &1),
+        Err(ExportError::BadName { .. })
+    ));
+}
