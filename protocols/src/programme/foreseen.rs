@@ -67,7 +67,7 @@ pub fn foresee(
             let refused = refused.map(|reason| Problem::error(task.line, reason));
             refusals.extend(refused);
             let warned = |reason| Problem::warning(task.line, told(reason));
-            notes.extend(plan.limits.unused(limits).into_iter().map(warned));
+            notes.extend(plan.limits.unused(limits).iter().map(warned));
             if !programme.is_acknowledged {
                 to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
                     let message = format!(

@@ -2,7 +2,7 @@
 
 use super::super::noise::{self, Blocks};
 use super::super::record::measured;
-use super::super::sample::{FitError, FitSample};
+use super::super::sample::{FitError, FitSample, Named};
 use super::super::triangle::{Factor, Triangle};
 use super::FamilyOptions;
 use super::descent::{GAIN_EXACT, Place, descend, place};
@@ -183,7 +183,7 @@ pub fn fit_body(
 pub(in super::super) fn refit_family(
     family: &dyn Family,
     options: FamilyOptions,
-) -> impl FnMut(&[(&str, &[FitSample])]) -> Result<Vec<f64>, FitError> {
+) -> impl FnMut(&[Named<'_>]) -> Result<Vec<f64>, FitError> {
     let mut known: Option<Vec<f64>> = None;
     move |records| {
         let problem = Problem::new(family, records, options)?;
