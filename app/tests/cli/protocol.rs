@@ -311,10 +311,10 @@ fn a_search_ends_before_the_base_where_the_technician_says_it_stands() {
     let columns = [
         "export",
         "short",
+        "--format",
+        "csv",
         "--columns",
         "position_mm",
-        "--out",
-        "short.csv",
     ];
     succeeded(&palpate(at, &columns));
     let table = std::fs::read_to_string(at.join("short.csv")).unwrap();
