@@ -308,19 +308,12 @@ fn a_search_ends_before_the_base_where_the_technician_says_it_stands() {
     assert_eq!(short.status.code(), Some(1));
     let words = "no tissue before 19.0 mm";
     assert!(stderr(&short).contains(words), "{}", stderr(&short));
-    let columns = [
-        "export",
-        "short",
-        "--format",
-        "csv",
-        "--columns",
-        "position_mm",
-    ];
+    let columns = ["export", "short", "--format", "csv", "--columns", "pulses"];
     succeeded(&palpate(at, &columns));
     let table = std::fs::read_to_string(at.join("short.csv")).unwrap();
     let furthest = table.lines().skip(1).map(|line| {
         let last = line.rsplit(',').next().unwrap();
-        last.parse::<f64>().unwrap()
+        0.015 * last.parse::<f64>().unwrap()
     });
     let furthest = furthest.fold(0.0, f64::max);
     // It did go all the way, and no pulse of 0.015 mm further.
