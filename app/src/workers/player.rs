@@ -3,16 +3,27 @@
 use palpate_model::Nanos;
 use palpate_protocols::replay::Player;
 use palpate_protocols::runner::Snapshot;
-use std::sync::mpsc::{Receiver, Sender, channel};
-use std::sync::{Arc, Mutex, PoisonError};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
 /// Samples between two pictures on a long way: some tens of milliseconds of work.
 const BATCH: usize = 20_000;
 
 /// The thread's near end.
 pub struct PlayerThread {
-    wanted: Sender<Nanos>,
-    shown: Arc<Mutex<Arc<Snapshot>>>,
+    desk: Arc<Desk>,
+    /// Says that something new is wanted; one word says it as well as many.
+    bell: SyncSender<()>,
+}
+
+/// What both ends see.
+struct Desk {
+    wanted: Mutex<Option<Nanos>>,
+    shown: Mutex<Arc<Snapshot>>,
+}
+
+fn locked<T>(value: &Mutex<T>) -> MutexGuard<'_, T> {
+    value.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
 impl PlayerThread {
@@ -21,45 +32,43 @@ impl PlayerThread {
         let Some(first) = player.snapshot(0) else {
             return Err("the session has no beginning".into());
         };
-        let shown = Arc::new(Mutex::new(Arc::new(first)));
-        let (wanted, asked) = channel();
-        let own = Arc::clone(&shown);
+        let desk = Arc::new(Desk {
+            wanted: Mutex::new(None),
+            shown: Mutex::new(Arc::new(first)),
+        });
+        let (bell, rung) = sync_channel(1);
+        let own = Arc::clone(&desk);
         std::thread::Builder::new()
             .name("player".into())
-            .spawn(move || play(&mut player, &asked, &own, &wake))
+            .spawn(move || play(&mut player, &rung, &own, &wake))
             .map_err(|err| format!("the player's thread cannot be started: {err}"))?;
-        Ok(Self { wanted, shown })
+        Ok(Self { desk, bell })
     }
 
     /// Asks for the run as it was at this session time. Never waits; a newer wish takes the place of an older.
     pub fn go_to(&self, time: Nanos) {
-        // The thread lives as long as this end of it.
-        let _ = self.wanted.send(time);
+        *locked(&self.desk.wanted) = Some(time);
+        // A bell that still rings will do.
+        let _ = self.bell.try_send(());
     }
 
     /// The newest picture.
     #[must_use]
     pub fn snapshot(&self) -> Arc<Snapshot> {
-        let shown = self.shown.lock().unwrap_or_else(PoisonError::into_inner);
-        Arc::clone(&shown)
+        Arc::clone(&locked(&self.desk.shown))
     }
 }
 
-fn play(
-    player: &mut Player,
-    asked: &Receiver<Nanos>,
-    shown: &Mutex<Arc<Snapshot>>,
-    wake: &impl Fn(),
-) {
-    let mut sequence = 0;
-    while let Ok(mut time) = asked.recv() {
+fn play(player: &mut Player, rung: &Receiver<()>, desk: &Desk, wake: &impl Fn()) {
+    let (mut sequence, mut time) = (0, Nanos::ZERO);
+    while rung.recv().is_ok() {
         let mut is_there = false;
         while !is_there {
-            time = asked.try_iter().last().unwrap_or(time);
+            time = locked(&desk.wanted).take().unwrap_or(time);
             is_there = player.go_to(time, BATCH);
             sequence += 1;
             if let Some(snapshot) = player.snapshot(sequence) {
-                *shown.lock().unwrap_or_else(PoisonError::into_inner) = Arc::new(snapshot);
+                *locked(&desk.shown) = Arc::new(snapshot);
             }
             wake();
         }
