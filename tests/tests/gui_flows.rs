@@ -14,6 +14,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
 use palpate_tests::flow::{FRAME, Flow, Window};
+use palpate_tests::workspace;
 
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {
