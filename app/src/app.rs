@@ -20,7 +20,7 @@ use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
 use crate::workers::select::Selected;
-use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use eframe::egui::{Context, Ui, ViewportCommand};
 use palpate_model::extremes::Row;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
@@ -260,10 +260,7 @@ impl WorkbenchApp {
                     Screen::Extremes => self.extremes.cancel(),
                 },
                 Command::Show(screen) => self.screen = screen,
-                Command::SwitchTheme => ctx.set_theme(match ctx.theme() {
-                    Theme::Dark => Theme::Light,
-                    Theme::Light => Theme::Dark,
-                }),
+                Command::SwitchTheme => theme::switch(ctx),
             }
             ctx.request_repaint();
         }

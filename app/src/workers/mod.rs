@@ -4,6 +4,7 @@ pub mod calibrations;
 pub mod extremes;
 pub mod fit;
 pub mod path_dialog;
+pub mod player;
 pub mod pool;
 pub mod ports;
 pub mod select;
