@@ -86,7 +86,7 @@ def main(words=None):
         print(f"{ended} of {args.shards} shards, about {left:.0f} s left", file=sys.stderr, flush=True)
     print(f"{totals['made']} fits made, {totals['were_there']} were there, {totals['rejected']} sessions rejected, "
           f"{len(failed)} of {args.shards} shards failed")
-    for shard, reasons in failed.items():
+    for shard, reasons in sorted(failed.items(), key=lambda one: int(one[0].partition("/")[0])):
         for reason in reasons:
             print(f"shard {shard}: {reason}", file=sys.stderr)
     return 1 if failed else 0
