@@ -4,14 +4,11 @@ use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
 use super::rows::SAMPLE_COLUMNS;
 use crate::edits::Verdict;
 use crate::export::atomic::write_or_same;
-use crate::export::{Beside, ExportError, Feed, Kept, Selection, Table};
+use crate::export::{Beside, Encoder, ExportError, Feed, Format, Kept, Selection, Table};
 use crate::log::Outline;
 use crate::record::{Entry, EntryKind};
 use crate::text::sha256;
-use polars::prelude::{
-    Column, DataFrame, IntoColumn, NamedFrom, ParquetCompression, ParquetWriter, PolarsResult,
-    Series,
-};
+use polars::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -78,10 +75,12 @@ fn write_frame(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Kept, Expo
         path: path.to_owned(),
         source,
     };
-    let mut frame = frame.map_err(failed)?;
+    let frame = frame.map_err(failed)?;
+    let metadata = vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())];
     write_or_same(path, |file| {
-        let writer = ParquetWriter::new(file).with_compression(ParquetCompression::Zstd(None));
-        writer.finish(&mut frame).map_err(failed).map(|_bytes| ())
+        let mut encoder = Encoder::new(Format::Parquet, file, &frame, metadata).map_err(failed)?;
+        encoder.write(frame).map_err(failed)?;
+        encoder.finish().map_err(failed)
     })
 }
 
