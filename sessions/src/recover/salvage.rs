@@ -11,7 +11,7 @@ use crate::manifest::Manifest;
 use crate::record::{Block, EndRecord, Entry};
 use mcap::records::op;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is left of a session, its samples apart.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,7 +35,6 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
         path: path.into(),
         source,
     };
-    let mut chunks = ChunkReader::new().map_err(failed)?;
     let mut kept = 0;
     let mut last_s = 0.0;
     let mut gaps = Vec::new();
@@ -60,33 +59,21 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     };
     let mut content = Content::new(!path.is_dir(), &mut note);
     content.allow_gaps();
-    let mut wounds = Vec::new();
-    for file in &files {
-        let wound = |offset: u64, reason: &str| Wound {
-            file: name_of(file),
-            offset,
-            reason: reason.into(),
-        };
-        if !file.is_file() {
-            wounds.push(wound(0, "this segment is missing"));
-            continue;
-        }
-        let source = Source::open(file).map_err(failed)?;
-        let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
-        if !is_ours && content.manifest.is_none() {
-            check_beginning(file, &source, is_ours)?;
-        }
-        content.begin_segment();
-        let found = go_through(&source, &mut chunks, &mut content, wound).map_err(failed)?;
-        if let Some(refusal) = content.refusal.take() {
-            // A first file that is another's is refused; a later one is left out.
-            if content.manifest.is_none() {
-                return Err(refused(file, refusal));
-            }
-            wounds.push(wound(0, "this segment is of another recording"));
-        }
-        wounds.extend(found);
+    let mut search = Search {
+        files: &files,
+        chunks: ChunkReader::new().map_err(failed)?,
+        content,
+        wounds: Vec::new(),
+    };
+    let mut next = 0;
+    while next < files.len() {
+        next = search.read(next)?;
     }
+    let Search {
+        mut content,
+        wounds,
+        ..
+    } = search;
     let (lost_entries, later) = (content.lost_entries, content.is_later_part);
     let entries = std::mem::take(&mut content.entries);
     let (manifest, end) = (content.manifest.take(), content.end.take());
@@ -122,58 +109,134 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     })
 }
 
-/// Reads what is whole of one file; returns what is not.
-fn go_through(
-    source: &Source,
-    chunks: &mut ChunkReader,
-    content: &mut Content<'_>,
-    wound: impl Fn(u64, &str) -> Wound,
-) -> io::Result<Vec<Wound>> {
-    let mut wounds = Vec::new();
-    let mut bytes = Vec::new();
-    let mut offset = mcap::MAGIC.len() as u64;
-    while offset < source.length() && content.refusal.is_none() {
-        let frame = source.frame_at(offset, &mut bytes)?;
-        let body = bytes.get(FRAME_HEADER_BYTES..).unwrap_or_default();
-        let (reason, next) = match frame {
-            Err(_) => ("a record's length is wrong".to_owned(), None),
-            Ok(frame) => match frame.opcode {
-                op::HEADER if offset == mcap::MAGIC.len() as u64 => {
-                    content.take_header(body);
-                    offset = frame.next;
-                    continue;
+/// Goes through the files of a session.
+struct Search<'f, 'v> {
+    files: &'f [PathBuf],
+    chunks: ChunkReader,
+    content: Content<'v>,
+    wounds: Vec<Wound>,
+}
+
+impl Search<'_, '_> {
+    /// Reads what is whole of one file; returns the number of the next one to read.
+    ///
+    /// Where a file is damaged and the next one was begun because of that, the next one is read first: it
+    /// has everything from before the damage on. What lies behind the damage may still go further.
+    fn read(&mut self, number: usize) -> Result<usize, ReadError> {
+        let file = &self.files[number];
+        let mut next = number + 1;
+        if !file.is_file() {
+            self.wound(file, 0, "this segment is missing");
+            return Ok(next);
+        }
+        let failed = |source| ReadError::Io {
+            path: file.clone(),
+            source,
+        };
+        let source = Source::open(file).map_err(failed)?;
+        let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
+        if !is_ours && self.content.manifest.is_none() {
+            check_beginning(file, &source, is_ours)?;
+        }
+        self.content.begin_segment();
+        let mut from = Some(mcap::MAGIC.len() as u64);
+        while let Some(offset) = from {
+            from = self.read_on(file, &source, offset).map_err(failed)?;
+            if from.is_some() && next == number + 1 && self.is_rewrite(next).map_err(failed)? {
+                let names = self.content.leave_segment();
+                next = self.read(next)?;
+                self.content.return_to_segment(names);
+            }
+        }
+        if let Some(refusal) = self.content.refusal.take() {
+            // A first file that is another's is refused; a later one is left out.
+            if self.content.manifest.is_none() {
+                return Err(refused(file, refusal));
+            }
+            self.wound(file, 0, "this segment is of another recording");
+        }
+        Ok(next)
+    }
+
+    fn wound(&mut self, file: &Path, offset: u64, reason: &str) {
+        self.wounds.push(Wound {
+            file: name_of(file),
+            offset,
+            reason: reason.into(),
+        });
+    }
+
+    /// Whether a file was begun because the one before failed.
+    fn is_rewrite(&mut self, number: usize) -> io::Result<bool> {
+        let Some(file) = self.files.get(number).filter(|file| file.is_file()) else {
+            return Ok(false);
+        };
+        let source = Source::open(file)?;
+        let mut ignore = |_: &Block| {};
+        let mut content = Content::new(true, &mut ignore);
+        content.allow_gaps();
+        let mut bytes = Vec::new();
+        let mut offset = mcap::MAGIC.len() as u64;
+        // It says so in the chunk after the manifest's.
+        while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
+            let had_manifest = content.has_manifest;
+            if frame.opcode == op::CHUNK {
+                let records = self.chunks.open(&bytes[FRAME_HEADER_BYTES..]);
+                let is_read = records.is_ok_and(|records| content.take_chunk(records).is_ok());
+                if !is_read || had_manifest {
+                    break;
                 }
-                op::CHUNK => match chunks
-                    .open(body)
-                    .and_then(|records| content.take_chunk(records))
-                {
-                    Ok(()) => {
+            }
+            offset = frame.next;
+        }
+        Ok(content.is_rewrite)
+    }
+
+    /// Reads to the end of a file, or to where it is damaged: then the place from which to go on.
+    fn read_on(&mut self, file: &Path, source: &Source, from: u64) -> io::Result<Option<u64>> {
+        let mut bytes = Vec::new();
+        let mut offset = from;
+        while offset < source.length() && self.content.refusal.is_none() {
+            let frame = source.frame_at(offset, &mut bytes)?;
+            let body = bytes.get(FRAME_HEADER_BYTES..).unwrap_or_default();
+            let (reason, next) = match frame {
+                Err(_) => ("a record's length is wrong".to_owned(), None),
+                Ok(frame) => match frame.opcode {
+                    op::HEADER if offset == mcap::MAGIC.len() as u64 => {
+                        self.content.take_header(body);
                         offset = frame.next;
                         continue;
                     }
-                    Err(reason) => (reason, Some(frame.next)),
+                    op::CHUNK => {
+                        let records = self.chunks.open(body);
+                        match records.and_then(|records| self.content.take_chunk(records)) {
+                            Ok(()) => {
+                                offset = frame.next;
+                                continue;
+                            }
+                            Err(reason) => (reason, Some(frame.next)),
+                        }
+                    }
+                    op::DATA_END | op::FOOTER => break,
+                    op::MESSAGE_INDEX | op::ATTACHMENT | op::METADATA | 0x80.. => {
+                        offset = frame.next;
+                        continue;
+                    }
+                    _ => ("a record is of an unexpected kind".to_owned(), None),
                 },
-                op::DATA_END | op::FOOTER => break,
-                op::MESSAGE_INDEX | op::ATTACHMENT | op::METADATA | 0x80.. => {
-                    offset = frame.next;
-                    continue;
-                }
-                _ => ("a record is of an unexpected kind".to_owned(), None),
-            },
-        };
-        // The damaged record's length may be right, or may lead anywhere: what lies at its end tells.
-        let resumed = match next {
-            Some(next) if is_record(source, next)? => Some(next),
-            _ => next_chunk(source, offset, chunks)?,
-        };
-        let is_torn = resumed.is_none() && !source.has_footer()?;
-        if !is_torn {
-            wounds.push(wound(offset, &reason));
+            };
+            // The damaged record's length may be right, or may lead anywhere: what lies at its end tells.
+            let resumed = match next {
+                Some(next) if is_record(source, next)? => Some(next),
+                _ => next_chunk(source, offset, &mut self.chunks)?,
+            };
+            if resumed.is_some() || source.has_footer()? {
+                self.wound(file, offset, &reason);
+            }
+            return Ok(resumed);
         }
-        let Some(place) = resumed else { break };
-        offset = place;
+        Ok(None)
     }
-    Ok(wounds)
 }
 
 /// Whether a record that follows a chunk, or the end, is at a place.

@@ -5,6 +5,8 @@ mod catalog;
 #[cfg(test)]
 mod damage;
 #[cfg(test)]
+mod disk;
+#[cfg(test)]
 mod exports;
 #[cfg(test)]
 mod faults;
@@ -16,6 +18,8 @@ mod foreign_damage;
 mod lake;
 #[cfg(test)]
 mod pace;
+#[cfg(test)]
+mod power;
 #[cfg(test)]
 mod recovery;
 #[cfg(test)]
