@@ -142,10 +142,13 @@ impl Search<'_, '_> {
         let mut from = Some(mcap::MAGIC.len() as u64);
         while let Some(offset) = from {
             from = self.read_on(file, &source, offset).map_err(failed)?;
-            if from.is_some() && next == number + 1 && self.is_rewrite(next).map_err(failed)? {
-                let names = self.content.leave_segment();
-                next = self.read(next)?;
-                self.content.return_to_segment(names);
+            if from.is_some() && next == number + 1 {
+                let until = self.rewrite_after(number).map_err(failed)?;
+                let left = self.content.leave_segment();
+                while next <= until {
+                    next = self.read(next)?;
+                }
+                self.content.return_to_segment(left);
             }
         }
         if let Some(refusal) = self.content.refusal.take() {
@@ -166,30 +169,17 @@ impl Search<'_, '_> {
         });
     }
 
-    /// Whether a file was begun because the one before failed.
-    fn is_rewrite(&mut self, number: usize) -> io::Result<bool> {
-        let Some(file) = self.files.get(number).filter(|file| file.is_file()) else {
-            return Ok(false);
-        };
-        let source = Source::open(file)?;
-        let mut ignore = |_: &Block| {};
-        let mut content = Content::new(true, &mut ignore);
-        content.allow_gaps();
-        let mut bytes = Vec::new();
-        let mut offset = mcap::MAGIC.len() as u64;
-        // It says so in the chunk after the manifest's.
-        while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
-            let had_manifest = content.has_manifest;
-            if frame.opcode == op::CHUNK {
-                let records = self.chunks.open(&bytes[FRAME_HEADER_BYTES..]);
-                let is_read = records.is_ok_and(|records| content.take_chunk(records).is_ok());
-                if !is_read || had_manifest {
-                    break;
-                }
+    /// The number of the file that was begun because this one failed; its own if none was. What was begun
+    /// in between and failed at once holds nothing.
+    fn rewrite_after(&mut self, number: usize) -> io::Result<usize> {
+        for (later, file) in self.files.iter().enumerate().skip(number + 1) {
+            match kind_of(file, &mut self.chunks)? {
+                Kind::Rewrite => return Ok(later),
+                Kind::Nothing => {}
+                Kind::Next => break,
             }
-            offset = frame.next;
         }
-        Ok(content.is_rewrite)
+        Ok(number)
     }
 
     /// Reads to the end of a file, or to where it is damaged: then the place from which to go on.
@@ -236,6 +226,50 @@ impl Search<'_, '_> {
             return Ok(resumed);
         }
         Ok(None)
+    }
+}
+
+/// What a file is to the one before.
+enum Kind {
+    /// It goes on where that one ends.
+    Next,
+    /// It was begun because that one failed.
+    Rewrite,
+    /// It holds no samples.
+    Nothing,
+}
+
+fn kind_of(file: &Path, chunks: &mut ChunkReader) -> io::Result<Kind> {
+    if !file.is_file() {
+        return Ok(Kind::Next);
+    }
+    let source = Source::open(file)?;
+    let mut ignore = |_: &Block| {};
+    let mut content = Content::new(true, &mut ignore);
+    content.allow_gaps();
+    let mut bytes = Vec::new();
+    let mut offset = mcap::MAGIC.len() as u64;
+    // A file says so in the chunk after the manifest's.
+    while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
+        let had_manifest = content.has_manifest;
+        if frame.opcode == op::CHUNK {
+            let records = chunks.open(&bytes[FRAME_HEADER_BYTES..]);
+            let is_read = records.is_ok_and(|records| content.take_chunk(records).is_ok());
+            if content.is_rewrite {
+                return Ok(Kind::Rewrite);
+            }
+            if !is_read {
+                break;
+            }
+            if had_manifest {
+                return Ok(Kind::Next);
+            }
+        }
+        offset = frame.next;
+    }
+    match next_chunk(&source, offset, chunks)? {
+        Some(_) => Ok(Kind::Next),
+        None => Ok(Kind::Nothing),
     }
 }
 
