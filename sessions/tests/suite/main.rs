@@ -15,6 +15,8 @@ mod foreign;
 #[cfg(test)]
 mod foreign_damage;
 #[cfg(test)]
+mod killed;
+#[cfg(test)]
 mod lake;
 #[cfg(test)]
 mod pace;
@@ -28,5 +30,7 @@ mod round_trip;
 mod segments;
 #[cfg(test)]
 mod support;
+#[cfg(test)]
+mod worker;
 #[cfg(test)]
 mod written_again;
