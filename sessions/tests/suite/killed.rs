@@ -102,7 +102,7 @@ fn sweep(
 
 /// Kills of each kind of call for each task: in the gate a few, in the soak script all.
 fn points() -> usize {
-    count_from("PALPATE_KILLS", 1)
+    count_from("PALPATE_KILLS", 3)
 }
 
 fn log_files(folder: &Path) -> Vec<PathBuf> {
@@ -170,6 +170,43 @@ fn a_killed_recording_has_everything_it_called_saved() {
     );
     // Samples are 1 ms apart.
     assert!(killed >= 5 && most_less <= 200, "{killed}, {most_less}");
+}
+
+/// What the simulated disk of the power cuts does, the real files do.
+#[test]
+fn a_session_is_on_the_disk_before_a_sample_is_taken() {
+    if let Some(reason) = hindrance() {
+        println!("skipped: {reason}");
+        return;
+    }
+    let parent = tempfile::tempdir().unwrap();
+    let folder = parent.path().join("sessions/one");
+    let trace = parent.path().join("trace");
+    let shown = trace.to_str().unwrap();
+    let calls = "trace=write,fdatasync,fsync";
+    let program = ["strace", "-f", "-y", "-qq", "-o", shown, "-e", calls];
+    let output = command(&program, "log 60", &folder).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    let text = fs::read_to_string(&trace).unwrap();
+    let place = |call: &str, path: &Path| {
+        let end = format!("<{}>", path.display());
+        let is_it = |line: &&str| line.contains(call) && line.contains(&end);
+        let found = text.lines().enumerate().find(|(_, line)| is_it(line));
+        found
+            .unwrap_or_else(|| panic!("no {call} of {end} in\n{text}"))
+            .0
+    };
+    let log = folder.join(LOG_FILE);
+    let first = text.lines().position(|line| line.contains("\"taken \""));
+    let order = [
+        place("fsync", parent.path()),
+        place("write", &log),
+        place("fdatasync", &log),
+        place("fsync", &folder),
+        first.unwrap(),
+    ];
+    assert!(order.is_sorted(), "{order:?} in\n{text}");
+    assert!(place("fsync", &parent.path().join("sessions")) < order[4]);
 }
 
 #[test]
