@@ -15,6 +15,8 @@ mod foreign;
 #[cfg(test)]
 mod foreign_damage;
 #[cfg(test)]
+mod hostile;
+#[cfg(test)]
 mod killed;
 #[cfg(test)]
 mod lake;

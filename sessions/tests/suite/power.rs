@@ -15,14 +15,14 @@ const BATCH: usize = 100;
 /// Batches between two synchronisations when there is no event; `log::scribe` tests that it is no more.
 const BATCHES_PER_SYNC: usize = 9;
 
-struct Recording {
-    rows: Vec<Row>,
-    entries: Vec<Entry>,
-    trace: Vec<Traced>,
+pub struct Recording {
+    pub rows: Vec<Row>,
+    pub entries: Vec<Entry>,
+    pub trace: Vec<Traced>,
 }
 
 impl Recording {
-    fn new(samples: usize, seed: u64) -> Self {
+    pub fn new(samples: usize, seed: u64) -> Self {
         let rows = rows(samples, seed);
         // Answers of the live fit, which wait for the next synchronisation, and a few events, which do not.
         let mut entries = entries(&rows, 130);
@@ -39,7 +39,7 @@ impl Recording {
     }
 
     /// Written as the writer thread does it, but step by step, and the caller told of every synchronisation.
-    fn by_log(mut self, batches_per_segment: u32, fail_at: &[u32]) -> Self {
+    pub fn by_log(mut self, batches_per_segment: u32, fail_at: &[u32]) -> Self {
         let disk = Disk::new(fail_at);
         let outcome = self.write(&disk, batches_per_segment);
         assert!(outcome.is_ok() || !fail_at.is_empty(), "{outcome:?}");

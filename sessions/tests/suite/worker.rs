@@ -1,6 +1,7 @@
 //! What other tests do in a process of its own, which is this program started again: to kill it, to limit it, or to let
 //! two do something at the same time.
 
+use crate::hostile;
 use crate::support::{end, entries, manifest, rows};
 use chrono::DateTime;
 use palpate_model::Nanos;
@@ -64,14 +65,19 @@ fn does_its_task() {
     };
     let folder = PathBuf::from(std::env::var_os("PALPATE_WORKER_FOLDER").unwrap());
     let mut words = task.split(' ');
-    let (what, number) = (words.next().unwrap(), words.next());
-    let number = number.map_or(0, |word| word.parse().unwrap());
+    let what = words.next().unwrap();
+    let name = words.next().filter(|word| word.parse::<usize>().is_err());
+    let number = task.rsplit(' ').next().and_then(|word| word.parse().ok());
+    let number = number.unwrap_or(0);
     match what {
         "log" => write_log(&folder, number),
         "session" => write_session(&folder, number),
         "recover" => recover_session(&folder),
         "edits" => write_edits(&folder, number),
         "journal" => write_journal(&folder, number),
+        "damage" => hostile::damage(&folder, name.unwrap(), number),
+        "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
+        "greed" => hostile::be_greedy(number),
         other => panic!("no task is called {other}"),
     }
 }
