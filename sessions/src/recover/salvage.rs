@@ -1,12 +1,12 @@
 //! Goes through a session's files and keeps everything that is whole.
 
 use super::{Gap, Missing, Wound};
-use crate::log::ReadError;
 use crate::log::content::Content;
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
 use crate::log::reader::{NOT_BEGUN, check_beginning, damaged, find_files, name_of, refused};
 use crate::log::source::Source;
 use crate::log::walk::next_chunk;
+use crate::log::{ReadError, Session};
 use crate::manifest::Manifest;
 use crate::record::{Block, EndRecord, Entry};
 use mcap::records::op;
@@ -30,6 +30,26 @@ pub struct Salvage {
 
 /// Hands out every block of samples that is whole, in order, and tells what is missing.
 pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
+    let mut left = blocks(path, visit)?;
+    // All that is kept may be whole and the file still be damaged where none of it is, as in its index.
+    if !left.missing.is_lossy()
+        && let Err(ReadError::Damaged {
+            path,
+            offset,
+            reason,
+        }) = Session::scan(path, &mut |_| {})
+    {
+        left.missing.wounds.push(Wound {
+            file: name_of(&path),
+            offset,
+            reason,
+        });
+    }
+    Ok(left)
+}
+
+/// As [`salvage`], and only what lies where samples are is looked at.
+pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     let failed = |source| ReadError::Io {
         path: path.into(),

@@ -1,5 +1,6 @@
 //! Writes what is left of a session as a session of its own, beside the original.
 
+use super::salvage::blocks;
 use super::{Missing, Salvage, salvage};
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
 use crate::log::{FileSink, LogError, LogWriter, ReadError};
@@ -187,7 +188,7 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         last = block.last_time().unwrap_or(last);
         outcome = log.append(&rows, &entries);
     };
-    salvage(path, &mut visit)?;
+    blocks(path, &mut visit)?;
     outcome?;
     let rest: Vec<Entry> = pending
         .map(|entry| Entry {

@@ -204,7 +204,7 @@ fn session(name: &'static str, is_finished: bool) -> Kind {
     Kind::new(name, LOG_FILE, bytes, Box::new(read))
 }
 
-/// A session in four files, one of them begun because another failed.
+/// A session in five files, one of them begun because another failed.
 fn segments() -> Kind {
     let recording = Recording::new(1800, 12).by_log(7, &[16]);
     let folder = quick_folder();
@@ -223,7 +223,7 @@ fn segments() -> Kind {
     };
     let read = move |folder: &Path| original.read(&folder.join("session"));
     let mut kind = Kind::of_folder("session-in-segments", folder.path(), Box::new(read));
-    assert_eq!(kind.files.len(), 4);
+    assert_eq!(kind.files.len(), 5);
     for (place, _) in &mut kind.files {
         *place = Path::new("session").join(&*place);
     }
