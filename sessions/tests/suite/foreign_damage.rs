@@ -59,6 +59,14 @@ fn an_archive_that_unpacks_to_too_much_is_refused() {
     assert!(reason.contains("more texts than it has bytes"), "{reason}");
 }
 
+/// Found by damaging the workbook at random: 5632 bytes made the reader ask for 180 MB.
+#[test]
+fn a_small_workbook_with_a_cell_far_away_is_refused() {
+    let corpus = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/corpus/foreign");
+    let reason = reason_of(fs::read(corpus.join("wide-xls")).unwrap());
+    assert!(reason.contains("span more than"), "{reason}");
+}
+
 #[test]
 fn a_sheet_that_claims_the_whole_world_is_refused() {
     let data = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/data");

@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Why processes cannot be killed at a system call here; `None` if they can.
-fn hindrance() -> Option<String> {
+pub fn hindrance() -> Option<String> {
     let outcome = Command::new("strace")
         .args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=write", "true"])
         .output();

@@ -21,6 +21,8 @@ mod killed;
 #[cfg(test)]
 mod lake;
 #[cfg(test)]
+mod limits;
+#[cfg(test)]
 mod pace;
 #[cfg(test)]
 mod power;

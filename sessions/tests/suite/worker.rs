@@ -1,8 +1,8 @@
 //! What other tests do in a process of its own, which is this program started again: to kill it, to limit it, or to let
 //! two do something at the same time.
 
-use crate::hostile;
 use crate::support::{end, entries, manifest, rows};
+use crate::{hostile, limits};
 use chrono::DateTime;
 use palpate_model::Nanos;
 use palpate_sessions::journal::Journal;
@@ -75,6 +75,10 @@ fn does_its_task() {
         "recover" => recover_session(&folder),
         "edits" => write_edits(&folder, number),
         "journal" => write_journal(&folder, number),
+        "spare" => limits::record_with_spare(&folder, number),
+        "little" => limits::record_in_little_memory(&folder, number),
+        "catalog" => limits::update_catalog(&folder),
+        "hold" => hold(&folder),
         "damage" => hostile::damage(&folder, name.unwrap(), number),
         "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
         "greed" => hostile::be_greedy(number),
@@ -127,6 +131,13 @@ fn write_session(folder: &Path, samples: usize) {
         .close(end(Nanos::from_millis(samples as u64)))
         .unwrap();
     eprintln!("saved {samples}");
+}
+
+/// Holds a folder until its input ends.
+fn hold(folder: &Path) {
+    let _held = SessionFolder::create(folder).unwrap();
+    eprintln!("saved 0");
+    std::io::read_to_string(std::io::stdin()).unwrap();
 }
 
 fn recover_session(folder: &Path) {

@@ -40,7 +40,7 @@ fn put(path: &Path, bytes: &[u8]) {
 }
 
 /// From now on this process may not take more than so many bytes more.
-fn limit_memory(more: u64) {
+pub fn limit_memory(more: u64) {
     let pages = fs::read_to_string("/proc/self/statm").expect("this is Linux");
     let pages = pages
         .split(' ')
