@@ -461,7 +461,7 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
         signal("CONT");
     }
     assert_eq!(child.wait().unwrap().code(), Some(0));
-    let session = Session::open(&at.join("slept")).unwrap();
+    let session = palpate_sessions::Session::open(&at.join("slept")).unwrap();
     assert!(session.end.is_some());
     let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
