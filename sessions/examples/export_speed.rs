@@ -30,7 +30,10 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         selection: &Selection::default(),
     };
     let from_log = timed(&table, &folder.join("from_log.parquet"), &mut |take| {
-        Session::scan(session, &mut |block| block.rows().for_each(|row| take(&row))).map(|_| ())
+        Session::scan(session, &mut |block| {
+            block.rows().for_each(|row| take(&row))
+        })
+        .map(|_| ())
     })?;
     let from_memory = timed(&table, &folder.join("from_memory.parquet"), &mut |take| {
         whole.rows.iter().for_each(&mut *take);
