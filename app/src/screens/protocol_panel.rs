@@ -18,6 +18,8 @@ pub struct ProtocolFacts<'a> {
     pub is_busy: bool,
     /// Where sessions go if no folder is chosen, or why nowhere.
     pub library: &'a Result<String, String>,
+    /// What was recovered of sessions that a crash left unfinished, a line each.
+    pub recovered: &'a [String],
     /// Whether the folder dialog is open.
     pub is_dialog_open: bool,
 }
@@ -114,6 +116,12 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     }
     if let Err(reason) = &field.value {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    }
+    if !facts.recovered.is_empty() {
+        ui.label("Recovered after a crash");
+        for line in facts.recovered {
+            ui.add(Label::new(RichText::new(line).small()).wrap());
+        }
     }
 }
 
