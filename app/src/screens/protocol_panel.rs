@@ -117,12 +117,6 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     if let Err(reason) = &field.value {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
     }
-    if !facts.recovered.is_empty() {
-        ui.label("Recovered after a crash");
-        for line in facts.recovered {
-            ui.add(Label::new(RichText::new(line).small()).wrap());
-        }
-    }
 }
 
 /// Whether it stands in the form: it always does, or the protocol asks for it.
@@ -197,6 +191,12 @@ fn folder_ui(
     });
     if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    }
+    if !facts.recovered.is_empty() {
+        ui.label("Recovered after a crash");
+        for line in facts.recovered {
+            ui.add(Label::new(RichText::new(line).small()).wrap());
+        }
     }
 }
 
