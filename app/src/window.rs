@@ -271,6 +271,7 @@ impl WorkbenchApp {
         let facts = ProtocolFacts {
             is_busy,
             library: &self.library,
+            recovered: self.recovery.told(),
             is_dialog_open: self.dialog.is_open(),
         };
         CentralPanel::no_frame().show(ui, |ui| {
@@ -291,6 +292,7 @@ impl WorkbenchApp {
                 let facts = ProtocolFacts {
                     is_busy: self.is_busy(),
                     library: &self.library,
+                    recovered: self.recovery.told(),
                     is_dialog_open: self.dialog.is_open(),
                 };
                 self.chooser.ui(ui, &self.form, &facts, commands);

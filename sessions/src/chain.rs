@@ -6,6 +6,7 @@
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON
 //! of the body with its keys in alphabetical order.
 
+use crate::folder::{create_folder, sync_folder_of};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -123,7 +124,7 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
         source,
     };
     if let Some(folder) = path.parent() {
-        std::fs::create_dir_all(folder).map_err(failed)?;
+        create_folder(folder).map_err(failed)?;
     }
     let mut options = OpenOptions::new();
     let mut file = options
@@ -144,7 +145,11 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
         checksum: checksum(chain.last, &body),
         body,
     };
-    write_line(&mut file, &line).map_err(failed)
+    write_line(&mut file, &line).map_err(failed)?;
+    if chain.bodies.is_empty() {
+        sync_folder_of(path).map_err(failed)?;
+    }
+    Ok(())
 }
 
 fn write_line(file: &mut File, line: &Line) -> io::Result<()> {

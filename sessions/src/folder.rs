@@ -80,7 +80,7 @@ impl SessionFolder {
         if path.exists() && !path.is_dir() {
             return Err(FolderError::NotAFolder { path: path.into() });
         }
-        fs::create_dir_all(path).map_err(failed)?;
+        create_folder(path).map_err(failed)?;
         let lock_path = path.join(LOCK_FILE);
         let had_lock = lock_path.exists();
         if !had_lock && holds_more_than_lock(path).map_err(failed)? {
@@ -109,6 +109,23 @@ impl SessionFolder {
     pub fn log_path(&self) -> PathBuf {
         self.path.join(LOG_FILE)
     }
+}
+
+/// Makes a folder and its parents. When this returns, those that are new survive a power cut.
+pub(crate) fn create_folder(path: &Path) -> io::Result<()> {
+    let path = std::path::absolute(path)?;
+    let is_new = |folder: &&Path| !folder.exists();
+    let new: Vec<&Path> = path.ancestors().take_while(is_new).collect();
+    fs::create_dir_all(&path)?;
+    new.iter().try_for_each(|folder| sync_folder_of(folder))
+}
+
+/// Makes the name of a file or a folder survive a power cut: it is only found if the folder it is in was
+/// synchronised (fsync(2)).
+pub(crate) fn sync_folder_of(path: &Path) -> io::Result<()> {
+    let path = std::path::absolute(path)?;
+    path.parent()
+        .map_or(Ok(()), |folder| fs::File::open(folder)?.sync_all())
 }
 
 fn holds_more_than_lock(path: &Path) -> io::Result<bool> {

@@ -1,10 +1,13 @@
 //! A journal: one line of JSON an entry, each on disk before the next thing happens, so that a series that broke off
 //! can be continued at the right place.
 
+use crate::chain::{self, ChainError};
+use crate::folder::create_folder;
 use chrono::{DateTime, SecondsFormat, Utc};
 use serde::Serialize;
 use serde::de::DeserializeOwned;
-use std::fs::{self, File, OpenOptions};
+use serde_json::Value;
+use std::fs::{self, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 use std::time::SystemTime;
@@ -28,7 +31,7 @@ pub enum JournalError {
     },
     /// A line in the middle is no entry.
     #[error(
-        "line {line} of the journal cannot be understood ({reason}); mend it by hand or begin in a new folder: {}",
+        "line {line} of the journal cannot be understood ({reason}); restore it from a backup or begin in a new folder: {}",
         path.display()
     )]
     Line {
@@ -51,41 +54,43 @@ pub fn stamp(at: SystemTime) -> String {
 #[derive(Debug)]
 pub struct Journal {
     path: PathBuf,
-    file: File,
+    is_plain: bool,
 }
 
 impl Journal {
     /// Opens the journal of a folder, new or begun, and reads what it holds. A last line without its end is
-    /// what a crash left of an entry that never counted; it is cut off.
+    /// what a crash left of an entry that never counted.
+    ///
+    /// Every line carries a checksum, as described in [`crate::edits`]. A journal begun by a palpate that wrote
+    /// none is read as it is, and goes on without.
     pub fn open<T: DeserializeOwned>(folder: &Path) -> Result<(Self, Vec<T>), JournalError> {
         let path = folder.join(JOURNAL_FILE);
         let failed = |what| {
             let path = path.clone();
             move |source| JournalError::Io { what, path, source }
         };
-        fs::create_dir_all(folder).map_err(failed("written"))?;
-        let text = match fs::read_to_string(&path) {
-            Ok(text) => text,
-            Err(err) if err.kind() == io::ErrorKind::NotFound => String::new(),
+        create_folder(folder).map_err(failed("written"))?;
+        let bytes = match fs::read(&path) {
+            Ok(bytes) => bytes,
+            Err(err) if err.kind() == io::ErrorKind::NotFound => Vec::new(),
             Err(err) => return Err(failed("read")(err)),
         };
-        let whole = text.rfind('\n').map_or(0, |end| end + 1);
-        let entries = text[..whole].lines().enumerate();
-        let entries = entries.map(|(index, line)| {
-            serde_json::from_str(line).map_err(|err| JournalError::Line {
+        let first = bytes.split(|byte| *byte == b'\n').next();
+        let first = first.and_then(|line| serde_json::from_slice::<Value>(line).ok());
+        let is_plain = first.is_some_and(|line| line.get("checksum").is_none());
+        let bodies = match is_plain {
+            true => plain_lines(&path, &bytes)?,
+            false => chain::read(&path, JOURNAL_FILE).map_err(told)?.bodies,
+        };
+        let entries = bodies.into_iter().enumerate().map(|(index, body)| {
+            T::deserialize(body).map_err(|err| JournalError::Line {
                 line: index + 1,
                 reason: err.to_string(),
                 path: path.clone(),
             })
         });
         let entries = entries.collect::<Result<Vec<T>, _>>()?;
-        let file = OpenOptions::new()
-            .create(true)
-            .append(true)
-            .open(&path)
-            .map_err(failed("written"))?;
-        file.set_len(whole as u64).map_err(failed("written"))?;
-        Ok((Self { path, file }, entries))
+        Ok((Self { path, is_plain }, entries))
     }
 
     /// Appends one entry; when this returns it is on disk.
@@ -95,12 +100,52 @@ impl Journal {
             path: self.path.clone(),
             source,
         };
-        let mut line = serde_json::to_vec(entry).map_err(|err| failed(err.into()))?;
-        line.push(b'\n');
-        self.file
-            .write_all(&line)
-            .and_then(|()| self.file.sync_data())
-            .map_err(failed)
+        let body = serde_json::to_value(entry).map_err(|err| failed(err.into()))?;
+        match self.is_plain {
+            true => push_plain(&self.path, &body).map_err(failed),
+            false => chain::append(&self.path, JOURNAL_FILE, body).map_err(told),
+        }
+    }
+}
+
+/// Where the last whole line ends.
+fn whole(bytes: &[u8]) -> usize {
+    let end = bytes.iter().rposition(|byte| *byte == b'\n');
+    end.map_or(0, |end| end + 1)
+}
+
+fn plain_lines(path: &Path, bytes: &[u8]) -> Result<Vec<Value>, JournalError> {
+    let lines = bytes[..whole(bytes)].split_inclusive(|byte| *byte == b'\n');
+    let lines = lines.enumerate().map(|(index, line)| {
+        serde_json::from_slice(line).map_err(|err| JournalError::Line {
+            line: index + 1,
+            reason: err.to_string(),
+            path: path.into(),
+        })
+    });
+    lines.collect()
+}
+
+fn push_plain(path: &Path, body: &Value) -> io::Result<()> {
+    let length = whole(&fs::read(path)?);
+    let mut file = OpenOptions::new().append(true).open(path)?;
+    file.set_len(length as u64)?;
+    file.write_all(format!("{body}\n").as_bytes())?;
+    file.sync_data()
+}
+
+fn told(err: ChainError) -> JournalError {
+    match err {
+        ChainError::Changed { path, line } => JournalError::Line {
+            line,
+            reason: "it is not as it was written".into(),
+            path,
+        },
+        ChainError::Io { what, path, source } => JournalError::Io {
+            what: if what == "read" { what } else { "written" },
+            path,
+            source,
+        },
     }
 }
 
@@ -118,17 +163,35 @@ mod tests {
         }
         drop(journal);
         let path = folder.path().join(JOURNAL_FILE);
-        let whole = fs::read(&path).unwrap();
-        for cut in 0..=whole.len() {
-            fs::write(&path, &whole[..cut]).unwrap();
-            let (mut journal, old) = Journal::open::<u32>(folder.path()).unwrap();
-            let ended = whole[..cut].iter().filter(|byte| **byte == b'\n').count();
-            assert_eq!(old, [1, 22, 333][..ended], "{cut}");
-            journal.push(&4444).unwrap();
-            drop(journal);
-            let (_, again) = Journal::open::<u32>(folder.path()).unwrap();
-            assert_eq!(again.len(), ended + 1);
+        // As written now, and as palpate wrote it before lines had checksums.
+        for whole in [fs::read(&path).unwrap(), b"1\n22\n333\n".to_vec()] {
+            for cut in 0..=whole.len() {
+                fs::write(&path, &whole[..cut]).unwrap();
+                let (mut journal, old) = Journal::open::<u32>(folder.path()).unwrap();
+                let ended = whole[..cut].iter().filter(|byte| **byte == b'\n').count();
+                assert_eq!(old, [1, 22, 333][..ended], "{cut}");
+                journal.push(&4444).unwrap();
+                let (_, again) = Journal::open::<u32>(folder.path()).unwrap();
+                assert_eq!(again.len(), ended + 1);
+                assert_eq!(again.last(), Some(&4444));
+            }
         }
+    }
+
+    #[test]
+    fn a_changed_entry_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut journal, _) = Journal::open::<u32>(folder.path()).unwrap();
+        for entry in [1, 22, 333] {
+            journal.push(&entry).unwrap();
+        }
+        let path = folder.path().join(JOURNAL_FILE);
+        let text = fs::read_to_string(&path).unwrap();
+        fs::write(&path, text.replacen("22", "23", 1)).unwrap();
+        let refusal = Journal::open::<u32>(folder.path()).unwrap_err().to_string();
+        let expected = "line 2 of the journal cannot be understood (it is not as it was written)";
+        assert!(refusal.starts_with(expected), "{refusal}");
+        assert!(journal.push(&4).is_err());
     }
 
     #[test]

@@ -11,6 +11,7 @@ use palpate_protocols::runner::{Answers, Runner, TimeScale};
 use palpate_sessions::journal::JOURNAL_FILE;
 use palpate_sessions::text::checksum;
 use palpate_tests::workspace;
+use serde_json::Value;
 use std::path::Path;
 use std::sync::mpsc::sync_channel;
 
@@ -95,8 +96,10 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
         std::fs::write(folder.path().join(JOURNAL_FILE), &text).unwrap();
         let entries = lines[..kept]
             .iter()
-            .map(|line| serde_json::from_str(line).unwrap());
-        let entries: Vec<Entry> = entries.collect();
+            .map(|line| serde_json::from_str::<Value>(line).unwrap());
+        let entries: Vec<Entry> = entries
+            .map(|line| serde_json::from_value(line["body"].clone()).unwrap())
+            .collect();
         for entry in &entries {
             if let Entry::Begun { session, .. } = entry {
                 std::fs::create_dir_all(folder.path().join(session)).unwrap();
@@ -112,6 +115,31 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
         let second = again.progress.runs.iter().filter(|run| run.0.attempt == 2);
         assert_eq!(second.count(), attempts, "{kept}");
         assert_eq!(again.was_continued, kept > 1, "{kept}");
+    }
+}
+
+#[test]
+fn a_session_that_was_closed_counts_though_its_line_in_the_journal_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(JOURNAL_FILE);
+    let whole = carry_out(JOGS, folder.path()).unwrap();
+    let journal = std::fs::read_to_string(&path).unwrap();
+    let lines: Vec<&str> = journal.split_inclusive('\n').collect();
+    // Killed behind the last log, and behind the second repeat's.
+    for (kept, runs) in [(lines.len() - 1, 4), (4, 2)] {
+        std::fs::write(&path, lines[..kept].concat()).unwrap();
+        if runs == 2 {
+            for session in ["jog/03", "jog-again/01"] {
+                std::fs::remove_dir_all(folder.path().join(session)).unwrap();
+            }
+        }
+        let again = carry_out(JOGS, folder.path()).unwrap();
+        assert!(again.was_continued);
+        assert_eq!(again.progress, whole.progress, "{kept}");
+        let journal = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(journal.lines().count(), lines.len());
+        // The line that was lost stands there again, word for word.
+        assert_eq!(journal.split_inclusive('\n').nth(kept), Some(lines[kept]));
     }
 }
 
@@ -231,12 +259,16 @@ repeats = 2
             "something ran"
         );
     }
-    // A journal of an older palpate knows no conditions, and goes on.
-    let mut lines = first.lines().map(str::to_owned);
-    let mut head: serde_json::Value = serde_json::from_str(&lines.next().unwrap()).unwrap();
-    assert!(head.as_object_mut().unwrap().remove("conditions").is_some());
-    let rest: Vec<String> = lines.collect();
-    std::fs::write(&path, format!("{head}\n{}\n", rest.join("\n"))).unwrap();
+    // A journal of an older palpate knows no conditions and no checksums, and goes on.
+    let bodies = first.lines().map(|line| {
+        let line: Value = serde_json::from_str(line).unwrap();
+        line["body"].clone()
+    });
+    let mut bodies: Vec<Value> = bodies.collect();
+    let head = bodies[0].as_object_mut().unwrap();
+    assert!(head.remove("conditions").is_some());
+    let plain: String = bodies.iter().map(|body| format!("{body}\n")).collect();
+    std::fs::write(&path, plain).unwrap();
     let done = carry_out_on(&with("1 mm"), TEXT, folder.path(), usual, same).unwrap();
     assert_eq!(done.progress.finished(0).len(), 2);
 }

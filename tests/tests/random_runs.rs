@@ -15,6 +15,7 @@ use palpate_protocols::plans::{
     OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step, Weigh,
 };
 use palpate_tests::lab::Lab;
+use std::collections::VecDeque;
 
 /// Runs in the test suite: about ten seconds.
 const RUNS: u64 = 300;
@@ -268,6 +269,9 @@ impl Hidden {
 /// Longest time for which a signal may stand still unnoticed, beside the way of the brake: 100 samples.
 const STUCK_SECS: f64 = 0.1;
 
+/// A brake from 20 mm/s takes 0.33 s; while it lasts, the way it needs is that of the speed it began with.
+const RECENT: Nanos = Nanos::from_millis(350);
+
 /// How far the rig gives way.
 const COMPLIANCE_UM_PER_N: f64 = 30.0;
 
@@ -304,7 +308,8 @@ fn one_run(seed: u64) -> EndingKind {
     let (mut worst_force, mut worst_travel) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
     let end = Nanos::from_seconds(Seconds(60.0));
     let interferes = random.below(2) == 0;
-    let mut fastest = 0.1f64;
+    // The speeds of the last tenth of a second, each with its time, slower ones that are older left out.
+    let mut speeds: VecDeque<(Nanos, f64)> = VecDeque::new();
     let (mut homed, mut tared) = (None, None);
     // Tissue is nowhere stiffer than 2 N/mm here; a base is as stiff as the rig.
     let stiffness = if settings.thickness.mm() < 100.0 {
@@ -322,8 +327,18 @@ fn one_run(seed: u64) -> EndingKind {
         let truth = lab.rig.inner().truth();
         // What the axis still does when the limit is seen: the way of the brake, the answer, and the 0.1 mm that
         // the age of a sample may cost.
-        fastest = fastest.max(lab.state().derived().velocity.0.abs());
-        let speed = fastest;
+        let own = lab.state().derived().velocity.0.abs();
+        while speeds.back().is_some_and(|(_, speed)| *speed <= own) {
+            speeds.pop_back();
+        }
+        speeds.push_back((lab.now, own));
+        while speeds
+            .front()
+            .is_some_and(|(at, _)| lab.now.since(*at) > RECENT)
+        {
+            speeds.pop_front();
+        }
+        let speed = speeds.front().map_or(0.0, |(_, speed)| *speed);
         let unseen = if is_stuck { STUCK_SECS * speed } else { 0.0 };
         let way = speed * speed / (2.0 * acceleration) + 0.012 * speed + 0.1 + unseen;
         let beyond = axis(&truth) - truth.counter_zero.0 - limits.travel_max.0 - way;

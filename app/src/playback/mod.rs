@@ -57,6 +57,7 @@ pub fn run_playback(options: PlaybackOptions) -> Result<(), String> {
 pub struct PlaybackApp {
     thread: PlayerThread,
     snapshot: Arc<Snapshot>,
+    end: Nanos,
     transport: Transport,
     name: String,
     force_max: Newtons,
@@ -71,12 +72,13 @@ impl PlaybackApp {
     pub fn new(options: PlaybackOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
         let transport = Transport::new(options.player.end().seconds().0, options.scale);
-        let is_same_engine = options.player.is_same_engine();
+        let (end, is_same_engine) = (options.player.end(), options.player.is_same_engine());
         let wake = ctx.clone();
         let thread = PlayerThread::start(options.player, move || wake.request_repaint())?;
         Ok(Self {
             snapshot: thread.snapshot(),
             thread,
+            end,
             transport,
             name: options.name,
             force_max: options.force_max,
@@ -148,7 +150,12 @@ impl eframe::App for PlaybackApp {
         self.transport.read_keys(ctx, shown);
         let passed = ctx.input(|input| f64::from(input.stable_dt));
         if let Some(wanted) = self.transport.pass(passed, shown) {
-            self.thread.go_to(Nanos::from_seconds(Seconds(wanted)));
+            // The end in seconds may be rounded to before the last input.
+            let time = match wanted < self.end.seconds().0 {
+                true => Nanos::from_seconds(Seconds(wanted)),
+                false => self.end,
+            };
+            self.thread.go_to(time);
         }
         if self.transport.is_playing() {
             ctx.request_repaint_after(FRAME_PLAYING);

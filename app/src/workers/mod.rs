@@ -7,6 +7,7 @@ pub mod path_dialog;
 pub mod player;
 pub mod pool;
 pub mod ports;
+pub mod recovery;
 pub mod select;
 pub mod task;
 

@@ -45,8 +45,49 @@ pub struct Systematic {
     pub parameters: Vec<SystematicError>,
     /// Terms that a calibration does not state.
     pub not_stated: Vec<Term>,
+    /// What each calibration states by itself, in the order of their names above.
+    pub stated_by: Vec<Stated>,
     /// Whether forces beyond the heaviest weight were fitted, so that the true error is larger.
     pub is_extrapolated: bool,
+}
+
+/// What one calibration states of its errors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stated {
+    /// Its name.
+    pub calibration: String,
+    /// Terms whose errors were moved.
+    pub terms: Vec<Term>,
+    /// Terms it does not state.
+    pub not_stated: Vec<Term>,
+}
+
+impl Stated {
+    fn of((name, own): (&str, &ForceUncertainty)) -> Self {
+        Self {
+            calibration: name.to_owned(),
+            terms: distinct(own.errors()),
+            not_stated: own.not_stated().to_vec(),
+        }
+    }
+
+    /// Its own part of a sentence.
+    fn words(&self) -> String {
+        let name = &self.calibration;
+        match (self.terms.as_slice(), self.not_stated.as_slice()) {
+            ([], _) => format!("\"{name}\" states nothing"),
+            (terms, []) => format!("\"{name}\" states {}", words(terms)),
+            (terms, others) => {
+                format!("\"{name}\" states {}, but not {}", words(terms), words(others))
+            }
+        }
+    }
+}
+
+/// Terms in words.
+fn words(terms: &[Term]) -> String {
+    let words: Vec<&str> = terms.iter().map(|term| term.word()).collect();
+    words.join(", ")
 }
 
 /// The systematic standard uncertainty of one parameter.
@@ -209,6 +250,7 @@ impl Spread {
                 .map(|(name, _)| (*name).to_owned())
                 .collect(),
             not_stated,
+            stated_by: calibrations.iter().copied().map(Stated::of).collect(),
             is_extrapolated: records.iter().any(|one| {
                 one.calibration.is_some_and(|(_, uncertainty)| {
                     let known = one.samples.iter().filter(|sample| sample.is_measured());
@@ -299,10 +341,6 @@ impl Systematic {
             .collect();
         let is_one = names.len() == 1;
         let names = names.join(" and ");
-        let words = |terms: &mut dyn Iterator<Item = Term>| {
-            let words: Vec<&str> = terms.map(Term::word).collect();
-            words.join(", ")
-        };
         let Some(first) = self.parameters.first() else {
             let states = match is_one {
                 true => "states nothing of its",
@@ -310,16 +348,22 @@ impl Systematic {
             };
             return format!("{names} {states} own errors, so a systematic part is not told");
         };
-        let stated = words(&mut first.terms.iter().map(|one| one.term));
-        let bends = first.compliance.map(|_| "what the rig gives way");
-        let stated: Vec<&str> = [stated.as_str()]
-            .into_iter()
-            .filter(|words| !words.is_empty())
-            .chain(bends)
-            .collect();
-        let missing = match self.not_stated.as_slice() {
-            [] => String::new(),
-            terms => format!("; not stated: {}", words(&mut terms.iter().copied())),
+        let bends = first.compliance.map(|_| "what the rig gives way".to_owned());
+        let is_alike = |pair: &[Stated]| {
+            (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
+        };
+        let parts = if self.stated_by.windows(2).all(is_alike) {
+            let terms: Vec<Term> = first.terms.iter().map(|one| one.term).collect();
+            let stated = Some(words(&terms)).filter(|words| !words.is_empty());
+            let stated: Vec<String> = stated.into_iter().chain(bends).collect();
+            match self.not_stated.as_slice() {
+                [] => stated.join(", "),
+                terms => format!("{}; not stated: {}", stated.join(", "), words(terms)),
+            }
+        } else {
+            // What one states and another does not would read as a contradiction.
+            let each = self.stated_by.iter().map(Stated::words);
+            each.chain(bends).collect::<Vec<_>>().join("; ")
         };
         let beyond = match self.is_extrapolated {
             true => {
@@ -328,9 +372,8 @@ impl Systematic {
             false => "",
         };
         format!(
-            "{names} {} the systematic error, one standard uncertainty that repeats do not take away ({}{missing}){beyond}",
+            "{names} {} the systematic error, one standard uncertainty that repeats do not take away ({parts}){beyond}",
             if is_one { "adds" } else { "add" },
-            stated.join(", ")
         )
     }
 
@@ -565,6 +608,40 @@ mod tests {
             sentence.starts_with("the calibration \"a\" and the calibration \"b\" add"),
             "{sentence}"
         );
+        assert!(
+            sentence.contains("(digits of the readings, interpolation; not stated: tolerance"),
+            "{sentence}"
+        );
+    }
+
+    #[test]
+    fn of_two_calibrations_it_is_told_which_states_what() {
+        let (one, options) = (record(5.0), FitOptions::default());
+        let drifting = Calibration {
+            zero_before: Some(Volts(1.28)),
+            zero_after: Some(Volts(1.29)),
+            ..calibration()
+        };
+        let straight = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0));
+        let told = |second: &Calibration| {
+            let both = [&calibration(), second].map(|one| ForceUncertainty::of(one).unwrap());
+            let records = [traced(&one, "a", &both[0]), traced(&one, "b", &both[1])];
+            systematic_joint(&records, &options, &PARAMETER_NAMES[..5]).unwrap()[0].clone()
+        };
+        let found = told(&drifting);
+        let sentence = found.sentence();
+        assert!(
+            sentence.contains(
+                "(\"a\" states digits of the readings, interpolation, but not tolerance of the weights, repeatability, \
+                 hysteresis, zero drift; \"b\" states digits of the readings, zero drift, interpolation, but not \
+                 tolerance of the weights, repeatability, hysteresis)"
+            ),
+            "{sentence}"
+        );
+        assert!(found.stated_by[1].terms.contains(&Term::ZeroDrift));
+        assert!(found.stated_by[0].not_stated.contains(&Term::ZeroDrift));
+        let sentence = told(&straight).sentence();
+        assert!(sentence.contains("; \"b\" states nothing)"), "{sentence}");
     }
 
     #[test]

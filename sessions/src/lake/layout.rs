@@ -14,12 +14,13 @@ pub const LAKE_VERSION: u32 = 1;
 /// What readers of partitioned folders take for a missing value (Apache Hive).
 const NO_VALUE: &str = "__HIVE_DEFAULT_PARTITION__";
 
-/// The kinds of table.
+/// The kinds of file.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Part {
     Samples,
     Sessions,
     Events,
+    Checksums,
 }
 
 impl Part {
@@ -28,6 +29,7 @@ impl Part {
             Self::Samples => "samples",
             Self::Sessions => "sessions",
             Self::Events => "events",
+            Self::Checksums => "checksums",
         }
     }
 }

@@ -5,12 +5,14 @@
 //! v1/samples/rig=R/month=YYYY-MM/ID.parquet     one row per sample
 //! v1/sessions/rig=R/month=YYYY-MM/ID.parquet    one row: what the session says about itself
 //! v1/events/rig=R/month=YYYY-MM/ID.parquet      one row per input, decision and fit
+//! v1/checksums/rig=R/month=YYYY-MM/ID.json      the CRC-32 of those three files
 //! v1/fits/model=M/ID.json                       one fit
 //! ```
 //!
 //! The session's name is a column and the name of the file, never a folder: there are too many. Files
 //! appear whole under their names and never change.
 
+mod checksums;
 mod fits;
 mod layout;
 mod read;

@@ -1,5 +1,6 @@
 //! Sessions out of a lake.
 
+use super::checksums::{Checksums, crc32_of};
 use super::layout::{Part, is_lake, part};
 use super::rows::rows;
 use super::write::kind_name;
@@ -9,7 +10,7 @@ use crate::record::{Entry, EntryKind};
 use palpate_model::Nanos;
 use polars::prelude::{DataFrame, ParquetReader, PolarsError, PolarsResult, SerReader};
 use std::fs::{self, File};
-use std::io;
+use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -114,8 +115,10 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         let folder = part(lake, of).join(&one.place);
         folder.join(format!("{}.parquet", one.id))
     };
+    let checksums = Checksums::read(lake, &one.place, &one.id)?;
     let about = path(Part::Sessions);
-    let (manifest, mut session, rejection) = with(&about, |frame| {
+    let sum = checksums.of_part(Part::Sessions);
+    let (manifest, mut session, rejection) = with(&about, sum, |frame| {
         session_of(frame).map_err(|err| err.to_string())
     })?;
     if manifest.record_version > RECORD_VERSION {
@@ -125,14 +128,18 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         });
     }
     let samples = path(Part::Samples);
-    let rows = with(&samples, |frame| rows(frame).map_err(|err| err.to_string()))?;
+    let sum = checksums.of_part(Part::Samples);
+    let rows = with(&samples, sum, |frame| {
+        rows(frame).map_err(|err| err.to_string())
+    })?;
     if rows.len() as u64 != session.samples {
         return Err(LakeError::Bad {
             reason: format!("{} samples of {}", rows.len(), session.samples),
             path: samples,
         });
     }
-    let entries = with(&path(Part::Events), |frame| {
+    let sum = checksums.of_part(Part::Events);
+    let entries = with(&path(Part::Events), sum, |frame| {
         entries(frame).map_err(|err| err.to_string())
     })?;
     let session = Session {
@@ -146,14 +153,25 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
     Ok((session, rejection))
 }
 
+/// Reads a table whose file has this checksum. No other file is given to the decoder, which trusts what it
+/// reads.
 fn with<T>(
     path: &Path,
+    checksum: Option<u32>,
     take: impl FnOnce(&DataFrame) -> Result<T, String>,
 ) -> Result<T, LakeError> {
-    let file = File::open(path).map_err(|source| LakeError::Io {
+    let failed = |source| LakeError::Io {
         path: path.into(),
         source,
-    })?;
+    };
+    let mut file = File::open(path).map_err(failed)?;
+    if Some(crc32_of(&mut file).map_err(failed)?) != checksum {
+        return Err(LakeError::Bad {
+            path: path.into(),
+            reason: "its checksum is wrong".into(),
+        });
+    }
+    file.rewind().map_err(failed)?;
     let frame = ParquetReader::new(file)
         .finish()
         .map_err(|err| err.to_string());

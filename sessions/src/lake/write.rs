@@ -1,19 +1,18 @@
 //! A session into a lake.
 
+use super::checksums::Checksums;
 use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
 use super::rows::SAMPLE_COLUMNS;
 use crate::edits::Verdict;
-use crate::export::atomic::write_or_same;
-use crate::export::{Beside, ExportError, Feed, Kept, Selection, Table};
+use crate::export::atomic::{io_error, write_or_same};
+use crate::export::{Beside, Encoder, ExportError, Feed, Format, Kept, Selection, Table};
 use crate::log::Outline;
 use crate::record::{Entry, EntryKind};
 use crate::text::sha256;
-use polars::prelude::{
-    Column, DataFrame, IntoColumn, NamedFrom, ParquetCompression, ParquetWriter, PolarsResult,
-    Series,
-};
+use polars::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 /// What is told of a session beside what it holds.
@@ -61,28 +60,40 @@ pub fn add(lake: &Path, outline: &Outline, told: Told, feed: Feed) -> Result<Add
         },
     };
     let mut kept = vec![table.write_to_lake(&samples, feed)?];
-    kept.push(write_frame(&place(Part::Events)?, events(outline))?);
-    // The last, for it is what a reader goes by: a session that is listed is there with all its files.
-    kept.push(write_frame(
-        &place(Part::Sessions)?,
-        session(outline, told),
+    let (of_events, of_session) = (place(Part::Events)?, place(Part::Sessions)?);
+    kept.push(write_bytes(
+        &of_events,
+        &encode(&of_events, events(outline))?,
     )?);
+    let last = encode(&of_session, session(outline, told))?;
+    let checksums = Checksums::of(&samples, &of_events, &last)?;
+    kept.push(checksums.write(lake, &partition(manifest), id)?);
+    // The last, for it is what a reader goes by: a session that is listed is there with all its files.
+    kept.push(write_bytes(&of_session, &last)?);
     Ok(Added {
         samples,
         was_there: kept.iter().all(|one| *one == Kept::Same),
     })
 }
 
-fn write_frame(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Kept, ExportError> {
+/// The bytes of a table's file.
+fn encode(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Vec<u8>, ExportError> {
     let failed = |source| ExportError::Table {
         path: path.to_owned(),
         source,
     };
-    let mut frame = frame.map_err(failed)?;
-    write_or_same(path, |file| {
-        let writer = ParquetWriter::new(file).with_compression(ParquetCompression::Zstd(None));
-        writer.finish(&mut frame).map_err(failed).map(|_bytes| ())
-    })
+    let frame = frame.map_err(failed)?;
+    let metadata = vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())];
+    let mut bytes = Vec::new();
+    let mut encoder =
+        Encoder::new(Format::Parquet, &mut bytes, &frame, metadata).map_err(failed)?;
+    encoder.write(frame).map_err(failed)?;
+    encoder.finish().map_err(failed)?;
+    Ok(bytes)
+}
+
+fn write_bytes(path: &Path, bytes: &[u8]) -> Result<Kept, ExportError> {
+    write_or_same(path, |file| file.write_all(bytes).map_err(io_error(path)))
 }
 
 /// The name of a kind of entry.

@@ -17,6 +17,13 @@ pub(crate) enum Refusal {
     Newer(String, u64),
 }
 
+/// What is particular to a segment that was left.
+pub(crate) struct Left {
+    topics: BTreeMap<u16, Option<Channel>>,
+    has_manifest: bool,
+    is_rewrite: bool,
+}
+
 /// What has been read so far, over all segments.
 pub(crate) struct Content<'v> {
     /// Gets every block of samples once it is verified.
@@ -88,6 +95,23 @@ impl<'v> Content<'v> {
         self.has_manifest = false;
         self.is_rewrite = false;
         // A raw block that was cut off from its other half is written again, if at all.
+        self.has_raw = false;
+    }
+
+    /// Leaves a segment to read another one first.
+    pub fn leave_segment(&mut self) -> Left {
+        Left {
+            topics: std::mem::take(&mut self.topics),
+            has_manifest: self.has_manifest,
+            is_rewrite: self.is_rewrite,
+        }
+    }
+
+    /// Goes on with a segment that was left.
+    pub fn return_to_segment(&mut self, left: Left) {
+        self.topics = left.topics;
+        self.has_manifest = left.has_manifest;
+        self.is_rewrite = left.is_rewrite;
         self.has_raw = false;
     }
 

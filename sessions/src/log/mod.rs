@@ -3,6 +3,7 @@
 pub(crate) mod content;
 pub(crate) mod frames;
 pub mod reader;
+mod scribe;
 mod segment;
 pub mod sink;
 pub(crate) mod source;

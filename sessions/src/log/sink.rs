@@ -1,6 +1,6 @@
 //! The one door to the disk: appending bytes and making them durable.
 
-use crate::folder::{SPARE_FILE, segment_file};
+use crate::folder::{SPARE_FILE, create_folder, segment_file};
 use std::fs::{File, OpenOptions};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ impl SegmentSource for FolderSegments {
         let Some(spare) = &self.spare else {
             return Err(io::Error::other("no spare folder was chosen"));
         };
-        std::fs::create_dir_all(spare)?;
+        create_folder(spare)?;
         let path = spare.join(segment_file(number));
         Ok((FileSink::create(&path)?, path.display().to_string()))
     }

@@ -5,6 +5,7 @@
 //! pace handing over never waits: 30 s of batches fit in a bounded queue, and a queue that is
 //! full is a failure the caller sees, never a silent gap.
 
+use super::scribe::{monotonic_now, write_batches};
 use super::sink::{FolderSegments, SegmentSource, Sink};
 use super::writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, check_order};
 use crate::folder::SessionFolder;
@@ -13,13 +14,12 @@ use crate::record::{EndRecord, Entry, EntryKind, Row};
 use palpate_model::Nanos;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
-use std::sync::mpsc::{Receiver, RecvTimeoutError, SyncSender, TrySendError, sync_channel};
+use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
 
 /// Session time in one batch.
-const BATCH: Nanos = Nanos::from_millis(100);
+pub(super) const BATCH: Nanos = Nanos::from_millis(100);
 /// Samples in one batch, however little time they take.
 const BATCH_ROWS_MAX: usize = 1 << 16;
 /// Session time that fits in the queue at real pace, in s.
@@ -27,13 +27,6 @@ const QUEUE_SECONDS: u64 = 30;
 const QUEUE: Nanos = Nanos::from_millis(QUEUE_SECONDS * 1000);
 /// Batches that fit in it: more than 30 s of batches, which slow samples make shorter.
 const QUEUE_BATCHES: usize = 4096;
-/// Samples that are kept in memory at most to be written again if the disk fails: 23 MB.
-const ROWS_SINCE_SYNC_MAX: usize = 1 << 18;
-/// New files begun at most because the disk failed. A disk that fails more often will not do.
-const MOVES_MAX: u32 = 4;
-/// Wall time between two synchronisations with the disk.
-const SYNC_EVERY: Duration = Duration::from_secs(1);
-
 /// How session time passes against wall time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
@@ -44,16 +37,16 @@ pub enum Pace {
 }
 
 #[derive(Default)]
-struct Batch {
-    rows: Vec<Row>,
-    entries: Vec<Entry>,
+pub(super) struct Batch {
+    pub rows: Vec<Row>,
+    pub entries: Vec<Entry>,
     /// Newest time in the batch.
-    through: Nanos,
+    pub through: Nanos,
     /// Session time it covers, a pause before it not counted.
-    span: Nanos,
-    end: Option<EndRecord>,
+    pub span: Nanos,
+    pub end: Option<EndRecord>,
     /// Whether it holds an event, which must survive a power cut at once.
-    has_event: bool,
+    pub has_event: bool,
 }
 
 /// What became of the log while it was written, for the screen.
@@ -105,21 +98,26 @@ impl std::fmt::Display for Notice {
 
 /// What the writer thread tells the caller.
 #[derive(Default)]
-struct Shared {
+pub(super) struct Shared {
     has_failed: AtomicBool,
     failure: Mutex<Option<LogError>>,
-    saved_through_ns: AtomicU64,
+    pub saved_through_ns: AtomicU64,
     /// Session time in batches that are not written yet.
-    queued_ns: AtomicU64,
+    pub queued_ns: AtomicU64,
     moves: Mutex<Vec<Notice>>,
 }
 
 impl Shared {
-    fn fail(&self, err: LogError) {
+    pub fn fail(&self, err: LogError) {
         let mut failure = self.failure.lock().unwrap_or_else(PoisonError::into_inner);
         // The first reason is the cause, later ones its consequences.
         failure.get_or_insert(err);
         self.has_failed.store(true, Ordering::Release);
+    }
+
+    pub fn tell(&self, news: Notice) {
+        let mut moves = self.moves.lock().unwrap_or_else(PoisonError::into_inner);
+        moves.push(news);
     }
 
     fn take_moves(&self) -> Vec<Notice> {
@@ -225,7 +223,7 @@ impl SessionWriter {
         let thread_shared = Arc::clone(&shared);
         let thread = std::thread::Builder::new()
             .name("session-writer".into())
-            .spawn(move || write_batches(log, &receiver, &thread_shared))
+            .spawn(move || write_batches(log, &receiver, &thread_shared, monotonic_now))
             .map_err(|err| LogError::Disk {
                 reason: format!("no thread to write on: {err}"),
                 path: path.into(),
@@ -422,135 +420,4 @@ impl Drop for SessionWriter {
         }
         self.join();
     }
-}
-
-/// The thread's part: the log, and what must be written again if the disk fails.
-struct Scribe<'a, S: Sink> {
-    log: LogWriter<S>,
-    shared: &'a Shared,
-    since_sync: Vec<Batch>,
-    last_sync: Instant,
-    moves: u32,
-}
-
-/// The thread: writes batches until there are no more, syncing once per second of wall time and
-/// after events.
-fn write_batches<S: Sink>(log: LogWriter<S>, receiver: &Receiver<Batch>, shared: &Shared) {
-    let mut scribe = Scribe {
-        log,
-        shared,
-        since_sync: Vec::new(),
-        last_sync: monotonic_now(),
-        moves: 0,
-    };
-    if let Err(err) = scribe.run(receiver) {
-        shared.fail(err);
-    }
-}
-
-impl<S: Sink> Scribe<'_, S> {
-    fn run(&mut self, receiver: &Receiver<Batch>) -> Result<(), LogError> {
-        let mut carried = None;
-        let mut has_event = false;
-        loop {
-            let next = carried
-                .take()
-                .map_or_else(|| receiver.recv_timeout(SYNC_EVERY), Ok);
-            match next {
-                Ok(batch) => {
-                    has_event |= batch.has_event;
-                    if self.write(batch)? {
-                        return Ok(());
-                    }
-                }
-                Err(RecvTimeoutError::Timeout) => {}
-                // No end record was asked for; what was written is still made durable.
-                Err(RecvTimeoutError::Disconnected) => return self.sync(),
-            }
-            let rows: usize = self.since_sync.iter().map(|batch| batch.rows.len()).sum();
-            let is_due = monotonic_now().duration_since(self.last_sync) >= SYNC_EVERY;
-            if has_event {
-                // One sync does for all events that wait.
-                carried = receiver.try_recv().ok();
-            }
-            if is_due || rows >= ROWS_SINCE_SYNC_MAX || (has_event && carried.is_none()) {
-                self.sync()?;
-                has_event = false;
-            }
-        }
-    }
-
-    /// Writes a batch; whether it was the last.
-    fn write(&mut self, mut batch: Batch) -> Result<bool, LogError> {
-        let end = batch.end.take();
-        let (span, through) = (batch.span, batch.through);
-        let outcome = self.log.append(&batch.rows, &batch.entries);
-        self.since_sync.push(batch);
-        let outcome = outcome.or_else(|err| self.go_on_elsewhere(&err));
-        self.shared.queued_ns.fetch_sub(span.0, Ordering::AcqRel);
-        outcome?;
-        if let Some(end) = &end {
-            while let Err(err) = self.log.finish(end.clone()) {
-                self.go_on_elsewhere(&err)?;
-            }
-        }
-        let saved = &self.shared.saved_through_ns;
-        saved.store(through.0, Ordering::Release);
-        Ok(end.is_some())
-    }
-
-    fn sync(&mut self) -> Result<(), LogError> {
-        if !self.since_sync.is_empty() {
-            if let Err(err) = self.log.sync() {
-                // What is written again is synced, too.
-                self.go_on_elsewhere(&err)?;
-            }
-            self.since_sync.clear();
-        }
-        self.last_sync = monotonic_now();
-        Ok(())
-    }
-
-    /// After the disk has failed: a new segment, with everything that may be lost of the old one.
-    fn go_on_elsewhere(&mut self, err: &LogError) -> Result<(), LogError> {
-        let LogError::Disk { reason, .. } = err else {
-            return Err(err.clone());
-        };
-        let again: Vec<(&[Row], &[Entry])> = self
-            .since_sync
-            .iter()
-            .map(|batch| (&*batch.rows, &*batch.entries))
-            .collect();
-        let (path, is_elsewhere) = loop {
-            if self.moves >= MOVES_MAX {
-                return Err(err.clone());
-            }
-            self.moves += 1;
-            if let Ok(place) = self.log.write_again(&again) {
-                break place;
-            }
-        };
-        self.since_sync.clear();
-        self.last_sync = monotonic_now();
-        let notice = Notice::Moved {
-            reason: reason.clone(),
-            path,
-            is_last: is_elsewhere || self.moves == MOVES_MAX,
-        };
-        let mut moves = self
-            .shared
-            .moves
-            .lock()
-            .unwrap_or_else(PoisonError::into_inner);
-        moves.push(notice);
-        Ok(())
-    }
-}
-
-#[expect(
-    clippy::disallowed_methods,
-    reason = "syncing once per second of wall time is about the disk, not about the session"
-)]
-fn monotonic_now() -> Instant {
-    Instant::now()
 }

@@ -1,17 +1,17 @@
 //! Goes through a session's files and keeps everything that is whole.
 
 use super::{Gap, Missing, Wound};
-use crate::log::ReadError;
 use crate::log::content::Content;
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
 use crate::log::reader::{NOT_BEGUN, check_beginning, damaged, find_files, name_of, refused};
 use crate::log::source::Source;
 use crate::log::walk::next_chunk;
+use crate::log::{ReadError, Session};
 use crate::manifest::Manifest;
 use crate::record::{Block, EndRecord, Entry};
 use mcap::records::op;
 use std::io;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// What is left of a session, its samples apart.
 #[derive(Clone, Debug, PartialEq)]
@@ -30,12 +30,31 @@ pub struct Salvage {
 
 /// Hands out every block of samples that is whole, in order, and tells what is missing.
 pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
+    let mut left = blocks(path, visit)?;
+    // All that is kept may be whole and the file still be damaged where none of it is, as in its index.
+    if !left.missing.is_lossy()
+        && let Err(ReadError::Damaged {
+            path,
+            offset,
+            reason,
+        }) = Session::scan(path, &mut |_| {})
+    {
+        left.missing.wounds.push(Wound {
+            file: name_of(&path),
+            offset,
+            reason,
+        });
+    }
+    Ok(left)
+}
+
+/// As [`salvage`], and only what lies where samples are is looked at.
+pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     let failed = |source| ReadError::Io {
         path: path.into(),
         source,
     };
-    let mut chunks = ChunkReader::new().map_err(failed)?;
     let mut kept = 0;
     let mut last_s = 0.0;
     let mut gaps = Vec::new();
@@ -60,33 +79,21 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     };
     let mut content = Content::new(!path.is_dir(), &mut note);
     content.allow_gaps();
-    let mut wounds = Vec::new();
-    for file in &files {
-        let wound = |offset: u64, reason: &str| Wound {
-            file: name_of(file),
-            offset,
-            reason: reason.into(),
-        };
-        if !file.is_file() {
-            wounds.push(wound(0, "this segment is missing"));
-            continue;
-        }
-        let source = Source::open(file).map_err(failed)?;
-        let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
-        if !is_ours && content.manifest.is_none() {
-            check_beginning(file, &source, is_ours)?;
-        }
-        content.begin_segment();
-        let found = go_through(&source, &mut chunks, &mut content, wound).map_err(failed)?;
-        if let Some(refusal) = content.refusal.take() {
-            // A first file that is another's is refused; a later one is left out.
-            if content.manifest.is_none() {
-                return Err(refused(file, refusal));
-            }
-            wounds.push(wound(0, "this segment is of another recording"));
-        }
-        wounds.extend(found);
+    let mut search = Search {
+        files: &files,
+        chunks: ChunkReader::new().map_err(failed)?,
+        content,
+        wounds: Vec::new(),
+    };
+    let mut next = 0;
+    while next < files.len() {
+        next = search.read(next)?;
     }
+    let Search {
+        mut content,
+        wounds,
+        ..
+    } = search;
     let (lost_entries, later) = (content.lost_entries, content.is_later_part);
     let entries = std::mem::take(&mut content.entries);
     let (manifest, end) = (content.manifest.take(), content.end.take());
@@ -122,58 +129,168 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     })
 }
 
-/// Reads what is whole of one file; returns what is not.
-fn go_through(
-    source: &Source,
-    chunks: &mut ChunkReader,
-    content: &mut Content<'_>,
-    wound: impl Fn(u64, &str) -> Wound,
-) -> io::Result<Vec<Wound>> {
-    let mut wounds = Vec::new();
-    let mut bytes = Vec::new();
-    let mut offset = mcap::MAGIC.len() as u64;
-    while offset < source.length() && content.refusal.is_none() {
-        let frame = source.frame_at(offset, &mut bytes)?;
-        let body = bytes.get(FRAME_HEADER_BYTES..).unwrap_or_default();
-        let (reason, next) = match frame {
-            Err(_) => ("a record's length is wrong".to_owned(), None),
-            Ok(frame) => match frame.opcode {
-                op::HEADER if offset == mcap::MAGIC.len() as u64 => {
-                    content.take_header(body);
-                    offset = frame.next;
-                    continue;
+/// Goes through the files of a session.
+struct Search<'f, 'v> {
+    files: &'f [PathBuf],
+    chunks: ChunkReader,
+    content: Content<'v>,
+    wounds: Vec<Wound>,
+}
+
+impl Search<'_, '_> {
+    /// Reads what is whole of one file; returns the number of the next one to read.
+    ///
+    /// Where a file is damaged and the next one was begun because of that, the next one is read first: it
+    /// has everything from before the damage on. What lies behind the damage may still go further.
+    fn read(&mut self, number: usize) -> Result<usize, ReadError> {
+        let file = &self.files[number];
+        let mut next = number + 1;
+        if !file.is_file() {
+            self.wound(file, 0, "this segment is missing");
+            return Ok(next);
+        }
+        let failed = |source| ReadError::Io {
+            path: file.clone(),
+            source,
+        };
+        let source = Source::open(file).map_err(failed)?;
+        let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
+        if !is_ours && self.content.manifest.is_none() {
+            check_beginning(file, &source, is_ours)?;
+        }
+        self.content.begin_segment();
+        let mut from = Some(mcap::MAGIC.len() as u64);
+        while let Some(offset) = from {
+            from = self.read_on(file, &source, offset).map_err(failed)?;
+            if from.is_some() && next == number + 1 {
+                let until = self.rewrite_after(number).map_err(failed)?;
+                let left = self.content.leave_segment();
+                while next <= until {
+                    next = self.read(next)?;
                 }
-                op::CHUNK => match chunks
-                    .open(body)
-                    .and_then(|records| content.take_chunk(records))
-                {
-                    Ok(()) => {
+                self.content.return_to_segment(left);
+            }
+        }
+        if let Some(refusal) = self.content.refusal.take() {
+            // A first file that is another's is refused; a later one is left out.
+            if self.content.manifest.is_none() {
+                return Err(refused(file, refusal));
+            }
+            self.wound(file, 0, "this segment is of another recording");
+        }
+        Ok(next)
+    }
+
+    fn wound(&mut self, file: &Path, offset: u64, reason: &str) {
+        self.wounds.push(Wound {
+            file: name_of(file),
+            offset,
+            reason: reason.into(),
+        });
+    }
+
+    /// The number of the file that was begun because this one failed; its own if none was. What was begun
+    /// in between and failed at once holds nothing.
+    fn rewrite_after(&mut self, number: usize) -> io::Result<usize> {
+        for (later, file) in self.files.iter().enumerate().skip(number + 1) {
+            match kind_of(file, &mut self.chunks)? {
+                Kind::Rewrite => return Ok(later),
+                Kind::Nothing => {}
+                Kind::Next => break,
+            }
+        }
+        Ok(number)
+    }
+
+    /// Reads to the end of a file, or to where it is damaged: then the place from which to go on.
+    fn read_on(&mut self, file: &Path, source: &Source, from: u64) -> io::Result<Option<u64>> {
+        let mut bytes = Vec::new();
+        let mut offset = from;
+        while offset < source.length() && self.content.refusal.is_none() {
+            let frame = source.frame_at(offset, &mut bytes)?;
+            let body = bytes.get(FRAME_HEADER_BYTES..).unwrap_or_default();
+            let (reason, next) = match frame {
+                Err(_) => ("a record's length is wrong".to_owned(), None),
+                Ok(frame) => match frame.opcode {
+                    op::HEADER if offset == mcap::MAGIC.len() as u64 => {
+                        self.content.take_header(body);
                         offset = frame.next;
                         continue;
                     }
-                    Err(reason) => (reason, Some(frame.next)),
+                    op::CHUNK => {
+                        let records = self.chunks.open(body);
+                        match records.and_then(|records| self.content.take_chunk(records)) {
+                            Ok(()) => {
+                                offset = frame.next;
+                                continue;
+                            }
+                            Err(reason) => (reason, Some(frame.next)),
+                        }
+                    }
+                    op::DATA_END | op::FOOTER => break,
+                    op::MESSAGE_INDEX | op::ATTACHMENT | op::METADATA | 0x80.. => {
+                        offset = frame.next;
+                        continue;
+                    }
+                    _ => ("a record is of an unexpected kind".to_owned(), None),
                 },
-                op::DATA_END | op::FOOTER => break,
-                op::MESSAGE_INDEX | op::ATTACHMENT | op::METADATA | 0x80.. => {
-                    offset = frame.next;
-                    continue;
-                }
-                _ => ("a record is of an unexpected kind".to_owned(), None),
-            },
-        };
-        // The damaged record's length may be right, or may lead anywhere: what lies at its end tells.
-        let resumed = match next {
-            Some(next) if is_record(source, next)? => Some(next),
-            _ => next_chunk(source, offset, chunks)?,
-        };
-        let is_torn = resumed.is_none() && !source.has_footer()?;
-        if !is_torn {
-            wounds.push(wound(offset, &reason));
+            };
+            // The damaged record's length may be right, or may lead anywhere: what lies at its end tells.
+            let resumed = match next {
+                Some(next) if is_record(source, next)? => Some(next),
+                _ => next_chunk(source, offset, &mut self.chunks)?,
+            };
+            if resumed.is_some() || source.has_footer()? {
+                self.wound(file, offset, &reason);
+            }
+            return Ok(resumed);
         }
-        let Some(place) = resumed else { break };
-        offset = place;
+        Ok(None)
     }
-    Ok(wounds)
+}
+
+/// What a file is to the one before.
+enum Kind {
+    /// It goes on where that one ends.
+    Next,
+    /// It was begun because that one failed.
+    Rewrite,
+    /// It holds no samples.
+    Nothing,
+}
+
+fn kind_of(file: &Path, chunks: &mut ChunkReader) -> io::Result<Kind> {
+    if !file.is_file() {
+        return Ok(Kind::Next);
+    }
+    let source = Source::open(file)?;
+    let mut ignore = |_: &Block| {};
+    let mut content = Content::new(true, &mut ignore);
+    content.allow_gaps();
+    let mut bytes = Vec::new();
+    let mut offset = mcap::MAGIC.len() as u64;
+    // A file says so in the chunk after the manifest's.
+    while let Ok(frame) = source.frame_at(offset, &mut bytes)? {
+        let had_manifest = content.has_manifest;
+        if frame.opcode == op::CHUNK {
+            let records = chunks.open(&bytes[FRAME_HEADER_BYTES..]);
+            let is_read = records.is_ok_and(|records| content.take_chunk(records).is_ok());
+            if content.is_rewrite {
+                return Ok(Kind::Rewrite);
+            }
+            if !is_read {
+                break;
+            }
+            if had_manifest {
+                return Ok(Kind::Next);
+            }
+        }
+        offset = frame.next;
+    }
+    match next_chunk(&source, offset, chunks)? {
+        Some(_) => Ok(Kind::Next),
+        None => Ok(Kind::Nothing),
+    }
 }
 
 /// Whether a record that follows a chunk, or the end, is at a place.

@@ -1,7 +1,8 @@
 //! Writes what is left of a session as a session of its own, beside the original.
 
+use super::salvage::blocks;
 use super::{Missing, Salvage, salvage};
-use crate::folder::{FolderError, SessionFolder};
+use crate::folder::{FolderError, SessionFolder, sync_folder_of};
 use crate::log::{FileSink, LogError, LogWriter, ReadError};
 use crate::manifest::Manifest;
 use crate::record::{Block, EndRecord, Entry, Row};
@@ -68,6 +69,22 @@ pub struct Recovery {
     pub session_id: String,
     /// What is in it and what is not.
     pub salvage: Salvage,
+}
+
+impl Recovery {
+    /// What was kept of the session at `from` and, after it, what is missing.
+    #[must_use]
+    pub fn sentences(&self, from: &Path) -> Vec<String> {
+        let kept = format!(
+            "{}: {} samples kept in {}",
+            from.display(),
+            self.salvage.samples,
+            self.folder.display()
+        );
+        let missing = self.salvage.missing.sentences().into_iter();
+        let missing = missing.map(|sentence| format!("  {sentence}"));
+        [kept].into_iter().chain(missing).collect()
+    }
 }
 
 /// Where a session is recovered to: beside it, with its name and an ending.
@@ -140,10 +157,12 @@ pub fn recover(
         copy(path, &left, &mut log)?;
     }
     // Either all of it is there, or nothing is.
-    std::fs::rename(&unfinished, &folder).map_err(|source| FolderError::Io {
-        path: folder.clone(),
-        source,
-    })?;
+    std::fs::rename(&unfinished, &folder)
+        .and_then(|()| sync_folder_of(&folder))
+        .map_err(|source| FolderError::Io {
+            path: folder.clone(),
+            source,
+        })?;
     Ok(Recovery {
         folder,
         session_id,
@@ -185,7 +204,7 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         last = block.last_time().unwrap_or(last);
         outcome = log.append(&rows, &entries);
     };
-    salvage(path, &mut visit)?;
+    blocks(path, &mut visit)?;
     outcome?;
     let rest: Vec<Entry> = pending
         .map(|entry| Entry {

@@ -75,10 +75,16 @@ fn a_session_comes_out_of_a_lake_as_it_went_in() {
     let added = put(lake, &session, Told { verdict }).unwrap();
     assert!(!added.was_there);
     let id = &session.manifest.session_id;
-    let expected = ["events", "samples", "sessions"]
-        .map(|part| lake.join(format!("v1/{part}/rig=sim/month=2026-03/{id}.parquet")));
+    let expected = [
+        ("checksums", "json"),
+        ("events", "parquet"),
+        ("samples", "parquet"),
+        ("sessions", "parquet"),
+    ];
+    let expected = expected
+        .map(|(part, ending)| lake.join(format!("v1/{part}/rig=sim/month=2026-03/{id}.{ending}")));
     assert_eq!(files(lake), expected);
-    assert_eq!(added.samples, expected[1]);
+    assert_eq!(added.samples, expected[2]);
 
     let listed = sessions(lake).unwrap();
     assert_eq!(listed.len(), 1);
@@ -102,7 +108,7 @@ fn files_of_a_lake_never_change() {
         .map(|path| fs::read(path).unwrap())
         .collect();
     // What a killed writer left, longer than what comes.
-    let samples = &files(lake)[1];
+    let samples = &files(lake)[2];
     let name = samples.file_name().unwrap().to_string_lossy();
     fs::write(
         samples.with_file_name(format!(".{name}.tmp")),
@@ -151,7 +157,7 @@ fn a_damaged_lake_is_refused_in_words() {
     let one = sessions(lake).unwrap().remove(0);
     for file in files(lake) {
         let whole = fs::read(&file).unwrap();
-        for cut in [0, 4, whole.len() / 2, whole.len() - 1] {
+        for cut in [0, 4, whole.len() / 2, whole.len() - 2] {
             fs::write(&file, &whole[..cut]).unwrap();
             let refusal = read_session(lake, &one).unwrap_err();
             assert!(matches!(refusal, LakeError::Bad { .. }), "{refusal}");

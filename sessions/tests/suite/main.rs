@@ -5,6 +5,8 @@ mod catalog;
 #[cfg(test)]
 mod damage;
 #[cfg(test)]
+mod disk;
+#[cfg(test)]
 mod exports;
 #[cfg(test)]
 mod faults;
@@ -13,9 +15,17 @@ mod foreign;
 #[cfg(test)]
 mod foreign_damage;
 #[cfg(test)]
+mod hostile;
+#[cfg(test)]
+mod killed;
+#[cfg(test)]
 mod lake;
 #[cfg(test)]
+mod limits;
+#[cfg(test)]
 mod pace;
+#[cfg(test)]
+mod power;
 #[cfg(test)]
 mod recovery;
 #[cfg(test)]
@@ -24,5 +34,7 @@ mod round_trip;
 mod segments;
 #[cfg(test)]
 mod support;
+#[cfg(test)]
+mod worker;
 #[cfg(test)]
 mod written_again;

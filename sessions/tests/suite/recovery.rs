@@ -161,6 +161,20 @@ fn the_doctor_says_what_each_file_is() {
             .iter()
             .any(|one| one.contains("000.mcap is damaged at byte"))
     );
+    // Where no sample is: nothing is missing, and it is still made whole again.
+    let mut hurt = whole.clone();
+    let index = hurt.len() - 100;
+    hurt[index] ^= 4;
+    let patient = health("index", &hurt);
+    assert_eq!(patient.samples, 1500);
+    let wounds = patient.findings.join("; ");
+    assert!(
+        wounds.contains("the checksum of the index is wrong"),
+        "{wounds}"
+    );
+    let copy = recover(&library.path().join("sessions/index"), "1", at()).unwrap();
+    let copy = Session::open(&copy.folder).unwrap();
+    assert!(same_bits(&copy.rows, &rows) && copy.end.is_some());
     assert_eq!(
         health("foreign", b"PK\x03\x04 a spreadsheet").health,
         Health::Foreign

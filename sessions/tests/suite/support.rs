@@ -231,3 +231,11 @@ pub fn same_bits(a: &[Row], b: &[Row]) -> bool {
     };
     a == b && a.iter().map(bits).eq(b.iter().map(bits))
 }
+
+/// A count that the soak script may raise by an environment variable.
+pub fn count_from(variable: &str, usual: usize) -> usize {
+    std::env::var(variable)
+        .ok()
+        .and_then(|text| text.parse().ok())
+        .unwrap_or(usual)
+}

@@ -3,8 +3,12 @@
 //!
 //! Compound files are \[MS-CFB\], records \[MS-XLS\] section 2.4.
 
-/// Most cells between the first and the last of all sheets together.
-const AREA_MAX: u64 = 8 << 20;
+/// Most cells between the first and the last of all sheets together: 48 MiB in the reader of cells, which is
+/// a sheet with all its rows and 32 columns.
+const AREA_MAX: u64 = 2 << 20;
+/// Cells that a small file may leave empty. Beyond that there may be as many as it has bytes, of which a cell
+/// that is there takes six and more.
+const EMPTY_MAX: u64 = 1 << 16;
 /// Columns and rows of a sheet in this format ([MS-XLS], 2.5.53 and 2.5.226).
 const COLUMNS: u32 = 256;
 const ROWS: u32 = 65_536;
@@ -131,12 +135,13 @@ fn check_stream(stream: &[u8]) -> Result<(), String> {
         .take_while(|(kind, _)| *kind != END)
         .filter(|(kind, _)| *kind == SHEET)
         .filter_map(|(_, content)| u32_at(content, 0));
+    let most = AREA_MAX.min(EMPTY_MAX + stream.len() as u64);
     let mut area = 0u64;
     for start in sheets {
         area = area.saturating_add(area_of(stream, start as usize)?);
-        if area > AREA_MAX {
+        if area > most {
             return Err(format!(
-                "its sheets span more than {AREA_MAX} cells; export the measurement as text"
+                "its sheets span more than {most} cells; export the measurement as text"
             ));
         }
     }

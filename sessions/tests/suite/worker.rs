@@ -1,0 +1,174 @@
+//! What other tests do in a process of its own, which is this program started again: to kill it, to limit it, or to let
+//! two do something at the same time.
+
+use crate::support::{end, entries, manifest, rows};
+use crate::{hostile, limits};
+use chrono::DateTime;
+use palpate_model::Nanos;
+use palpate_sessions::journal::Journal;
+use palpate_sessions::recover::recover;
+use palpate_sessions::{
+    Change, Edit, Entry, FolderSegments, LogWriter, Pace, Row, SessionFolder, SessionWriter,
+    add_edit,
+};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+/// Tells a process what to do, as words.
+const TASK: &str = "PALPATE_WORKER";
+
+/// What a recording process records.
+pub struct Work {
+    pub rows: Vec<Row>,
+    pub entries: Vec<Entry>,
+}
+
+impl Work {
+    pub fn new(samples: usize) -> Self {
+        let rows = rows(samples, 91);
+        let entries = entries(&rows, 70);
+        Self { rows, entries }
+    }
+}
+
+/// A command that does a task in a folder, `program` and its arguments before it.
+pub fn command(program: &[&str], task: &str, folder: &Path) -> Command {
+    let own = std::env::current_exe().expect("a test is a program");
+    let mut words: Vec<PathBuf> = program.iter().map(PathBuf::from).collect();
+    words.push(own);
+    let mut command = Command::new(&words[0]);
+    command
+        .args(&words[1..])
+        .args(["worker::does_its_task", "--exact", "--nocapture"])
+        .env(TASK, task)
+        .env("PALPATE_WORKER_FOLDER", folder)
+        // A second arena for memory would reserve 64 MiB of addresses that a limit counts.
+        .env("MALLOC_ARENA_MAX", "1");
+    command
+}
+
+/// The numbers that a process told with a word, as `saved 300`.
+pub fn told(output: &std::process::Output, word: &str) -> Vec<u64> {
+    let text = String::from_utf8_lossy(&output.stderr);
+    let numbers = text.lines().filter_map(|line| {
+        let number = line.strip_prefix(word)?.strip_prefix(' ')?;
+        number.parse().ok()
+    });
+    numbers.collect()
+}
+
+/// Only a process that was given a task has one.
+#[test]
+fn does_its_task() {
+    let Ok(task) = std::env::var(TASK) else {
+        return;
+    };
+    let folder = PathBuf::from(std::env::var_os("PALPATE_WORKER_FOLDER").unwrap());
+    let mut words = task.split(' ');
+    let what = words.next().unwrap();
+    let name = words.next().filter(|word| word.parse::<usize>().is_err());
+    let number = task.rsplit(' ').next().and_then(|word| word.parse().ok());
+    let number = number.unwrap_or(0);
+    match what {
+        "log" => write_log(&folder, number),
+        "session" => write_session(&folder, number),
+        "recover" => recover_session(&folder),
+        "edits" => write_edits(&folder, number),
+        "journal" => write_journal(&folder, number),
+        "spare" => limits::record_with_spare(&folder, number),
+        "little" => limits::record_in_little_memory(&folder, number),
+        "catalog" => limits::update_catalog(&folder),
+        "hold" => hold(&folder),
+        "damage" => hostile::damage(&folder, name.unwrap(), number),
+        "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
+        "greed" => hostile::be_greedy(number),
+        other => panic!("no task is called {other}"),
+    }
+}
+
+/// Writes a log in segments of 30 batches, step by step, and tells what was handed to the system.
+fn write_log(folder: &Path, samples: usize) {
+    let work = Work::new(samples);
+    let _held = SessionFolder::create(folder).unwrap();
+    let source = Box::new(FolderSegments::new(folder));
+    let mut log = LogWriter::begin_in_segments(source, 30, &manifest()).unwrap();
+    let mut rest = &work.entries[..];
+    for (number, batch) in work.rows.chunks(20).enumerate() {
+        let stop = ((number + 1) * 20) as u64;
+        let (due, later) = rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
+        rest = later;
+        eprintln!("taken {stop}");
+        log.append(batch, due).unwrap();
+        eprintln!("saved {stop}");
+        if number % 9 == 8 {
+            log.sync().unwrap();
+        }
+    }
+    log.finish(end(Nanos::from_millis(samples as u64))).unwrap();
+}
+
+/// Records with the writer thread, and tells what it calls saved.
+fn write_session(folder: &Path, samples: usize) {
+    let work = Work::new(samples);
+    let _held = SessionFolder::create(folder).unwrap();
+    let source = FolderSegments::new(folder);
+    let mut writer =
+        SessionWriter::start_in_segments(source, 40, &manifest(), Pace::Virtual).unwrap();
+    let mut pending = work.entries.iter().peekable();
+    for (number, row) in work.rows.iter().enumerate() {
+        while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
+            writer.push_entry(entry.clone()).unwrap();
+        }
+        writer.push_row(*row).unwrap();
+        if number % 10 == 9 {
+            let saved = writer.saved_through();
+            let count = work.rows.partition_point(|one| one.host <= saved);
+            let count = if saved == Nanos::ZERO { 0 } else { count };
+            eprintln!("taken {}\nsaved {count}", number + 1);
+        }
+    }
+    writer
+        .close(end(Nanos::from_millis(samples as u64)))
+        .unwrap();
+    eprintln!("saved {samples}");
+}
+
+/// Holds a folder until its input ends.
+fn hold(folder: &Path) {
+    let _held = SessionFolder::create(folder).unwrap();
+    eprintln!("saved 0");
+    std::io::read_to_string(std::io::stdin()).unwrap();
+}
+
+fn recover_session(folder: &Path) {
+    recover(folder, "1", DateTime::UNIX_EPOCH).unwrap();
+    eprintln!("saved 1");
+}
+
+/// An edit as the worker makes it.
+pub fn edit(number: usize) -> Edit {
+    Edit {
+        at: DateTime::UNIX_EPOCH,
+        by: "Ada".into(),
+        reason: format!("number {number}"),
+        change: Change::Tags {
+            add: vec![format!("tag-{number}")],
+            remove: Vec::new(),
+        },
+    }
+}
+
+fn write_edits(folder: &Path, count: usize) {
+    for number in 1..=count {
+        add_edit(folder, &manifest().session_id, &edit(number)).unwrap();
+        eprintln!("saved {number}");
+    }
+}
+
+fn write_journal(folder: &Path, count: usize) {
+    let (mut journal, _) = Journal::open::<Edit>(folder).unwrap();
+    for number in 1..=count {
+        journal.push(&edit(number)).unwrap();
+        eprintln!("saved {number}");
+    }
+}
