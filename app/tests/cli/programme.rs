@@ -242,12 +242,12 @@ fn check_looks_at_a_programme_whole() {
     for (text, words) in [
         (
             told.replace("DEPTH", "12 mm"),
-            "line 14: parameter 'depth': 12 mm is too large",
+            "line 17: parameter 'depth': 12 mm is too large",
         ),
         (
             told.replace("DEPTH", "5 mm")
                 .replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
-            "line 14: 'theirs.toml' is neither",
+            "line 16: 'theirs.toml' is neither",
         ),
         (
             told.replace("mine.toml", "ramp-hold")

@@ -3,7 +3,7 @@
 //!
 //! A stiff surface gives no time: both touches are slow, and the rig's own compliance is all that softens them.
 
-use super::contact::{NOT_TARED, above_noise};
+use super::contact::{NOT_TARED, above_noise, not_felt};
 use super::context::{Context, Progress};
 use super::input::Record;
 use super::state::Contact;
@@ -119,7 +119,7 @@ impl BaseSearch {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
-                    return Err("the second touch did not feel what the first one felt".into());
+                    return Err(not_felt("touch", self.plan.criterion, self.criterion));
                 }
             }
             Stage::SlowBraking if at_rest => {
