@@ -19,8 +19,9 @@ use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
+use crate::workers::recovery::Recovery;
 use crate::workers::select::Selected;
-use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use eframe::egui::{Context, Ui, ViewportCommand};
 use palpate_model::extremes::Row;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
@@ -53,6 +54,7 @@ pub struct WorkbenchApp {
     pub(crate) form: ProtocolForm,
     pub(crate) library: Result<String, String>,
     pub(crate) ports: Ports,
+    pub(crate) recovery: Recovery,
     pub(crate) dialog: PathDialog,
     pub(crate) plots: PlotCache,
     pub(crate) refitter: Refitter,
@@ -74,7 +76,7 @@ pub struct WorkbenchApp {
 }
 
 impl WorkbenchApp {
-    /// Starts the runner on the rig of the options. Opens no window and reads nothing from disk.
+    /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
         let curve = options
@@ -93,6 +95,10 @@ impl WorkbenchApp {
             Some(folder) => Ok(folder.clone()),
             None => palpate_sessions::library_folder().map_err(|err| err.to_string()),
         };
+        let mut recovery = Recovery::default();
+        if let Ok(library) = &curves_in {
+            recovery.start(library.clone(), ctx);
+        }
         let mut form = ProtocolForm::default();
         if let Some(folder) = options.sessions {
             form.folder = folder.display().to_string();
@@ -114,6 +120,7 @@ impl WorkbenchApp {
                 .map(|path| path.display().to_string())
                 .map_err(|err| err.to_string()),
             ports,
+            recovery,
             dialog: PathDialog::default(),
             plots,
             refitter: Refitter::default(),
@@ -260,10 +267,7 @@ impl WorkbenchApp {
                     Screen::Extremes => self.extremes.cancel(),
                 },
                 Command::Show(screen) => self.screen = screen,
-                Command::SwitchTheme => ctx.set_theme(match ctx.theme() {
-                    Theme::Dark => Theme::Light,
-                    Theme::Light => Theme::Dark,
-                }),
+                Command::SwitchTheme => theme::switch(ctx),
             }
             ctx.request_repaint();
         }
@@ -384,6 +388,7 @@ impl eframe::App for WorkbenchApp {
         self.snapshot = self.runner.snapshot();
         self.poll_start();
         self.ports.poll();
+        self.recovery.poll();
         match self.dialog.poll() {
             Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
             Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),

@@ -7,6 +7,7 @@
 pub mod app;
 pub mod cli;
 pub mod command;
+pub mod playback;
 pub mod plots;
 pub mod report;
 pub mod screens;

@@ -72,6 +72,13 @@ impl WindowOptions {
 
 /// Opens the window and returns when it has closed, the motion stopped and the session closed.
 pub fn run_window(options: WindowOptions) -> Result<(), String> {
+    open_window(move |ctx| WorkbenchApp::new(options, ctx))
+}
+
+/// Opens a window of the usual size.
+pub(crate) fn open_window<A: eframe::App + 'static>(
+    make: impl FnOnce(&Context) -> Result<A, String> + 'static,
+) -> Result<(), String> {
     let native = eframe::NativeOptions {
         viewport: ViewportBuilder::default()
             .with_title("palpate")
@@ -84,7 +91,7 @@ pub fn run_window(options: WindowOptions) -> Result<(), String> {
         native,
         Box::new(move |cc| {
             close_on_signals(&cc.egui_ctx);
-            Ok(Box::new(WorkbenchApp::new(options, &cc.egui_ctx)?))
+            Ok(Box::new(make(&cc.egui_ctx)?))
         }),
     )
     .map_err(|err| format!("the window cannot be opened ({err}); 'palpate run' needs no window"))
@@ -100,7 +107,7 @@ fn close_on_signals(ctx: &Context) {
     });
 }
 
-fn frame(ui: &Ui, is_canvas: bool) -> Frame {
+pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     Frame::new()
         .fill(if is_canvas {
@@ -264,6 +271,7 @@ impl WorkbenchApp {
         let facts = ProtocolFacts {
             is_busy,
             library: &self.library,
+            recovered: self.recovery.told(),
             is_dialog_open: self.dialog.is_open(),
         };
         CentralPanel::no_frame().show(ui, |ui| {
@@ -284,6 +292,7 @@ impl WorkbenchApp {
                 let facts = ProtocolFacts {
                     is_busy: self.is_busy(),
                     library: &self.library,
+                    recovered: self.recovery.told(),
                     is_dialog_open: self.dialog.is_open(),
                 };
                 self.chooser.ui(ui, &self.form, &facts, commands);

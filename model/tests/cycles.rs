@@ -29,6 +29,7 @@ fn cycles(sets: &[f64], hold: f64, noise: f64) -> Vec<CycleSample> {
                 force: Newtons(force + noise * random.normal()),
                 phase,
                 cycle: k as u32 + 1,
+                step: 0,
             });
         }
     }
@@ -44,7 +45,7 @@ fn receding(count: i32) -> Vec<f64> {
 fn shifts_peaks_and_the_steady_cycle_are_found() {
     for noise in [0.0, 0.02] {
         let sets = receding(10);
-        let found = analyse(&cycles(&sets, 0.0, noise), None);
+        let found = analyse(&cycles(&sets, 0.0, noise), None, None);
         assert_eq!(found.len(), 10);
         let steady = SteadyRule::default().judge(&found);
         for (k, change) in steady.changes.iter().enumerate() {
@@ -90,7 +91,7 @@ fn peak_and_stiffness_are_those_of_the_body() {
     };
     let slope = (exact(24.01) - exact(23.99)) / 0.02;
     for (noise, at_most) in [(0.0, 1e-3), (0.02, 4.0)] {
-        let one = &analyse(&cycles(&[0.0], 0.0, noise), None)[0];
+        let one = &analyse(&cycles(&[0.0], 0.0, noise), None, None)[0];
         let stiffness = one.stiffness.unwrap();
         assert!((stiffness.depth.0 - 24.0).abs() < 1e-9);
         let misses = [
@@ -106,11 +107,11 @@ fn peak_and_stiffness_are_those_of_the_body() {
             assert!(miss.abs() < at_most * unit, "{noise}: {miss} {error}");
         }
     }
-    let at = analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(12.0)))[0].stiffness;
+    let at = analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(12.0)), None)[0].stiffness;
     let slope = (exact(12.01) - exact(11.99)) / 0.02;
     assert!((at.unwrap().slope.value - slope).abs() < 1e-3);
     assert_eq!(
-        analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)))[0].stiffness,
+        analyse(&cycles(&[0.0], 0.0, 0.0), Some(Depth(31.0)), None)[0].stiffness,
         None
     );
 }
@@ -128,6 +129,7 @@ fn energies_are_those_of_straight_lines() {
                     force: Newtons(slope * x(share)),
                     phase,
                     cycle,
+                    step: 0,
                 })
                 .collect()
         };
@@ -136,7 +138,7 @@ fn energies_are_those_of_straight_lines() {
     all.extend(line(500, Phase::Ramp, &|s| 10.0 * s, 0.5, 2));
     // Moves between cycles are no part of one.
     all.extend(line(500, Phase::Retract, &|s| 10.0 * (1.0 - s), 0.1, 2));
-    let found = analyse(&all, None);
+    let found = analyse(&all, None, None);
     assert!((found[0].work_loading - 25.0).abs() < 1e-12);
     assert!((found[0].work_loop.unwrap() - 5.0).abs() < 1e-12);
     assert!((found[0].loss_share().unwrap() - 0.2).abs() < 1e-12);
@@ -150,12 +152,12 @@ fn energies_are_those_of_straight_lines() {
 
 #[test]
 fn a_hold_relaxes_or_creeps() {
-    let found = &analyse(&cycles(&[0.0], 12.0, 0.0), None)[0];
+    let found = &analyse(&cycles(&[0.0], 12.0, 0.0), None, None)[0];
     let relaxation = found.relaxation.unwrap();
     let settled = ModifiedKelvin::THESIS.elastic(Depth(30.0)).0;
     let equilibrium = relaxation.equilibrium.unwrap();
     assert!((equilibrium.value.0 - settled).abs() < 1e-3);
-    assert!(found.creep.is_none());
+    assert!(found.creep.is_empty());
     let percent = 100.0 * (1.0 - settled / found.force_peak.value.0);
     assert!((relaxation.percent.value - percent).abs() < 0.01);
     // One time constant of 1.023 s: half of it has gone after 0.709 s.
@@ -166,11 +168,82 @@ fn a_hold_relaxes_or_creeps() {
         one.depth = Depth(30.0 + 0.1 * (one.t.0 - 10.0));
         one.force = Newtons(5.0);
     }
-    let found = &analyse(&creeping, None)[0];
+    let found = &analyse(&creeping, None, None)[0];
     assert!(found.relaxation.is_none());
-    let creep = found.creep.unwrap();
+    let creep = found.creep[0];
     assert!((creep.rate_end.value - 0.1).abs() < 1e-9);
     assert!((creep.depth_end.value.0 - 31.2).abs() < 1e-6);
+}
+
+/// In to 20 mm, 30 s at 1 N and at 2 N, each step adding half a millimetre, and back.
+fn two_forces(extra: Phase) -> Vec<CycleSample> {
+    let part = |phase, step: u32, from: f64, to: f64, force: f64, t: f64, secs: f64| {
+        (0..3000).map(move |i| {
+            let share = f64::from(i) / 3000.0;
+            CycleSample {
+                t: Seconds(t + secs * share),
+                depth: Depth(from + (to - from) * share),
+                force: Newtons(force),
+                phase,
+                cycle: 1,
+                step,
+            }
+        })
+    };
+    let mut all: Vec<CycleSample> = part(Phase::Ramp, 4, 0.0, 20.0, 1.0, 0.0, 10.0).collect();
+    all.extend(part(extra, 5, 20.0, 20.5, 1.0, 10.0, 30.0));
+    all.extend(part(extra, 6, 20.5, 21.0, 2.0, 40.0, 30.0));
+    all.extend(part(Phase::Unload, 7, 21.0, 0.0, 0.5, 70.0, 10.0));
+    all
+}
+
+#[test]
+fn each_hold_of_a_force_has_its_own_row() {
+    let found = &analyse(&two_forces(Phase::Creep), None, Some(Depth(0.015)))[0];
+    let rows: Vec<[f64; 4]> = found
+        .creep
+        .iter()
+        .map(|one| {
+            [
+                one.duration.0.round(),
+                one.force.0,
+                one.force_sd.0,
+                one.depth_start.0,
+            ]
+        })
+        .collect();
+    assert_eq!(rows, [[30.0, 1.0, 0.0, 20.0], [30.0, 2.0, 0.0, 20.5]]);
+    assert!(
+        found
+            .creep
+            .iter()
+            .all(|one| (2.4..2.6).contains(&one.percent))
+    );
+}
+
+#[test]
+fn a_cycle_with_more_than_a_hold_in_it_is_no_loop() {
+    for (extra, is_loop) in [
+        (Phase::Hold, true),
+        (Phase::Creep, false),
+        (Phase::Sine, false),
+    ] {
+        let found = &analyse(&two_forces(extra), None, None)[0];
+        assert_eq!(
+            (found.work_loop.is_some(), found.loss_share().is_some()),
+            (is_loop, is_loop),
+            "{extra}"
+        );
+        assert_eq!(found.relaxation.is_some(), extra == Phase::Hold);
+        // The way back counts to the cycle, whatever came before.
+        assert!((found.duration.0 - 80.0).abs() < 0.01, "{}", found.duration);
+    }
+    // A hold behind a sine does not begin at the peak.
+    let mut all = two_forces(Phase::Hold);
+    for one in all.iter_mut().filter(|one| one.step == 5) {
+        one.phase = Phase::Sine;
+    }
+    assert!(analyse(&all, None, None)[0].relaxation.is_none());
 }
 
 #[test]
@@ -182,7 +255,7 @@ fn a_record_without_phases_has_the_same_cycles() {
         &column(|one| one.depth.0),
         &column(|one| one.force.0),
     );
-    let (one, other) = (analyse(&named, None), analyse(&split, None));
+    let (one, other) = (analyse(&named, None, None), analyse(&split, None, None));
     assert_eq!(one.len(), other.len());
     for (a, b) in one.iter().zip(&other) {
         assert!((a.force_peak.value.0 - b.force_peak.value.0).abs() < 1e-9);

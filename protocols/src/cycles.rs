@@ -18,6 +18,8 @@ pub struct CycleSource {
     pub samples: Vec<CycleSample>,
     /// How far, for each sample, the contact its cycle began from is from the first one; empty for a table.
     pub contact_offsets: Vec<Depth>,
+    /// The least step of the depth; `None` where the source does not name it.
+    pub pulse: Option<Depth>,
     /// The sines that were run: frequency in Hz, and which of the samples.
     pub sines: Vec<(f64, std::ops::Range<usize>)>,
     /// Remarks, such as an interrupted recording.
@@ -63,10 +65,16 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let decisions = decisions(session)?;
     let trusted = trusted_samples(&decisions);
     let contacts = contacts(&decisions);
+    let steps = steps(&decisions);
     let tick_secs = session.manifest.tick().0;
     let first_tick = session.rows.first().map_or(0, |row| row.tick);
     let mut source = CycleSource {
         notes: session.notes.clone(),
+        pulse: session
+            .manifest
+            .rig
+            .as_ref()
+            .map(|rig| Depth(rig.mm_per_pulse)),
         ..CycleSource::default()
     };
     let mut left_out = 0usize;
@@ -89,6 +97,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
             force: Newtons(force),
             phase: row.phase,
             cycle: row.cycle,
+            step: step_at(&steps, index),
         });
     }
     source.sines = oscillations(&decisions)
@@ -135,6 +144,25 @@ fn offset_at(contacts: &[(u64, Position)], index: usize) -> Depth {
         (Some((_, first)), Some(latest)) => contacts[latest].1.depth_from(*first),
         _ => Depth(0.0),
     }
+}
+
+/// Steps of the plan, each from the sample that it began with: the one that led to it.
+fn steps(decisions: &[(u64, Effect)]) -> Vec<(u64, u32)> {
+    decisions
+        .iter()
+        .filter_map(|(after, effect)| match effect {
+            Effect::Record(Record::PhaseStarted { step_index, .. }) => {
+                Some((after.saturating_sub(1), u32::try_from(*step_index).ok()?))
+            }
+            _ => None,
+        })
+        .collect()
+}
+
+/// The step a sample belongs to; the first one before any began.
+fn step_at(steps: &[(u64, u32)], index: usize) -> u32 {
+    let begun = steps.partition_point(|(from, _)| *from <= index as u64);
+    begun.checked_sub(1).map_or(0, |latest| steps[latest].1)
 }
 
 fn oscillations(decisions: &[(u64, Effect)]) -> impl Iterator<Item = (usize, Oscillation)> {
@@ -198,6 +226,25 @@ mod tests {
         }
         assert!(source.sines.is_empty() && source.contact_offsets.iter().all(|one| one.0 == 0.0));
         assert!(source.samples.windows(2).all(|pair| pair[0].t < pair[1].t));
+    }
+
+    #[test]
+    fn samples_know_their_step_and_the_pulse() {
+        let session = recorded();
+        let source = of_session(&session).unwrap();
+        let rig = session.manifest.rig.as_ref().unwrap();
+        assert_eq!(source.pulse, Some(Depth(rig.mm_per_pulse)));
+        let plan: crate::plans::Plan =
+            serde_json::from_value(session.manifest.plan.clone()).unwrap();
+        // From the first sample on the step is the one whose phase it has.
+        assert!(source.samples.len() > 100_000);
+        for (index, one) in source.samples.iter().enumerate() {
+            let planned = plan.steps[one.step as usize].step.phase();
+            assert!(
+                planned == one.phase || one.phase == Phase::Ended,
+                "{index}: {one:?}, {planned}"
+            );
+        }
     }
 
     #[test]

@@ -43,7 +43,12 @@ impl Flow {
     /// Opens a window; the rig answers.
     #[must_use]
     pub fn open(scale: TimeScale) -> Self {
-        let folder = tempfile::tempdir().unwrap();
+        Self::open_in(tempfile::tempdir().unwrap(), scale)
+    }
+
+    /// The same with a folder for sessions that may hold some.
+    #[must_use]
+    pub fn open_in(folder: TempDir, scale: TimeScale) -> Self {
         let settings = SimSettings {
             seed: 7,
             ..SimSettings::default()

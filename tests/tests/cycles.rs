@@ -48,6 +48,7 @@ fn samples(lab: &Lab<SimRig>) -> Vec<CycleSample> {
                 force: seen.derived.force?,
                 phase: seen.phase,
                 cycle: seen.cycle,
+                step: seen.step_index as u32,
             })
         })
         .collect()

@@ -14,6 +14,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
 use palpate_tests::flow::{FRAME, Flow, Window};
+use palpate_tests::workspace;
 
 #[test]
 fn an_idle_window_settles_and_every_control_has_a_name() {
@@ -301,4 +302,31 @@ fn frames_of_a_run_stay_within_their_budget() {
     // tree, which a window without a screen reader does not build; the maximum is only printed
     // because a cold cache after a switch to another program counts, too.
     assert!(median < 8.0, "the median frame took {median:.2} ms");
+}
+
+#[test]
+fn what_a_crash_left_is_recovered_when_the_window_opens_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let crashed = folder.path().join("sessions/crashed");
+    std::fs::create_dir_all(&crashed).unwrap();
+    let whole = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
+    let bytes = std::fs::read(whole).unwrap();
+    std::fs::write(crashed.join("000.mcap"), &bytes[..bytes.len() / 2]).unwrap();
+    let mut flow = Flow::open_in(folder, TimeScale::Max);
+    flow.wait("the recovery", |window| {
+        window.query_by_label("Recovered after a crash").is_some()
+    });
+    let kept = flow.folder.path().join("sessions/crashed.recovered");
+    let session = palpate_sessions::Session::open(&kept).unwrap();
+    assert!(session.rows.len() > 10_000, "{}", session.rows.len());
+    let told = format!("{} samples kept in", session.rows.len());
+    assert!(
+        flow.window.query_by_label_contains(&told).is_some(),
+        "{told}"
+    );
+    // The original is as it was.
+    assert_eq!(
+        std::fs::read(crashed.join("000.mcap")).unwrap(),
+        bytes[..bytes.len() / 2]
+    );
 }

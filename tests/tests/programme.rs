@@ -119,6 +119,31 @@ fn a_crash_at_any_line_of_the_journal_goes_on_at_the_right_repeat() {
 }
 
 #[test]
+fn a_session_that_was_closed_counts_though_its_line_in_the_journal_is_lost() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join(JOURNAL_FILE);
+    let whole = carry_out(JOGS, folder.path()).unwrap();
+    let journal = std::fs::read_to_string(&path).unwrap();
+    let lines: Vec<&str> = journal.split_inclusive('\n').collect();
+    // Killed behind the last log, and behind the second repeat's.
+    for (kept, runs) in [(lines.len() - 1, 4), (4, 2)] {
+        std::fs::write(&path, lines[..kept].concat()).unwrap();
+        if runs == 2 {
+            for session in ["jog/03", "jog-again/01"] {
+                std::fs::remove_dir_all(folder.path().join(session)).unwrap();
+            }
+        }
+        let again = carry_out(JOGS, folder.path()).unwrap();
+        assert!(again.was_continued);
+        assert_eq!(again.progress, whole.progress, "{kept}");
+        let journal = std::fs::read_to_string(&path).unwrap();
+        assert_eq!(journal.lines().count(), lines.len());
+        // The line that was lost stands there again, word for word.
+        assert_eq!(journal.split_inclusive('\n').nth(kept), Some(lines[kept]));
+    }
+}
+
+#[test]
 fn a_crash_before_the_journal_knew_of_a_run_loses_nothing() {
     let folder = tempfile::tempdir().unwrap();
     std::fs::create_dir_all(folder.path().join("jog/02")).unwrap();

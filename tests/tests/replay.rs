@@ -2,7 +2,8 @@
 #![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
 use palpate_model::Nanos;
-use palpate_protocols::replay::{Blessing, blessings_of, replay};
+use palpate_protocols::replay::{Blessing, Player, blessings_of, replay};
+use palpate_protocols::runner::RunView;
 use palpate_sessions::{EntryKind, Session};
 use palpate_tests::workspace;
 use serde_json::json;
@@ -169,4 +170,93 @@ fn an_interrupted_recording_replays_as_far_as_it_goes() {
     session.end = None;
     let report = replay(&session, &[]).unwrap();
     assert_eq!(report.first_difference, None);
+}
+
+fn player(name: &str) -> Player {
+    Player::new(open(name), PathBuf::from(name)).unwrap()
+}
+
+/// All that is shown of a run.
+fn shown(player: &Player) -> String {
+    let snapshot = player.snapshot(0).unwrap();
+    format!("{:?} {:?}", snapshot.rig.reading, snapshot.run)
+}
+
+fn run_at(player: &mut Player, seconds: f64) -> RunView {
+    assert!(player.go_to(Nanos::from_millis((1e3 * seconds) as u64), usize::MAX));
+    player.snapshot(0).unwrap().run.unwrap()
+}
+
+#[test]
+fn every_moment_is_the_same_however_it_is_reached() {
+    for folder in recorded() {
+        let name = folder.file_name().unwrap().to_str().unwrap();
+        let mut wanderer = player(name);
+        let end = wanderer.end().0;
+        // Far jumps forth and back, beside a player that has never been anywhere else.
+        for share in [0.9, 0.1, 0.55, 0.0, 1.0, 0.3, 0.31, 0.97, 0.02] {
+            let time = Nanos((end as f64 * share) as u64);
+            assert!(wanderer.go_to(time, usize::MAX));
+            let mut straight = player(name);
+            // In small pieces, as a window asks for them.
+            while !straight.go_to(time, 777) {}
+            assert_eq!(shown(&wanderer), shown(&straight), "{name} at {share}");
+            assert!(wanderer.now() <= time, "{name} at {share}");
+        }
+    }
+}
+
+#[test]
+fn a_played_session_shows_what_was_recorded() {
+    let session = open("ramp-hold-lab");
+    let mut player = player("ramp-hold-lab");
+    for share in [0.2, 0.5, 0.8] {
+        let row = &session.rows[(session.rows.len() as f64 * share) as usize];
+        assert!(player.go_to(row.host, usize::MAX));
+        let run = player.snapshot(0).unwrap().run.unwrap();
+        let derived = run.derived;
+        assert_eq!(run.phase, row.phase);
+        for (shown, recorded) in [
+            (derived.force.map(|force| force.0), row.force),
+            (derived.depth.map(|depth| depth.0), row.depth),
+        ] {
+            assert_eq!(shown.is_some(), recorded.is_some());
+            let apart = shown.unwrap_or(0.0) - recorded.unwrap_or(0.0);
+            assert!(apart.abs() <= palpate_protocols::replay::TOLERANCE_DERIVED);
+        }
+    }
+    let end = session.end.unwrap();
+    let run = run_at(&mut player, 1e6);
+    assert_eq!(run.samples, end.samples);
+    assert_eq!(run.outcome.unwrap().ending.name(), end.outcome);
+    // Back at the start nothing is known any more, and nothing of the end is left over.
+    let run = run_at(&mut player, 0.0);
+    assert!(run.contact.is_none() && run.live.is_none() && run.force_peak.is_none());
+    assert!(run.outcome.is_none() && run.samples <= 1, "{}", run.samples);
+}
+
+#[test]
+fn a_difference_is_told_in_the_words_of_the_protocol() {
+    let mut session = open("over-force-galil");
+    let is_contact = |body: &serde_json::Value| body["record"] == "contact_found";
+    let entry = session
+        .entries
+        .iter_mut()
+        .find(|entry| is_contact(&entry.body));
+    entry.unwrap().body["position"] = json!(39.0);
+    let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
+    assert!(
+        difference.step.contains("find-contact"),
+        "{}",
+        difference.step
+    );
+    assert!(
+        difference.step.starts_with("step 4 of "),
+        "{}",
+        difference.step
+    );
+    let recorded = difference.recorded_words();
+    assert!(recorded.starts_with("contact at 39.000 ± "), "{recorded}");
+    let now = difference.now_words();
+    assert!(now.starts_with("contact at ") && now != recorded, "{now}");
 }

@@ -6,7 +6,7 @@ use clap::Args;
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::library_folder;
 use palpate_sessions::recover::{
-    Health, Missing, Patient, RecoverError, examine, examine_library, recover,
+    Health, Missing, Patient, RecoverError, examine, examine_library, recover, recover_library,
 };
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -236,10 +236,6 @@ fn recovered_text(one: &Recovered) -> String {
 
 /// Recovers what a crash left unfinished in a library, and says so; what fails is only told.
 pub(super) fn recover_unfinished(library: &Path, output: &Output) {
-    for path in examine_library(library).unwrap_or_default() {
-        match one(&path) {
-            Ok(done) => output.note(&recovered_text(&done)),
-            Err(failure) => output.note(failure.sentence()),
-        }
-    }
+    let told = recover_library(library, VERSION, wall_now().into());
+    told.iter().for_each(|line| output.note(line));
 }

@@ -2,8 +2,12 @@
 
 use super::Failure;
 use super::output::Output;
+use crate::playback::{PlaybackOptions, run_playback};
 use clap::Args;
-use palpate_protocols::replay::{ReplayError, ReplayReport, blessings_of, replay};
+use palpate_model::units::Newtons;
+use palpate_protocols::analysis::calibration_of;
+use palpate_protocols::replay::{Player, ReplayError, ReplayReport, blessings_of, replay};
+use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
@@ -14,6 +18,15 @@ pub struct ReplayArgs {
     /// Session folders
     #[arg(required = true)]
     sessions: Vec<PathBuf>,
+    /// Fail also where a session is not whole, so that what tests rely on cannot rot unseen
+    #[arg(long)]
+    check: bool,
+    /// Show one session in a window, as it was at any moment
+    #[arg(long, conflicts_with_all = ["check", "json"])]
+    window: bool,
+    /// With --window: session seconds per second to begin with, or max
+    #[arg(long, requires = "window", default_value = "1")]
+    time_scale: TimeScale,
     /// Print one JSON object
     #[arg(long)]
     pub json: bool,
@@ -34,11 +47,14 @@ struct Replays {
 }
 
 pub(super) fn run(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
+    if args.window {
+        return show(args, output);
+    }
     let bar = output.bar(args.sessions.len() as u64);
     let mut sessions = Vec::new();
     for path in &args.sessions {
         bar.set_message(path.display().to_string());
-        let report = replay_one(path, output)?;
+        let report = replay_one(path, args.check, output)?;
         sessions.push(Replayed {
             session: path.clone(),
             report,
@@ -72,34 +88,68 @@ pub(super) fn run(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
-fn replay_one(path: &Path, output: &Output) -> Result<ReplayReport, Failure> {
+/// One session in a window.
+fn show(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
+    let [path] = args.sessions.as_slice() else {
+        return Err(Failure::usage("--window shows one session; name one"));
+    };
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
-    let blessings = blessings_of(path).map_err(Failure::usage)?;
-    replay(&session, &blessings).map_err(|err| {
-        let sentence = format!("{err}: {}", path.display());
-        match err {
-            ReplayError::Imported { .. } => Failure::Usage(sentence),
-            _ => Failure::Failed(sentence),
-        }
+    let calibration = calibration_of(&session).map_err(super::source_failure)?;
+    let force_max = session.manifest.limits.map(|limits| limits.force_max);
+    let player = Player::new(session, path.clone()).map_err(|err| failure(&err, path))?;
+    let name = path.file_name().unwrap_or(path.as_os_str());
+    run_playback(PlaybackOptions {
+        player,
+        calibration,
+        force_max: force_max.unwrap_or(Newtons(0.0)),
+        name: name.to_string_lossy().into_owned(),
+        scale: args.time_scale,
     })
+    .map_err(Failure::Failed)
+}
+
+fn failure(err: &ReplayError, path: &Path) -> Failure {
+    let sentence = format!("{err}: {}", path.display());
+    match err {
+        ReplayError::Imported { .. } => Failure::Usage(sentence),
+        _ => Failure::Failed(sentence),
+    }
+}
+
+fn replay_one(path: &Path, is_strict: bool, output: &Output) -> Result<ReplayReport, Failure> {
+    let session = Session::open(path).map_err(super::read_failure)?;
+    session.notes.iter().for_each(|note| output.note(note));
+    if is_strict && (session.end.is_none() || !session.notes.is_empty()) {
+        let reason = session.notes.join("; ");
+        return Err(Failure::failed(format!(
+            "{} is not whole: {reason}",
+            path.display()
+        )));
+    }
+    let blessings = blessings_of(path).map_err(Failure::usage)?;
+    replay(&session, &blessings).map_err(|err| failure(&err, path))
 }
 
 fn text(replayed: &Replayed) -> String {
     let report = &replayed.report;
     let name = replayed.session.display();
     if let Some(difference) = &report.first_difference {
+        let (mut recorded, mut now) = (difference.recorded_words(), difference.now_words());
+        // Words round; what differs in a digit they leave out is shown as it stands.
+        if recorded == now {
+            (recorded, now) = (difference.recorded.to_string(), difference.now.to_string());
+        }
         return format!(
-            "{name}: {} differs first at {:.3} s (after sample {}){}\n  recorded {}\n  now      {}",
+            "{name}: {} differs first at {:.3} s, in {} (after sample {}{})\n  recorded {recorded}\n  now      {now}",
             difference.what,
             difference.at_s,
+            difference.step,
             difference.after_sample,
             difference
                 .decision
                 .map(|index| format!(", decision {index}"))
                 .unwrap_or_default(),
-            difference.recorded,
-            difference.now
         );
     }
     let decisions = match (report.is_same_engine, report.blessed) {

@@ -12,6 +12,7 @@ use palpate_drivers::sim::{
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
+use palpate_model::units::Position;
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::folder::{HolderLock, library_folder};
@@ -49,6 +50,9 @@ pub struct RigArgs {
     /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
+    /// Furthest position from home, in mm: a little before the base, so that no search meets it
+    #[arg(long, value_name = "MM")]
+    pub travel_max: Option<f64>,
     /// Read forces with this calibration: a name or id of the library, or a file
     #[arg(long, value_name = "NAME|FILE")]
     pub calibration: Option<String>,
@@ -70,6 +74,7 @@ impl Default for RigArgs {
             thickness: SimThickness::default(),
             compliance: SimCompliance::default(),
             preconditioning: SimPreconditioning::default(),
+            travel_max: None,
             calibration: None,
             time_scale: TimeScale::Factor(1.0),
         }
@@ -117,7 +122,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         Some((_, name)) => Some(rig_lock(name)?),
         None => None,
     };
-    let limits = Limits::for_travel(rig.description().travel);
+    let limits = Limits::for_travel(travel(args, rig.description().travel)?);
     // The built-in one belongs to its rig.
     let (calibration, doubts) = match &args.calibration {
         None => (
@@ -137,6 +142,18 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         limits,
         _lock: lock,
     })
+}
+
+/// The end of the travel: the rig's, or one before it.
+fn travel(args: &RigArgs, rigs: Position) -> Result<Position, Failure> {
+    match args.travel_max {
+        None => Ok(rigs),
+        Some(end) if end > 0.0 && end <= rigs.0 => Ok(Position(end)),
+        Some(end) => Err(Failure::usage(format!(
+            "--travel-max {end} is not within the travel of the rig; give more than 0 and at most {} mm",
+            rigs.0
+        ))),
+    }
 }
 
 fn rig_lock(name: &str) -> Result<HolderLock, Failure> {

@@ -3,7 +3,7 @@
 
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, legend, look, sentence_lines, span, title};
 use super::svg::{Ink, Panel, Svg};
-use super::text::typeset;
+use super::text::{systematic, typeset};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
 use crate::widgets::uncertain::{plain, with_error};
@@ -31,7 +31,8 @@ fn cells(parameters: &[FamilyParameter]) -> Vec<[String; 3]> {
             Some(error) => with_error(one.value, error),
             None => plain(one.value),
         };
-        [one.name.clone(), value, typeset(&one.unit)]
+        let unit = format!("{}{}", typeset(&one.unit), systematic(one.systematic_error));
+        [one.name.clone(), value, unit]
     });
     cells.collect()
 }

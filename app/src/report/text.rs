@@ -33,7 +33,7 @@ impl ParameterText {
             interval: match (parameter.ci95, parameter.std_error) {
                 (Some(ends), Some(error)) => {
                     let ends = interval(ends, parameter.value, error);
-                    format!("{ends}{}", systematic(parameter))
+                    format!("{ends}{}", systematic(parameter.systematic_error))
                 }
                 _ => String::new(),
             },
@@ -42,9 +42,10 @@ impl ParameterText {
 }
 
 /// The systematic standard uncertainty as it stands after an interval, empty where there is none.
-fn systematic(parameter: &Parameter) -> String {
-    let words = |error: f64| format!(" ± {} calibration", error_alone(error));
-    parameter.systematic_error.map(words).unwrap_or_default()
+#[must_use]
+pub fn systematic(error: Option<f64>) -> String {
+    let words = |error: f64| format!(" ± {} systematic", error_alone(error));
+    error.map(words).unwrap_or_default()
 }
 
 /// A parameter in one cell of a table: `value [low, high]`, or the value and why it has no
@@ -54,7 +55,7 @@ pub fn cell(parameter: &Parameter) -> String {
     match (parameter.std_error, parameter.ci95) {
         (Some(error), Some(ends)) => {
             let words = with_interval(parameter.value, error, ends);
-            format!("{words}{}", systematic(parameter))
+            format!("{words}{}", systematic(parameter.systematic_error))
         }
         _ => ParameterText::of(parameter).value,
     }
@@ -176,7 +177,7 @@ mod tests {
     fn what_the_calibration_adds_stands_after_the_interval() {
         let mut known = parameter(Some(0.1), false);
         known.systematic_error = Some(0.0234);
-        let interval = "[1.30, 1.70] ± 0.023 calibration";
+        let interval = "[1.30, 1.70] ± 0.023 systematic";
         assert_eq!(ParameterText::of(&known).interval, interval);
         assert_eq!(cell(&known), format!("1.50 {interval}"));
     }

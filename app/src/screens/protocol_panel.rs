@@ -18,6 +18,8 @@ pub struct ProtocolFacts<'a> {
     pub is_busy: bool,
     /// Where sessions go if no folder is chosen, or why nowhere.
     pub library: &'a Result<String, String>,
+    /// What was recovered of sessions that a crash left unfinished, a line each.
+    pub recovered: &'a [String],
     /// Whether the folder dialog is open.
     pub is_dialog_open: bool,
 }
@@ -189,6 +191,12 @@ fn folder_ui(
     });
     if let (Err(reason), true) = (facts.library, form.folder.trim().is_empty()) {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
+    }
+    if !facts.recovered.is_empty() {
+        ui.label("Recovered after a crash");
+        for line in facts.recovered {
+            ui.add(Label::new(RichText::new(line).small()).wrap());
+        }
     }
 }
 

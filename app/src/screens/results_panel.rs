@@ -28,6 +28,12 @@ pub fn results_ui(
     if let Some(run) = run {
         after_stop_ui(ui, run, commands);
     }
+    findings_ui(ui, snapshot, refit, loops);
+}
+
+/// Draws what was found, without what can be done.
+pub fn findings_ui(ui: &mut Ui, snapshot: &Snapshot, refit: Refit<'_>, loops: &[CycleLoop]) {
+    let run = snapshot.run.as_ref();
     match refit {
         Refit::Done(exact) => exact_ui(ui, &exact.report),
         _ => {

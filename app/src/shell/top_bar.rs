@@ -108,7 +108,7 @@ fn run_line(run: &RunView) -> String {
 }
 
 /// Force, depth, position and velocity, right to left.
-fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
+pub fn numbers_ui(ui: &mut Ui, snapshot: &Snapshot) {
     let derived = run_in_progress(snapshot).map(|run| run.derived);
     let at_rest = snapshot
         .rig

@@ -24,6 +24,14 @@ pub fn apply(ctx: &Context) {
     ctx.set_theme(ThemePreference::Light);
 }
 
+/// The other theme.
+pub fn switch(ctx: &Context) {
+    ctx.set_theme(match ctx.theme() {
+        Theme::Dark => Theme::Light,
+        Theme::Light => Theme::Dark,
+    });
+}
+
 fn visuals(theme: Theme, tokens: &Tokens) -> Visuals {
     let mut visuals = theme.default_visuals();
     visuals.panel_fill = tokens.panel;

@@ -70,6 +70,10 @@ impl Digits {
         let are_digits_short = magnitude < 5 && error >= SHORTEST_PLAIN_ERROR;
         let exponent = if are_digits_short { 0 } else { magnitude };
         let scaled = error / 10f64.powi(exponent);
+        // An error that six decimals do not show is one of rounding.
+        if scaled < 5e-7 {
+            return None;
+        }
         Some(Self {
             exponent,
             decimals: (1 - scaled.log10().floor() as i32).clamp(0, 6) as usize,
@@ -135,6 +139,7 @@ mod tests {
             (-0.5, 0.13, "-0.50 ± 0.13"),
             (41.235_4, 0.006, "41.2354 ± 0.0060"),
             (1234.5, 25.0, "1234 ± 25"),
+            (19.657_28, 1e-9, "19.66"),
             (4.12e-5, 3.1e-7, "(4.120 ± 0.031)e-5"),
             (-0.008_732, 2.9e-6, "(-8.7320 ± 0.0029)e-3"),
             (0.985_73, 0.000_99, "0.98573 ± 0.00099"),

@@ -5,12 +5,13 @@ use super::Job;
 use crate::report::thin::thin;
 use eframe::egui::Context;
 use egui_plot::PlotPoint;
-use palpate_model::calibration::{Calibration, ForceUncertainty};
+use palpate_model::calibration::Calibration;
 use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_protocols::analysis::{self, FitSource, SourceError, Wanted};
 use palpate_protocols::compliance::Correction;
+use palpate_protocols::origin::Origin;
 use palpate_protocols::runner::{RunView, Stopwatch};
 use palpate_sessions::import::ColumnNames;
 use std::path::{Path, PathBuf};
@@ -54,30 +55,35 @@ impl Fitted {
         }
     }
 
-    /// Adds what the calibration's own errors do to the parameters; a table has none, and a refusal is a
-    /// note. `options` are those of the fit.
+    /// Adds what the errors of calibration and compliance do to the parameters; a table has none, and a refusal is
+    /// a note. `options` are those of the fit.
     #[must_use]
     pub fn with_systematic(mut self, options: &FitOptions) -> Self {
-        let (Some(calibration), Ok(report)) = (&self.calibration, &self.result) else {
+        let Ok(report) = &self.result else {
             return self;
         };
-        let found = ForceUncertainty::of(calibration)
-            .map_err(|err| err.to_string())
-            .and_then(|uncertainty| {
-                systematic(&self.samples, options, &calibration.name, &uncertainty)
-                    .map_err(|err| err.to_string())
-            });
+        let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
+        let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
+            let record = origin.traced("", &self.samples);
+            let found = origin.is_known().then(|| systematic(record, options));
+            found.transpose().map_err(|err| err.to_string())
+        });
         match found {
-            Ok(found) => {
+            Ok(Some(found)) => {
                 self.result = Ok(report.clone().with_systematic(&found));
                 self.systematic = Some(found);
             }
-            Err(reason) => self.notes.push(format!(
-                "what the calibration adds to the uncertainty cannot be told: {reason}"
-            )),
+            Ok(None) => {}
+            Err(reason) => self.notes.push(no_systematic(&reason)),
         }
         self
     }
+}
+
+/// That systematic errors are not told, and why.
+#[must_use]
+pub fn no_systematic(reason: &str) -> String {
+    format!("what calibration and compliance add to the uncertainty cannot be told: {reason}")
 }
 
 /// Reads what is wanted of a session or a table and fits it. `columns` names the columns of a table without header.

@@ -4,8 +4,10 @@ pub mod calibrations;
 pub mod extremes;
 pub mod fit;
 pub mod path_dialog;
+pub mod player;
 pub mod pool;
 pub mod ports;
+pub mod recovery;
 pub mod select;
 pub mod task;
 

@@ -82,7 +82,10 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     let fit = palpate(at, &["fit", "session", "--json"]);
     succeeded(&fit);
     let fit = json(&fit);
-    assert_eq!(fit["systematic"]["calibration"], "bench");
+    assert_eq!(
+        fit["systematic"]["calibrations"],
+        serde_json::json!(["bench"])
+    );
     let terms = fit["systematic"]["parameters"][0]["terms"]
         .as_array()
         .unwrap();
@@ -105,6 +108,34 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
             && plain["parameters"][0].get("systematic_error").is_none()
     );
     assert_eq!(plain["parameters"][0]["std_error"], tau["std_error"]);
+    // Two of the same calibration and any other family tell it too.
+    succeeded(&short_run(
+        at,
+        "second",
+        &["--calibration", "bench", "--seed", "5"],
+    ));
+    let joint = ["fit", "session", "second", "--share", "body", "--json"];
+    let joint = json(&palpate(at, &joint));
+    let own = &joint["records"][1]["report"]["parameters"][0];
+    let [one, both] = [tau, own].map(|one| one["systematic_error"].as_f64().unwrap());
+    // The same tissue with the same weights: a second run tells nothing of their errors.
+    assert!((both / one - 1.0).abs() < 0.2, "{one} {both}");
+    assert_eq!(
+        joint["systematic"][1]["calibrations"],
+        serde_json::json!(["bench"])
+    );
+    let maxwell = ["fit", "session", "--family", "series-3", "--json"];
+    let family = json(&palpate(at, &maxwell));
+    let own = family["parameters"][0]["systematic_error"]
+        .as_f64()
+        .unwrap();
+    let one = tau["systematic_error"].as_f64().unwrap();
+    assert!((own / one - 1.0).abs() < 0.01, "{one} {own}");
+    let text = stdout(&palpate(at, &["fit", "session", "--family", "series-3"]));
+    assert!(
+        text.contains(" systematic") && text.contains("the calibration \"bench\" adds"),
+        "{text}"
+    );
 
     table(at, "newer.csv", 0.01);
     let newer = [

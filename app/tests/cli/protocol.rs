@@ -266,18 +266,25 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
 fn a_limit_that_changes_nothing_is_told_where_it_stands() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    for (force, is_told) in [("6 N", false), ("9 N", true), ("12 N", true)] {
+    for (limit, is_told) in [
+        ("force_max = 6 N", false),
+        ("force_max = 9 N", true),
+        ("force_max = 12 N", true),
+        ("travel_max = 100 mm", false),
+        ("travel_max = 1000 mm", true),
+    ] {
+        let (name, value) = limit.split_once(" = ").unwrap();
         let limited = MINE.replace(
             "[procedure]",
-            &format!("[limits]\nforce_max = \"{force}\"\n\n[procedure]"),
+            &format!("[limits]\n{name} = \"{value}\"\n\n[procedure]"),
         );
         std::fs::write(at.join("mine.toml"), limited).unwrap();
         let check = palpate(at, &["protocol", "check", "mine.toml"]);
         succeeded(&check);
         let told = stdout(&check);
-        let words = format!("line 12: warning: force_max = {force}");
+        let words = format!("line 12: warning: {limit}");
         assert_eq!(told.contains(&words), is_told, "{told}");
-        assert_eq!(told.contains("the rig stops at 9 N"), is_told, "{told}");
+        assert_eq!(told.contains("the rig stops at "), is_told, "{told}");
         let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
         succeeded(&preview);
         let said = stdout(&preview) + &stderr(&preview);
@@ -287,4 +294,34 @@ fn a_limit_that_changes_nothing_is_told_where_it_stands() {
             "{said}"
         );
     }
+}
+
+#[test]
+fn a_search_ends_before_the_base_where_the_technician_says_it_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = |name: &str, end: &str| {
+        let args = ["run", "zeroing", "--time-scale", "max", "--out", name];
+        palpate(at, &[&args[..], &["--travel-max", end]].concat())
+    };
+    let short = run("short", "20");
+    assert_eq!(short.status.code(), Some(1));
+    let words = "no tissue before 19.0 mm";
+    assert!(stderr(&short).contains(words), "{}", stderr(&short));
+    let columns = ["export", "short", "--format", "csv", "--columns", "pulses"];
+    succeeded(&palpate(at, &columns));
+    let table = std::fs::read_to_string(at.join("short.csv")).unwrap();
+    let furthest = table.lines().skip(1).map(|line| {
+        let last = line.rsplit(',').next().unwrap();
+        0.015 * last.parse::<f64>().unwrap()
+    });
+    let furthest = furthest.fold(0.0, f64::max);
+    // It did go all the way, and no pulse of 0.015 mm further.
+    assert!((18.9..19.02).contains(&furthest), "{furthest}");
+    for end in ["0", "-3", "1000", "nan"] {
+        let refused = run("wrong", end);
+        assert_eq!(refused.status.code(), Some(2), "{end}");
+    }
+    assert!(!at.join("wrong").exists());
+    succeeded(&palpate(at, &["replay", "short"]));
 }

@@ -57,16 +57,17 @@ pub struct CycleAnalysis {
     pub force_peak: Estimate<Newtons>,
     /// Energy that the way in took, in N*mm.
     pub work_loading: f64,
-    /// Energy that the whole loop kept, in N*mm; `None` where the way back was not recorded.
+    /// Energy that the whole loop kept, in N*mm; `None` where the way back was not recorded, or where the probe did more
+    /// between the ways than hold its depth.
     pub work_loop: Option<f64>,
     /// Depths at [`LEVELS`]; `None` where the force never rises through one.
     pub levels: [Option<LevelDepth>; 3],
     /// Stiffness at the depth asked for.
     pub stiffness: Option<Stiffness>,
-    /// The hold of the depth, if there was one of twenty samples.
+    /// The hold of the depth that follows the way in, if there was one of twenty samples.
     pub relaxation: Option<Relaxation>,
-    /// The hold of the force, if there was one of twenty samples.
-    pub creep: Option<Creep>,
+    /// The holds of a force of twenty samples or more, one for each step of the plan.
+    pub creep: Vec<Creep>,
 }
 
 impl CycleAnalysis {
@@ -85,9 +86,14 @@ impl CycleAnalysis {
 }
 
 /// Analyses every cycle of a record in order of time. Cycles without a way in are left out; `at` is the depth of the
-/// stiffness, 80 % of the first cycle's depth if none is given.
+/// stiffness, 80 % of the first cycle's depth if none is given; `pulse` is the least step of the depth, where it is
+/// known.
 #[must_use]
-pub fn analyse(samples: &[CycleSample], at: Option<Depth>) -> Vec<CycleAnalysis> {
+pub fn analyse(
+    samples: &[CycleSample],
+    at: Option<Depth>,
+    pulse: Option<Depth>,
+) -> Vec<CycleAnalysis> {
     let mut cycles: Vec<CycleAnalysis> = Vec::new();
     let mut levels = None;
     let of_cycles: Vec<CycleSample> = samples
@@ -112,7 +118,7 @@ pub fn analyse(samples: &[CycleSample], at: Option<Depth>) -> Vec<CycleAnalysis>
             .first()
             .and_then(|first| Some(first.stiffness?.depth)));
         let at = at.unwrap_or(Depth(0.8 * way.depth_peak));
-        cycles.push(way.analysis(cycle, force_start, levels, at));
+        cycles.push(way.analysis(cycle, force_start, (levels, at), pulse));
     }
     cycles
 }
@@ -139,7 +145,7 @@ pub fn stiffness_at(way_in: &[[f64; 2]], at: Depth) -> Option<Stiffness> {
 fn is_of_cycle(phase: Phase) -> bool {
     matches!(
         phase,
-        Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Unload
+        Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Sine | Phase::Unload
     )
 }
 
@@ -228,16 +234,30 @@ impl WayIn {
         &self,
         cycle: &[CycleSample],
         force_start: Option<Estimate<Newtons>>,
-        levels: [f64; 3],
-        at: Depth,
+        (levels, at): ([f64; 3], Depth),
+        pulse: Option<Depth>,
     ) -> CycleAnalysis {
         let start = cycle.first().map_or(0.0, |one| one.t.0);
-        let end = cycle.last().map_or(0.0, |one| one.t.0);
+        // A sine has its own table.
+        let last = cycle.iter().rfind(|one| one.phase != Phase::Sine);
+        let end = last.map_or(0.0, |one| one.t.0);
         let bins = bins(&self.points);
-        let is_back = cycle.iter().any(|one| one.phase == Phase::Unload);
+        let has = |phase: Phase| cycle.iter().any(|one| one.phase == phase);
+        let is_loop = has(Phase::Unload) && !has(Phase::Creep) && !has(Phase::Sine);
         let of = |phase: Phase| cycle.iter().filter(move |one| one.phase == phase);
-        let held: Vec<[f64; 2]> = of(Phase::Hold).map(|one| [one.t.0, one.force.0]).collect();
-        let creeping: Vec<CycleSample> = of(Phase::Creep).copied().collect();
+        // What is held after a creep or a sine does not begin at the peak.
+        let held: Vec<[f64; 2]> = cycle
+            .iter()
+            .skip_while(|one| one.phase == Phase::Ramp)
+            .take_while(|one| one.phase == Phase::Hold)
+            .map(|one| [one.t.0, one.force.0])
+            .collect();
+        let is_one_step = |one: &CycleSample, next: &CycleSample| {
+            (one.phase, one.step) == (next.phase, next.step)
+        };
+        let creeping = cycle
+            .chunk_by(is_one_step)
+            .filter(|part| part[0].phase == Phase::Creep);
         CycleAnalysis {
             cycle: cycle.first().map_or(0, |one| one.cycle),
             start: Seconds(start),
@@ -247,7 +267,7 @@ impl WayIn {
             force_start,
             force_peak: self.force_peak,
             work_loading: work(of(Phase::Ramp).map(|one| (one.depth, one.force))),
-            work_loop: is_back.then(|| work(cycle.iter().map(|one| (one.depth, one.force)))),
+            work_loop: is_loop.then(|| work(cycle.iter().map(|one| (one.depth, one.force)))),
             levels: levels.map(|level| {
                 Some(LevelDepth {
                     force: Newtons(level),
@@ -256,7 +276,7 @@ impl WayIn {
             }),
             stiffness: stiffness_at(&self.points, at),
             relaxation: relaxation(&held, self.force_peak),
-            creep: creep(&creeping),
+            creep: creeping.filter_map(|part| creep(part, pulse)).collect(),
         }
     }
 }

@@ -37,6 +37,8 @@ pub struct CycleSample {
     pub phase: Phase,
     /// Which cycle, from 1.
     pub cycle: u32,
+    /// Which step of the plan, from 0; 0 throughout where there was none.
+    pub step: u32,
 }
 
 /// A measured number and its standard error, of one unit.

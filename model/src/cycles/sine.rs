@@ -214,6 +214,7 @@ mod tests {
                 force: Newtons(force(t)),
                 phase: Phase::Hold,
                 cycle: 1,
+                step: 0,
             })
             .collect()
     }

@@ -48,6 +48,7 @@ pub fn by_depth(t: &[f64], depth: &[f64], force: &[f64]) -> Vec<CycleSample> {
                 force: Newtons(force[start + i]),
                 phase,
                 cycle: k as u32 + 1,
+                step: 0,
             });
         }
     }

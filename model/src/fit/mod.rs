@@ -39,4 +39,6 @@ pub use profile::ProfileInterval;
 pub use report::{FitReport, JointReport, MODEL_NAME, NamedReport, NoiseFound, Parameter};
 pub use sample::{FitError, FitSample};
 pub use solve::{Fitted, fit, fit_joint};
-pub use systematic::{Systematic, SystematicError, TermError, systematic};
+pub use systematic::{
+    Systematic, SystematicError, TermError, Traced, systematic, systematic_family, systematic_joint,
+};

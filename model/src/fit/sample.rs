@@ -3,6 +3,9 @@
 use crate::units::{Depth, Newtons, Seconds};
 use thiserror::Error;
 
+/// A record's name and its samples.
+pub(super) type Named<'a> = (&'a str, &'a [FitSample]);
+
 /// One sample of an indentation.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct FitSample {

@@ -58,7 +58,7 @@ pub fn check(
             }
         }
     }
-    if let Some(reason) = written.plan.limits.unused(limits) {
+    for reason in written.plan.limits.unused(limits) {
         problems.push(Problem::warning(protocol.limits_line(), reason));
     }
     problems.sort_by_key(|problem| problem.line);

@@ -15,6 +15,8 @@ struct Known {
     tare: bool,
     contact: bool,
     is_inside: bool,
+    /// Whether the specimen was taken out and no other clipped in.
+    is_bare: bool,
 }
 
 /// Looks through the steps.
@@ -62,6 +64,7 @@ enum Missed {
     Tare,
     Contact,
     Outside,
+    Specimen,
 }
 
 impl Known {
@@ -90,6 +93,10 @@ impl Known {
             let message = "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it";
             return Err((Missed::Contact, message));
         }
+        if self.is_bare && matches!(step, Step::FindContact(_)) {
+            let message = "would run into the base, for the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }";
+            return Err((Missed::Specimen, message));
+        }
         if self.is_inside && (is_search || is_by_hand || matches!(step, Step::Tare { .. })) {
             let message = "must not be done while the probe is in the tissue; put { do = \"retract\" } before it";
             return Err((Missed::Outside, message));
@@ -104,6 +111,7 @@ impl Known {
             Missed::Tare => self.tare = true,
             Missed::Contact => self.contact = true,
             Missed::Outside => self.is_inside = false,
+            Missed::Specimen => self.is_bare = false,
         }
     }
 
@@ -125,7 +133,10 @@ impl Known {
             Step::Unload { .. } | Step::Retract { .. } => self.is_inside = false,
             // Another specimen has its surface elsewhere. Without one there is only the base to find.
             Step::Prompt(prompt) => match prompt.hand {
-                Some(HandAction::Mount { .. } | HandAction::Unmount) => self.contact = false,
+                Some(hand @ (HandAction::Mount { .. } | HandAction::Unmount)) => {
+                    self.contact = false;
+                    self.is_bare = hand == HandAction::Unmount;
+                }
                 Some(HandAction::LoadCell { .. }) | None => {}
             },
             // From the surface a jog towards the tissue goes in.

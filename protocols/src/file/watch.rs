@@ -7,15 +7,24 @@ use super::scope::Scope;
 use super::tree::{Node, Table, Value};
 use super::words::{Key, Need, Range};
 use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
-use palpate_model::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Position, Seconds};
 
-const LIMIT_KEYS: [Key; 1] = [Key {
-    name: "force_max",
-    kind: Kind::Force,
-    range: Range::Above0,
-    need: Need::Optional,
-    about: "highest force above tare; the rig's own limit holds too",
-}];
+const LIMIT_KEYS: [Key; 2] = [
+    Key {
+        name: "force_max",
+        kind: Kind::Force,
+        range: Range::Above0,
+        need: Need::Optional,
+        about: "highest force above tare; the rig's own limit holds too",
+    },
+    Key {
+        name: "travel_max",
+        kind: Kind::Length,
+        range: Range::Above0,
+        need: Need::Optional,
+        about: "furthest position from home, such as a little before the base; the rig's own end holds too",
+    },
+];
 
 /// The limits of a plan for given values.
 pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems) -> PlanLimits {
@@ -28,6 +37,7 @@ pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems
             let args = Args::read(table, "[limits]", &[&LIMIT_KEYS], &[], scope, problems);
             PlanLimits {
                 force_max: args.maybe("force_max").map(Newtons),
+                travel_max: args.maybe("travel_max").map(Position),
             }
         }
         Some(node) => {

@@ -7,9 +7,10 @@ pub mod ramp_hold;
 pub mod step;
 
 use palpate_model::rig::Limits;
-use palpate_model::units::Newtons;
+use palpate_model::units::{Newtons, Position};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 
 pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
@@ -86,23 +87,31 @@ pub struct PlanLimits {
     /// Highest force above tare.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub force_max: Option<Newtons>,
+    /// Furthest position from home.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub travel_max: Option<Position>,
 }
 
 impl PlanLimits {
     /// Whether there is none.
     #[must_use]
     pub fn is_none(&self) -> bool {
-        self.force_max.is_none()
+        *self == Self::default()
     }
 
-    /// Why a limit stands here for nothing, if one does: it can only tighten what the rig allows.
+    /// Which limits stand here for nothing, and why: they can only tighten what the rig allows.
     #[must_use]
-    pub fn unused(&self, rig: &Limits) -> Option<String> {
-        let own = self.force_max.filter(|own| *own >= rig.force_max)?;
-        Some(format!(
-            "force_max = {own} in [limits] changes nothing, because the rig stops at {} in any case and a protocol's limits can only be tighter; give less, or leave it out",
-            rig.force_max
-        ))
+    pub fn unused(&self, rig: &Limits) -> Vec<String> {
+        let told = |name, own: &dyn Display, rigs: &dyn Display| {
+            format!(
+                "{name} = {own} in [limits] changes nothing, because the rig stops at {rigs} in any case and a protocol's limits can only be tighter; give less, or leave it out"
+            )
+        };
+        let force = self.force_max.filter(|own| *own >= rig.force_max);
+        let travel = self.travel_max.filter(|own| *own >= rig.travel_max);
+        let force = force.map(|own| told("force_max", &own, &rig.force_max));
+        let travel = travel.map(|own| told("travel_max", &own, &rig.travel_max));
+        force.into_iter().chain(travel).collect()
     }
 
     /// The rig's limits, made tighter where this plan asks for it.
@@ -110,6 +119,9 @@ impl PlanLimits {
     pub fn tighten(&self, mut limits: Limits) -> Limits {
         if let Some(force) = self.force_max {
             limits.force_max = Newtons(limits.force_max.0.min(force.0));
+        }
+        if let Some(end) = self.travel_max {
+            limits.travel_max = Position(limits.travel_max.0.min(end.0));
         }
         limits
     }

@@ -100,7 +100,7 @@ fn walk(
     is_homed: bool,
     has_outline: bool,
 ) -> (Preview, Vec<OutlinePoint>) {
-    let unused_limit = plan.limits.unused(limits);
+    let unused_limits = plan.limits.unused(limits);
     let limits = plan.limits.tighten(*limits);
     let mut walk = Walk {
         rig,
@@ -142,7 +142,7 @@ fn walk(
             force_band[0], force_band[1]
         ));
     }
-    notes.extend(unused_limit);
+    notes.extend(unused_limits);
     if force_band[1] > limits.force_max {
         notes.push(format!(
             "a stiff specimen may reach {:.1}; the interlock stops the run at {:.1}",

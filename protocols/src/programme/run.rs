@@ -162,6 +162,7 @@ pub fn run(
             conditions: Some(Box::new(conditions)),
         })?;
     }
+    work.settle_last()?;
     for task in 0..programme.tasks.len() {
         if let Some(folder) = work.progress.finished(task).last() {
             work.calibrate(task, &work.laboratory.folder.join(folder))?;
@@ -188,6 +189,31 @@ struct Work<'a> {
 }
 
 impl Work<'_> {
+    /// Gives the last run its line in the journal where a crash came between the end of its log and that line: its
+    /// session knows how it ended. One that cannot be read, or has no end, broke off.
+    fn settle_last(&mut self) -> Result<(), RunError> {
+        let Some((place, session, None)) = self.progress.runs.last().cloned() else {
+            return Ok(());
+        };
+        let session = Session::open(&self.laboratory.folder.join(session));
+        let Some(end) = session.ok().and_then(|session| session.end) else {
+            return Ok(());
+        };
+        self.end(place, counted(&end.outcome, &end.reason), end.reason)
+    }
+
+    /// Writes down how the last run ended.
+    fn end(&mut self, place: Place, outcome: String, reason: String) -> Result<(), RunError> {
+        if let Some(run) = self.progress.runs.last_mut() {
+            run.2 = Some(outcome.clone());
+        }
+        Ok(self.journal.push(&Entry::Ended {
+            place,
+            outcome,
+            reason,
+        })?)
+    }
+
     /// One run, from its entry in the journal to the next.
     fn one(&mut self, mut place: Place) -> Result<(), RunError> {
         let programme = self.programme;
@@ -260,14 +286,7 @@ impl Work<'_> {
             count: (done, programme.session_count()),
         });
         let (ending, reason) = self.wait(&folder, later)?;
-        self.journal.push(&Entry::Ended {
-            place: place.clone(),
-            outcome: ending.clone(),
-            reason: reason.clone(),
-        })?;
-        if let Some(run) = self.progress.runs.last_mut() {
-            run.2 = Some(ending.clone());
-        }
+        self.end(place.clone(), ending.clone(), reason.clone())?;
         if ending != FINISHED {
             return Err(RunError::Ended {
                 task: task.name.clone(),
@@ -293,13 +312,10 @@ impl Work<'_> {
                     return match &view.log_error {
                         // What is not on disk did not happen.
                         Some(err) => Ok(("abort".into(), err.clone())),
-                        // What was left out was not done.
-                        None if outcome.ending == EndingKind::Finish
-                            && outcome.reason != PLAN_COMPLETE =>
-                        {
-                            Ok((EndingKind::Stop.name().into(), outcome.reason.clone()))
-                        }
-                        None => Ok((outcome.ending.name().into(), outcome.reason.clone())),
+                        None => Ok((
+                            counted(outcome.ending.name(), &outcome.reason),
+                            outcome.reason.clone(),
+                        )),
                     };
                 }
             }
@@ -346,6 +362,14 @@ impl Work<'_> {
             }
         }
         Ok(Seconds(left))
+    }
+}
+
+/// How a run that ended so counts: what was left out was not done.
+fn counted(outcome: &str, reason: &str) -> String {
+    match outcome {
+        FINISHED if reason != PLAN_COMPLETE => EndingKind::Stop.name().into(),
+        outcome => outcome.into(),
     }
 }
 

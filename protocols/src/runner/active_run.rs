@@ -1,32 +1,26 @@
 //! One run in progress: the engine's state with its log, its live fit and its plot history.
 
+use super::board::{Board, LogState};
 use super::clock::wall_now;
-use super::snapshot::{LogLine, PromptView, RunView};
+use super::snapshot::RunView;
 use super::start::{AfterStop, Answers};
-use crate::base::FoundBase;
-use crate::engine::{
-    self, Config, Contact, Effect, EndingKind, Input, Operator, Outcome, PauseView, Record, State,
-};
+use crate::engine::{self, Config, Effect, Input, Operator, Outcome, PauseView, State};
 use crate::fidelity::{FidelityMeter, first_verdict};
 use crate::plans::Step;
 use crate::preview::Preview;
 use palpate_model::Nanos;
 use palpate_model::fit::LiveFit;
 use palpate_model::rig::{Fault, HandAction, Phase, Reading, RigCommand};
-use palpate_model::signal::LiveTrace;
-use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Seconds};
 use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
 use palpate_sessions::{LogError, SessionWriter};
-use std::collections::{BTreeMap, VecDeque};
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
 /// Samples between two answers of the live fit: half a second at 1 kHz.
 pub(crate) const LIVE_FIT_EVERY: u64 = 500;
-
-/// Buckets of the live plots: two points a bucket, two buckets a pixel on a wide screen.
-const TRACE_BUCKETS: usize = 2048;
 
 /// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
 const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
@@ -34,34 +28,22 @@ const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
 pub(super) struct ActiveRun {
     /// `None` only while `engine::step` has it.
     engine: Option<State>,
-    preview: Preview,
     writer: Option<SessionWriter>,
     folder: PathBuf,
     session_id: String,
+    board: Board,
     fidelity: FidelityMeter,
     verdict: Option<(Verdict, String)>,
     origin: Nanos,
     after_stop: AfterStop,
     answers: Answers,
     paused_since: Option<Nanos>,
-    now: Nanos,
-    samples: u64,
     order: u64,
     live: LiveFeed,
-    trace: Arc<LiveTrace>,
-    force_peak: Option<Newtons>,
-    /// Where the tissue was found, should depths count from a base by now.
-    tissue: Option<Contact>,
-    base: FoundBase,
-    events: VecDeque<LogLine>,
-    phases: Arc<Vec<(f64, Phase)>>,
-    cycle_starts: Arc<Vec<(f64, u32)>>,
-    cycles: u32,
     time_use: BTreeMap<&'static str, u64>,
     /// Why the log failed, and whether the engine knows.
     log_failure: Option<String>,
     is_log_failure_told: bool,
-    outcome: Option<Outcome>,
     log_error: Option<String>,
 }
 
@@ -77,35 +59,24 @@ impl ActiveRun {
         let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         let fidelity = FidelityMeter::new(&config.plan, &config.rig);
-        let cycles = config.plan.steps.iter().map(|planned| planned.cycle).max();
+        let board = Board::new(&config, preview.steps, folder.clone());
         Self {
             engine: Some(State::new(Arc::new(config))),
-            preview,
             writer: Some(writer),
             folder,
             session_id,
+            board,
             fidelity,
             verdict: None,
             origin,
             after_stop,
             answers,
             paused_since: None,
-            now: Nanos::ZERO,
-            samples: 0,
             order: 0,
             live,
-            trace: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
-            force_peak: None,
-            tissue: None,
-            base: FoundBase::default(),
-            events: VecDeque::new(),
-            phases: Arc::new(Vec::new()),
-            cycle_starts: Arc::new(Vec::new()),
-            cycles: cycles.unwrap_or(0),
             time_use: BTreeMap::new(),
             log_failure: None,
             is_log_failure_told: false,
-            outcome: None,
             log_error: None,
         }
     }
@@ -117,7 +88,7 @@ impl ActiveRun {
 
     /// Whether the run is over and its log closed.
     pub fn is_over(&self) -> bool {
-        self.outcome.is_some()
+        self.board.outcome().is_some()
     }
 
     /// Session time of a time on the rig's clock.
@@ -131,14 +102,11 @@ impl ActiveRun {
         let Some(state) = self.engine.take() else {
             return;
         };
-        *self.time_use.entry(state.phase().name()).or_default() += now.since(self.now).0;
-        self.now = now;
+        *self.time_use.entry(state.phase().name()).or_default() += now.since(self.board.now()).0;
+        self.board.input(now, &input);
         let (reading, logged) = match &input {
             Input::Reading(reading) => (Some(*reading), None),
-            other => {
-                self.note_input(now, other);
-                (None, Some((kind_of(other), to_json(other))))
-            }
+            other => (None, Some((kind_of(other), to_json(other)))),
         };
         let (state, effects) = engine::step(state, now, input);
         let commands: Vec<ToRig> = effects.iter().filter_map(to_rig).collect();
@@ -161,7 +129,7 @@ impl ActiveRun {
             self.log(now, EntryKind::Decision, to_json(&effect));
             match effect {
                 Effect::Command(_) | Effect::ByHand(_) => {}
-                Effect::Record(record) => self.note_record(now, &record),
+                Effect::Record(record) => self.board.record(&record),
                 Effect::Finished(outcome) => self.close(outcome),
             }
         }
@@ -177,7 +145,7 @@ impl ActiveRun {
     /// What the runner owes the engine after each input: news of a failed log, and the choice of
     /// an operator who is not there.
     fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(ToRig)) {
-        self.heed_log(now);
+        self.heed_log();
         if let (Some(detail), false) = (&self.log_failure, self.is_log_failure_told) {
             self.is_log_failure_told = true;
             let detail = detail.clone();
@@ -206,15 +174,11 @@ impl ActiveRun {
     }
 
     /// News of the log: told, and a failure of the run where the disk will not do much longer.
-    fn heed_log(&mut self, now: Nanos) {
+    fn heed_log(&mut self) {
         let notices = self.writer.as_mut().map(SessionWriter::take_notices);
         for notice in notices.into_iter().flatten() {
             let text = notice.to_string();
-            self.note(LogLine {
-                at: now,
-                text: text.clone(),
-                is_alarm: true,
-            });
+            self.board.note(text.clone(), true);
             if notice.ends_the_run() {
                 self.log_failure.get_or_insert(text);
             }
@@ -233,24 +197,8 @@ impl ActiveRun {
     }
 
     fn log_row(&mut self, now: Nanos, reading: &Reading, state: &State) {
-        let derived = state.derived();
-        self.samples += 1;
-        let cycle = state.cycle();
-        if cycle > 0
-            && self
-                .cycle_starts
-                .last()
-                .is_none_or(|(_, last)| *last != cycle)
-        {
-            Arc::make_mut(&mut self.cycle_starts).push((now.seconds().0, cycle));
-        }
-        if let Some(force) = derived.force {
-            if self.force_peak.is_none_or(|peak| force > peak) {
-                self.force_peak = Some(force);
-            }
-            let depth = derived.depth.unwrap_or(Depth(f64::NAN));
-            Arc::make_mut(&mut self.trace).push(now.seconds(), depth, force);
-        }
+        let (derived, cycle) = (state.derived(), state.cycle());
+        self.board.sample(state);
         let row = Row {
             tick: reading.tick,
             host: now,
@@ -275,7 +223,7 @@ impl ActiveRun {
         let entry = Entry {
             kind,
             order: self.order,
-            after_sample: self.samples,
+            after_sample: self.board.samples(),
             now,
             body,
         };
@@ -293,86 +241,14 @@ impl ActiveRun {
         }
     }
 
-    fn note_input(&mut self, now: Nanos, input: &Input) {
-        match input {
-            Input::Operator { choice } => {
-                let text = format!("operator: {choice}");
-                self.note(LogLine {
-                    at: now,
-                    text,
-                    is_alarm: false,
-                });
-            }
-            Input::Fault(fault) => {
-                self.note(LogLine {
-                    at: now,
-                    text: fault.to_string(),
-                    is_alarm: true,
-                });
-            }
-            _ => {}
-        }
-    }
-
-    fn note_record(&mut self, now: Nanos, record: &Record) {
-        if let Record::PhaseStarted { phase, .. } = record {
-            Arc::make_mut(&mut self.phases).push((now.seconds().0, *phase));
-        }
-        if let Record::ContactFound {
-            position,
-            std_error_mm,
-        } = record
-        {
-            self.tissue = Some(Contact {
-                position: *position,
-                std_error_mm: *std_error_mm,
-            });
-        }
-        if let Some(base) = FoundBase::of(record) {
-            // Without a thickness no tissue is known in front of it.
-            self.tissue = self.tissue.filter(|_| base.thickness_mm.is_some());
-            self.base = base;
-        }
-        let is_alarm = match record {
-            Record::InterlockTripped { .. } => true,
-            Record::EndingStarted { ending, .. } => is_alarming(*ending),
-            _ => false,
-        };
-        self.note(LogLine {
-            at: now,
-            text: record.to_string(),
-            is_alarm,
-        });
-    }
-
-    /// Where the tissue begins, though depths may count from the base behind it.
-    fn contact(&self, state: &State) -> Option<Contact> {
-        let counted = state.contact()?;
-        match self.base.base_mm == Some(counted.position.0) {
-            true => self.tissue,
-            false => Some(counted),
-        }
-    }
-
-    fn note(&mut self, line: LogLine) {
-        if self.events.len() == RunView::EVENTS_MAX {
-            self.events.pop_front();
-        }
-        self.events.push_back(line);
-    }
-
     fn close(&mut self, outcome: Outcome) {
-        self.note(LogLine {
-            at: self.now,
-            text: format!("{}: {}", outcome.ending, outcome.reason),
-            is_alarm: is_alarming(outcome.ending),
-        });
+        self.board.end(&outcome);
         let end = EndRecord {
             outcome: outcome.ending.name().into(),
             reason: outcome.reason.clone(),
-            samples: self.samples,
+            samples: self.board.samples(),
             entries: self.order,
-            ended_at: self.now,
+            ended_at: self.board.now(),
             time_use: self
                 .time_use
                 .iter()
@@ -387,7 +263,6 @@ impl ActiveRun {
         let (verdict, reason) = first_verdict(&outcome, self.fidelity.found());
         self.record_verdict(verdict, &reason);
         self.verdict = Some((verdict, reason));
-        self.outcome = Some(outcome);
     }
 
     /// The first verdict stands beside the log, like those of people after it.
@@ -406,84 +281,14 @@ impl ActiveRun {
     /// The run as the world may see it.
     pub fn view(&self) -> Option<RunView> {
         let state = self.engine.as_ref()?;
-        let (step_index, step_started) = state.step_progress();
-        let (time_left, fraction) = self.progress(step_index, step_started);
-        Some(RunView {
-            plan_name: state.config().plan.name.clone(),
-            folder: self.folder.clone(),
-            phase: state.phase(),
-            power: state.power(),
-            steps: Arc::new(self.preview.steps.clone()),
-            step_index,
-            now: self.now,
-            time_left,
-            fraction,
-            derived: *state.derived(),
-            tare: state.tare(),
-            contact: self.contact(state),
-            base: self.base,
-            force_peak: self.force_peak,
-            live: state.live().cloned(),
-            trace: Arc::clone(&self.trace),
-            phases: Arc::clone(&self.phases),
-            samples: self.samples,
-            saved_through: self
-                .writer
-                .as_ref()
-                .map_or(self.now, SessionWriter::saved_through),
-            is_motion_possible: state.is_motion_possible(),
-            pause: state.pause(),
-            prompt: state.prompt().map(|(prompt, until)| PromptView {
-                message: prompt.message.clone(),
-                time_left: until.since(self.now).seconds(),
-            }),
-            next_checkpoint: self.next_checkpoint(state, step_index),
-            cycle: state.cycle(),
-            cycles: self.cycles,
-            cycle_starts: Arc::clone(&self.cycle_starts),
-            holding: state.holding().cloned(),
-            can_retract: state.can_retract().map_err(String::from),
-            outcome: self.outcome.clone(),
+        let writer = self.writer.as_ref();
+        let log = LogState {
+            saved_through: writer.map_or(self.board.now(), SessionWriter::saved_through),
             verdict: self.verdict.clone(),
-            log_error: self.log_error.clone(),
-            events: Arc::new(self.events.iter().cloned().collect()),
-        })
+            error: self.log_error.clone(),
+        };
+        Some(self.board.view(state, log))
     }
-
-    /// The nearest place ahead where a pause spoils nothing, by its name.
-    fn next_checkpoint(&self, state: &State, step_index: usize) -> Option<(usize, String)> {
-        let mut ahead = state.config().plan.checkpoints_from(step_index);
-        ahead.next().map(|(index, name)| (index, name.to_owned()))
-    }
-
-    /// Expected time left and share done, from the preview and the step in progress.
-    fn progress(&self, step_index: usize, step_started: Nanos) -> (Seconds, f64) {
-        if self.outcome.is_some() {
-            return (Seconds(0.0), 1.0);
-        }
-        let spent = self.now.since(step_started).seconds().0;
-        let left: f64 = self
-            .preview
-            .steps
-            .iter()
-            .enumerate()
-            .skip(step_index)
-            .map(|(i, step)| {
-                if i == step_index {
-                    (step.expected.0 - spent).max(0.0)
-                } else {
-                    step.expected.0
-                }
-            })
-            .sum();
-        let done = self.now.seconds().0;
-        (Seconds(left), done / (done + left).max(1e-9))
-    }
-}
-
-/// Whether an ending needs attention; a stop the operator asked for does not.
-fn is_alarming(ending: EndingKind) -> bool {
-    !matches!(ending, EndingKind::Finish | EndingKind::Stop)
 }
 
 /// What a run asks of the rig or of the hand beside it.

@@ -5,12 +5,14 @@
 //! no experiment logic.
 
 mod active_run;
+mod board;
 mod clock;
 mod main_loop;
 mod snapshot;
 mod start;
 
 pub(crate) use active_run::{LiveFeed, to_json};
+pub(crate) use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, wall_now};
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;

@@ -111,7 +111,7 @@ impl Field {
                 "mm",
                 "number",
                 "depth below contact, positive into the tissue; empty before contact is known",
-                "pulses times the length of a pulse, from the contact found or corrected",
+                "the commanded path, within one pulse of the pulses, from the contact found or corrected",
             ),
             Self::Force => (
                 "force_N",

@@ -37,9 +37,9 @@ impl Format {
 }
 
 /// Keys and texts about a table.
-pub(super) type Metadata = Vec<(String, String)>;
+pub(crate) type Metadata = Vec<(String, String)>;
 
-pub(super) enum Encoder<W: Write> {
+pub(crate) enum Encoder<W: Write> {
     Csv(csv::write::BatchedWriter<W>),
     Parquet(Box<parquet::write::BatchedWriter<W>>, Metadata),
     Arrow(FileWriter<W>),
@@ -95,7 +95,8 @@ impl<W: Write> Encoder<W> {
             Self::Parquet(writer, metadata) => {
                 // The footer is written here and not by `finish`, which adds the frame's Arrow schema:
                 // with one in the file, Arrow readers show its metadata, which is empty, instead of ours
-                // (Arrow issue 8980). All our types are told by Parquet's own.
+                // (Arrow issue 8980), and texts as views, which pyarrow cannot compare with texts. All our
+                // types are told by Parquet's own.
                 let KeyValueMetadata::Static(pairs) = KeyValueMetadata::from_static(metadata)
                 else {
                     return Err(PolarsError::ComputeError("metadata is not static".into()));

@@ -5,14 +5,11 @@ use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
 use super::rows::SAMPLE_COLUMNS;
 use crate::edits::Verdict;
 use crate::export::atomic::{io_error, write_or_same};
-use crate::export::{Beside, ExportError, Feed, Kept, Selection, Table};
+use crate::export::{Beside, Encoder, ExportError, Feed, Format, Kept, Selection, Table};
 use crate::log::Outline;
 use crate::record::{Entry, EntryKind};
 use crate::text::sha256;
-use polars::prelude::{
-    Column, DataFrame, IntoColumn, NamedFrom, ParquetCompression, ParquetWriter, PolarsResult,
-    Series,
-};
+use polars::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 use std::fs;
 use std::io::Write;
@@ -85,9 +82,13 @@ fn encode(path: &Path, frame: PolarsResult<DataFrame>) -> Result<Vec<u8>, Export
         path: path.to_owned(),
         source,
     };
+    let frame = frame.map_err(failed)?;
+    let metadata = vec![("palpate.lake_version".into(), LAKE_VERSION.to_string())];
     let mut bytes = Vec::new();
-    let writer = ParquetWriter::new(&mut bytes).with_compression(ParquetCompression::Zstd(None));
-    writer.finish(&mut frame.map_err(failed)?).map_err(failed)?;
+    let mut encoder =
+        Encoder::new(Format::Parquet, &mut bytes, &frame, metadata).map_err(failed)?;
+    encoder.write(frame).map_err(failed)?;
+    encoder.finish().map_err(failed)?;
     Ok(bytes)
 }
 

@@ -1,8 +1,9 @@
 //! Tells in which state a session is.
 
-use super::write::is_in_use;
+use super::write::{is_in_use, recover};
 use super::{Missing, recovered_folder, salvage};
 use crate::log::{ReadError, Session, Summary};
+use chrono::{DateTime, Utc};
 use serde::Serialize;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -93,6 +94,26 @@ pub fn examine(path: &Path) -> Patient {
             }
         }
     }
+}
+
+/// Recovers the unfinished sessions of a library and tells what came of it, a line each. What fails is told and
+/// stays as it is.
+#[must_use]
+pub fn recover_library(library: &Path, software_version: &str, at: DateTime<Utc>) -> Vec<String> {
+    let found = match examine_library(library) {
+        Ok(found) => found,
+        Err(err) => {
+            let folder = library.display();
+            return vec![format!(
+                "cannot read {folder} ({err}); check its permissions"
+            )];
+        }
+    };
+    let one = |path: &PathBuf| match recover(path, software_version, at) {
+        Ok(recovery) => recovery.sentences(path),
+        Err(err) => vec![err.to_string()],
+    };
+    found.iter().flat_map(one).collect()
 }
 
 /// The unfinished sessions of a library that nobody records and nobody recovered, newest first.

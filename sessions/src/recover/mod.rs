@@ -8,7 +8,7 @@ mod doctor;
 mod salvage;
 mod write;
 
-pub use doctor::{Health, Patient, examine, examine_library};
+pub use doctor::{Health, Patient, examine, examine_library, recover_library};
 pub use salvage::{Salvage, salvage};
 pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder};
 

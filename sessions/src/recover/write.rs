@@ -71,6 +71,22 @@ pub struct Recovery {
     pub salvage: Salvage,
 }
 
+impl Recovery {
+    /// What was kept of the session at `from` and, after it, what is missing.
+    #[must_use]
+    pub fn sentences(&self, from: &Path) -> Vec<String> {
+        let kept = format!(
+            "{}: {} samples kept in {}",
+            from.display(),
+            self.salvage.samples,
+            self.folder.display()
+        );
+        let missing = self.salvage.missing.sentences().into_iter();
+        let missing = missing.map(|sentence| format!("  {sentence}"));
+        [kept].into_iter().chain(missing).collect()
+    }
+}
+
 /// Where a session is recovered to: beside it, with its name and an ending.
 #[must_use]
 pub fn recovered_folder(path: &Path) -> PathBuf {

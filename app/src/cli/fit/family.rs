@@ -4,8 +4,12 @@ use super::super::{Failure, new_file, output::Output};
 use super::FitArgs;
 use super::sources::{self, Recording};
 use crate::report::family::{self, FittedRecord};
+use crate::workers::fit::no_systematic;
+use palpate_model::families::Family;
 use palpate_model::families::by_key;
-use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
+use palpate_model::fit::{
+    FamilyFit, FamilyOptions, FitSample, Systematic, fit_family, systematic_family,
+};
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
 use palpate_protocols::compliance::Correction;
@@ -27,6 +31,9 @@ struct FamilyOutput<'a> {
     rmse_n: f64,
     effective_samples: f64,
     warnings: &'a [String],
+    /// What calibrations and compliances add; absent for tables and with `--no-systematic`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<&'a Systematic>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -37,6 +44,8 @@ struct ParameterOutput<'a> {
     value: f64,
     unit: &'a str,
     std_error: Option<f64>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic_error: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -73,8 +82,19 @@ pub(super) fn run(
     let named = sources::read(&found, columns, args.wanted(), &args.corrections()?, output)?;
     let borrowed: Vec<(&str, &[FitSample])> = named.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
-    let fit = fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
+    let mut fit =
+        fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
     let seconds = watch.seconds();
+    let systematic = match args.no_systematic {
+        true => None,
+        false => systematic(&fit, &*family, &named).unwrap_or_else(|reason| {
+            output.note(&no_systematic(&reason));
+            None
+        }),
+    };
+    if let Some(found) = &systematic {
+        fit = fit.with_systematic(found);
+    }
     let forces = forces(&fit, &borrowed)?;
     let records: Vec<FittedRecord<'_>> = borrowed
         .iter()
@@ -100,10 +120,32 @@ pub(super) fn run(
         rmse_n: fit.rms,
         effective_samples: fit.effective_samples,
         warnings: &fit.warnings,
+        systematic: systematic.as_ref(),
         seconds,
     };
-    output.result(&object, || family::whole(&*family, &fit, &records));
+    output.result(&object, || {
+        let sentence = systematic
+            .as_ref()
+            .map(|one| format!("- {}", one.sentence()));
+        let whole = [family::whole(&*family, &fit, &records)];
+        let lines: Vec<String> = whole.into_iter().chain(sentence).collect();
+        lines.join("\n")
+    });
     Ok(())
+}
+
+/// What calibrations and compliances add; `None` where none is known.
+fn systematic(
+    fit: &FamilyFit,
+    family: &dyn Family,
+    records: &[Recording],
+) -> Result<Option<Systematic>, String> {
+    let origins = sources::origins(records).map_err(|err| err.to_string())?;
+    let found = origins.map(|origins| {
+        let traced = sources::traced(records, &origins);
+        systematic_family(fit, family, &traced, FamilyOptions::default())
+    });
+    found.transpose().map_err(|err| err.to_string())
 }
 
 fn forces(fit: &FamilyFit, records: &[(&str, &[FitSample])]) -> Result<Vec<Vec<Newtons>>, Failure> {
@@ -137,6 +179,7 @@ fn parameters(fit: &FamilyFit) -> Vec<ParameterOutput<'_>> {
         value: one.value,
         unit: &one.unit,
         std_error: one.std_error,
+        systematic_error: one.systematic_error,
     });
     all.collect()
 }

@@ -4,7 +4,10 @@ use super::super::{Failure, output::Output};
 use super::Recipe;
 use super::sources::{self, Recording};
 use crate::report::text;
-use palpate_model::fit::{FitSample, JointReport, NamedReport, Parameter, fit_joint};
+use crate::workers::fit::no_systematic;
+use palpate_model::fit::{
+    FitSample, JointReport, NamedReport, Parameter, Systematic, fit_joint, systematic_joint,
+};
 use palpate_protocols::compliance::Correction;
 use palpate_protocols::runner::Stopwatch;
 use serde::Serialize;
@@ -19,6 +22,9 @@ struct JointOutput<'a> {
     report: &'a JointReport,
     /// What the rig's compliance did to the depths of each record, or would; null where none is known.
     compliances: Vec<Option<&'a Correction>>,
+    /// What calibrations and compliances add, for each record; absent for tables and with `--no-systematic`.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<&'a [Systematic]>,
     /// The fit alone, without reading.
     seconds: f64,
 }
@@ -46,7 +52,7 @@ pub(super) fn run(
     )?;
     let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
     let watch = Stopwatch::start();
-    let report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {
+    let mut report = fit_joint(&borrowed, &recipe.options, &shared).map_err(|err| {
         use palpate_model::fit::FitError::{NotShareable, UnknownParameter};
         match err {
             NotShareable { .. } | UnknownParameter { .. } => Failure::usage(err),
@@ -54,13 +60,43 @@ pub(super) fn run(
         }
     })?;
     let seconds = watch.seconds();
+    let systematic = match recipe.is_systematic {
+        true => systematic(&records, recipe, &shared).unwrap_or_else(|reason| {
+            output.note(&no_systematic(&reason));
+            None
+        }),
+        false => None,
+    };
+    if let Some(found) = &systematic {
+        report = report.with_systematic(found);
+    }
     let object = JointOutput {
+        systematic: systematic.as_deref(),
         report: &report,
         compliances: records.iter().map(|one| one.compliance.as_ref()).collect(),
         seconds,
     };
-    output.result(&object, || whole(&report));
+    output.result(&object, || {
+        let first = systematic.iter().flatten().next();
+        let sentence = first.map(|one| format!("- {}", one.sentence()));
+        let lines: Vec<String> = [whole(&report)].into_iter().chain(sentence).collect();
+        lines.join("\n")
+    });
     Ok(())
+}
+
+/// What calibrations and compliances add, for each record; `None` where none is known.
+fn systematic(
+    records: &[Recording],
+    recipe: &Recipe,
+    shared: &[&str],
+) -> Result<Option<Vec<Systematic>>, String> {
+    let origins = sources::origins(records).map_err(|err| err.to_string())?;
+    let found = origins.map(|origins| {
+        let traced = sources::traced(records, &origins);
+        systematic_joint(&traced, &recipe.options, shared)
+    });
+    found.transpose().map_err(|err| err.to_string())
 }
 
 fn names(shared: &str) -> Vec<&str> {

@@ -3,9 +3,11 @@
 use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
-use palpate_model::fit::FitSample;
+use palpate_model::calibration::{Calibration, CalibrationError};
+use palpate_model::fit::{FitSample, Traced};
 use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::compliance::{Correction, Corrections};
+use palpate_protocols::origin::Origin;
 use palpate_sessions::import::ColumnNames;
 use palpate_sessions::log::ReadError;
 use std::fs;
@@ -99,6 +101,25 @@ pub(in crate::cli) struct Recording {
     pub specimen: Option<String>,
     /// What the rig's compliance does to its depths, or would.
     pub compliance: Option<Correction>,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
+}
+
+/// Where the forces and depths of each come from, where that is known of any; `None` says that it is of none.
+pub(super) fn origins(records: &[Recording]) -> Result<Option<Vec<Origin>>, CalibrationError> {
+    let each = records
+        .iter()
+        .map(|one| Origin::of(one.calibration.as_ref(), one.compliance.as_ref()));
+    let origins: Vec<Origin> = each.collect::<Result<_, _>>()?;
+    Ok(origins.iter().any(Origin::is_known).then_some(origins))
+}
+
+/// The records as their systematic errors are found.
+pub(super) fn traced<'a>(records: &'a [Recording], origins: &'a [Origin]) -> Vec<Traced<'a>> {
+    let pairs = records.iter().zip(origins);
+    pairs
+        .map(|(one, origin)| origin.traced(&one.name, &one.samples))
+        .collect()
 }
 
 impl Recording {
@@ -147,6 +168,7 @@ pub(in crate::cli) fn read(
             name,
             samples: source.samples,
             specimen: source.specimen,
+            calibration: source.calibration,
             compliance,
         }))
     };

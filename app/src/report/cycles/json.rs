@@ -80,7 +80,7 @@ fn cycle(report: &CycleReport, index: usize) -> Value {
             "n_per_mm": number(stiffness.slope),
         })),
         "relaxation": one.relaxation.as_ref().map(relaxation),
-        "creep": one.creep.as_ref().map(creep),
+        "creep": one.creep.iter().map(creep).collect::<Vec<Value>>(),
         "prediction": report.predictions.get(index).map(prediction),
     })
 }

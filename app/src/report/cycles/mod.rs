@@ -65,7 +65,7 @@ impl CycleReport {
         // A table that is one sine has no ways in worth a name.
         let cycles = match question.frequency {
             Some(_) => Vec::new(),
-            None => analyse(&source.samples, question.at),
+            None => analyse(&source.samples, question.at, source.pulse),
         };
         let predictions = match &question.body {
             Some(body) => cycles

@@ -138,10 +138,11 @@ fn creep(report: &CycleReport) -> (&'static str, Vec<Vec<String>>) {
         "added %",
         "end rate mm/s",
     ])];
-    for one in &report.cycles {
-        let Some(creep) = &one.creep else { continue };
+    let all = report.cycles.iter();
+    let all = all.flat_map(|one| one.creep.iter().map(|creep| (one.cycle, creep)));
+    for (cycle, creep) in all {
         lines.push(vec![
-            one.cycle.to_string(),
+            cycle.to_string(),
             format!("{:.1}", creep.duration.0),
             plain(creep.force.0),
             plain(creep.force_sd.0),

@@ -16,6 +16,7 @@ mod search;
 
 pub use given::fit_family_at;
 pub use predict::{Predicted, predict};
+pub(super) use report::refit_family;
 pub use report::{FamilyFit, FamilyParameter, RecordFit, fit_body, fit_family};
 
 /// What a family's fit finds besides the body: the same for every family, or they could not be

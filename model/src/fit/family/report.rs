@@ -2,7 +2,7 @@
 
 use super::super::noise::{self, Blocks};
 use super::super::record::measured;
-use super::super::sample::{FitError, FitSample};
+use super::super::sample::{FitError, FitSample, Named};
 use super::super::triangle::{Factor, Triangle};
 use super::FamilyOptions;
 use super::descent::{GAIN_EXACT, Place, descend, place};
@@ -29,6 +29,9 @@ pub struct FamilyParameter {
     /// Standard error, with allowance for the memory of the residuals; `None` for a derived number
     /// and for one stopped at an end of its range.
     pub std_error: Option<f64>,
+    /// Standard uncertainty that calibration and compliance add, the same in every repeat; `None` where it is
+    /// not known or not asked for.
+    pub systematic_error: Option<f64>,
 }
 
 /// What belongs to one record.
@@ -175,6 +178,28 @@ pub fn fit_body(
     model(&problem, &end)
 }
 
+/// Fits records that differ little from each other, one call after the other: only the first is searched for.
+/// Gives the values of all parameters, in the order of [`FamilyFit::parameters`].
+pub(in super::super) fn refit_family(
+    family: &dyn Family,
+    options: FamilyOptions,
+) -> impl FnMut(&[Named<'_>]) -> Result<Vec<f64>, FitError> {
+    let mut known: Option<Vec<f64>> = None;
+    move |records| {
+        let problem = Problem::new(family, records, options)?;
+        let z = match &known {
+            Some(z) => z.clone(),
+            None => search(&problem).ok_or(FitError::Overflow)?.z,
+        };
+        let start = place(&problem, &z, Rows::All).ok_or(FitError::Overflow)?;
+        let end = descend(&problem, start, Rows::All, GAIN_EXACT);
+        let model = model(&problem, &end)?;
+        known.get_or_insert(end.z);
+        let all = model.parameters().map_err(|_| FitError::Overflow)?;
+        Ok(all.into_iter().map(|one| one.value).collect())
+    }
+}
+
 /// The model at a place, if the family allows its numbers.
 fn model(problem: &Problem<'_>, end: &Place) -> Result<Model, FitError> {
     let family = problem.family;
@@ -230,6 +255,7 @@ fn parameters(
             name: parameter.name,
             unit: parameter.unit,
             value: parameter.value,
+            systematic_error: None,
         })
         .collect())
 }

@@ -3,14 +3,10 @@
 //! Decisions (commands, records, endings) must be equal where the engine version is; derived
 //! numbers must agree within a stated tolerance whatever the version.
 
-use crate::engine::{self, Config, ENGINE_VERSION, Effect, Input, State};
-use crate::plans::Plan;
+use crate::engine::{self, ENGINE_VERSION, Effect, Input, State};
 use crate::runner::{LiveFeed, to_json};
 use palpate_model::Nanos;
-use palpate_model::calibration::Calibration;
 use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{AxisStatus, Reading};
-use palpate_model::units::Volts;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{Entry, EntryKind, Row};
 use serde::{Deserialize, Serialize};
@@ -19,6 +15,13 @@ use std::collections::VecDeque;
 use std::path::Path;
 use std::sync::Arc;
 use thiserror::Error;
+
+mod player;
+mod source;
+mod words;
+
+pub use player::Player;
+use source::{RecordedInput, config_of, inputs_of, reading_of};
 
 /// Force and depth come from the same arithmetic on the same raw numbers; `exp` and friends may
 /// differ in the last digits between platforms, which depth (under 200 mm) and force (under 50 N)
@@ -83,10 +86,26 @@ pub struct Difference {
     pub what: String,
     /// Number of the decision, for a decision.
     pub decision: Option<usize>,
+    /// What the protocol was doing, in its words, such as `step 6 of 8, ramp, cycle 2`.
+    pub step: String,
     /// What the session says.
     pub recorded: Value,
     /// What the engine says now.
     pub now: Value,
+}
+
+impl Difference {
+    /// What the session says, in words.
+    #[must_use]
+    pub fn recorded_words(&self) -> String {
+        words::of(&self.recorded)
+    }
+
+    /// What the engine says now, in words.
+    #[must_use]
+    pub fn now_words(&self) -> String {
+        words::of(&self.now)
+    }
 }
 
 /// A decision that is allowed to differ, for a reason somebody reviewed.
@@ -185,62 +204,6 @@ pub fn replay(session: &Session, blessings: &[Blessing]) -> Result<ReplayReport,
     Ok(run.report)
 }
 
-fn config_of(session: &Session) -> Result<Config, ReplayError> {
-    let manifest = &session.manifest;
-    let bad = |what, detail: String| ReplayError::Manifest { what, detail };
-    if let Some(imported) = &manifest.imported {
-        let file = imported.file.clone();
-        return Err(ReplayError::Imported { file });
-    }
-    let nothing = |what| bad(what, "it is missing".into());
-    let rig = manifest.rig.clone().ok_or_else(|| nothing("rig"))?;
-    let limits = manifest.limits.ok_or_else(|| nothing("limits"))?;
-    let plan: Plan = serde_json::from_value(manifest.plan.clone())
-        .map_err(|err| bad("plan", err.to_string()))?;
-    let calibration: Calibration = serde_json::from_value(manifest.calibration.clone())
-        .map_err(|err| bad("calibration", err.to_string()))?;
-    let is_homed = manifest
-        .settings
-        .get("is_homed_at_start")
-        .and_then(Value::as_bool)
-        .ok_or_else(|| bad("settings", "is_homed_at_start is missing".into()))?;
-    Ok(Config {
-        rig,
-        limits: plan.limits.tighten(limits),
-        curve: calibration
-            .curve()
-            .map_err(|err| bad("calibration", err.to_string()))?,
-        plan,
-        is_homed,
-    })
-}
-
-struct RecordedInput {
-    after_sample: u64,
-    now: Nanos,
-    input: Input,
-}
-
-fn inputs_of(session: &Session) -> Result<VecDeque<RecordedInput>, ReplayError> {
-    session
-        .entries
-        .iter()
-        .filter(|entry| entry.kind != EntryKind::Decision)
-        .map(|entry| {
-            let input =
-                serde_json::from_value(entry.body.clone()).map_err(|err| ReplayError::Input {
-                    order: entry.order,
-                    detail: err.to_string(),
-                })?;
-            Ok(RecordedInput {
-                after_sample: entry.after_sample,
-                now: entry.now,
-                input,
-            })
-        })
-        .collect()
-}
-
 struct Replay<'a> {
     state: Option<State>,
     live: LiveFeed,
@@ -279,16 +242,8 @@ impl Replay<'_> {
     }
 
     fn feed_row(&mut self, index: u64, row: &Row) {
-        // Every row of a session with a rig has both.
-        let (Some(volts), Some(pulses)) = (row.volts, row.pulses) else {
+        let Some(reading) = reading_of(row) else {
             return;
-        };
-        let reading = Reading {
-            tick: row.tick,
-            counts: row.counts,
-            volts: Volts(volts),
-            pulses,
-            status: AxisStatus(row.status),
         };
         self.step(row.host, index + 1, Input::Reading(reading));
         let Some(state) = &self.state else { return };
@@ -409,7 +364,9 @@ impl Replay<'_> {
         recorded: Value,
         now: Value,
     ) {
+        let step = self.state.as_ref().map_or(String::new(), words::of_step);
         self.report.first_difference.get_or_insert(Difference {
+            step,
             at_s: at.seconds().0,
             after_sample,
             what: what.into(),

@@ -1,0 +1,203 @@
+//! The window of `palpate replay SESSION --window`: a recorded session as it was at any moment, at any speed. No rig
+//! belongs to it, so nothing in it can move one.
+
+mod transport;
+
+use crate::command::{Command, Commands};
+use crate::plots::PlotCache;
+use crate::plots::force_depth::force_depth_ui;
+use crate::plots::force_time::{TimeView, force_time_ui};
+use crate::screens::results_panel::findings_ui;
+use crate::shell::activity::{Intent, activity};
+use crate::shell::event_log::EventLog;
+use crate::shell::top_bar::{HEIGHT, numbers_ui};
+use crate::theme::{self, Tokens};
+use crate::widgets::state_badge::badge_ui;
+use crate::window::{frame, open_window};
+use crate::workers::fit::Refit;
+use crate::workers::player::PlayerThread;
+use eframe::egui::{
+    Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, vec2,
+};
+use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
+use palpate_model::units::{Newtons, Seconds};
+use palpate_protocols::replay::Player;
+use palpate_protocols::runner::{Snapshot, TimeScale};
+use std::sync::Arc;
+use std::time::Duration;
+use transport::Transport;
+
+/// Width of the panel beside the plots and height of the event log, in points.
+const RIGHT_WIDTH: f32 = 318.0;
+const LOG_HEIGHT: f32 = 134.0;
+/// Between two frames while it plays: 30 a second is what an eye needs on a chart.
+const FRAME_PLAYING: Duration = Duration::from_millis(33);
+
+/// What is played and how.
+pub struct PlaybackOptions {
+    /// The session, at its beginning.
+    pub player: Player,
+    /// What its forces were read with.
+    pub calibration: Calibration,
+    /// The force at which its interlock trips.
+    pub force_max: Newtons,
+    /// What it is called in the head of the window.
+    pub name: String,
+    /// Pace at which it begins.
+    pub scale: TimeScale,
+}
+
+/// Opens the window and returns when it has closed.
+pub fn run_playback(options: PlaybackOptions) -> Result<(), String> {
+    open_window(move |ctx| PlaybackApp::new(options, ctx))
+}
+
+/// The window's state.
+pub struct PlaybackApp {
+    thread: PlayerThread,
+    snapshot: Arc<Snapshot>,
+    end: Nanos,
+    transport: Transport,
+    name: String,
+    force_max: Newtons,
+    is_same_engine: bool,
+    plots: PlotCache,
+    events: EventLog,
+    time_view: TimeView,
+}
+
+impl PlaybackApp {
+    /// Stands at the beginning of the session and plays.
+    pub fn new(options: PlaybackOptions, ctx: &Context) -> Result<Self, String> {
+        theme::apply(ctx);
+        let transport = Transport::new(options.player.end().seconds().0, options.scale);
+        let (end, is_same_engine) = (options.player.end(), options.player.is_same_engine());
+        let wake = ctx.clone();
+        let thread = PlayerThread::start(options.player, move || wake.request_repaint())?;
+        Ok(Self {
+            snapshot: thread.snapshot(),
+            thread,
+            end,
+            transport,
+            name: options.name,
+            force_max: options.force_max,
+            is_same_engine,
+            plots: PlotCache::for_calibration(&options.calibration),
+            events: EventLog::default(),
+            time_view: TimeView::default(),
+        })
+    }
+
+    /// What is shown.
+    #[must_use]
+    pub fn snapshot(&self) -> &Arc<Snapshot> {
+        &self.snapshot
+    }
+
+    fn head_ui(&self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            ui.set_height(HEIGHT);
+            let state = activity(&self.snapshot, Intent::None);
+            badge_ui(ui, &state, vec2(146.0, HEIGHT));
+            ui.add_space(6.0);
+            ui.vertical(|ui| {
+                ui.set_width(380.0);
+                ui.add(Label::new(format!("Replay of {}", self.name)).truncate());
+                let run = self.snapshot.run.as_ref();
+                let words = match run.and_then(|run| run.prompt.as_ref()) {
+                    Some(prompt) => format!("asked: {}", prompt.message),
+                    None if !self.is_same_engine => {
+                        "decided anew: another version of palpate recorded it".to_owned()
+                    }
+                    None => "as it was recorded; nothing here moves a rig".to_owned(),
+                };
+                ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).truncate());
+            });
+            ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+                numbers_ui(ui, &self.snapshot);
+            });
+        });
+    }
+
+    fn plots_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Force over time").heading().strong());
+            ui.selectable_value(&mut self.time_view, TimeView::Whole, "Whole run");
+            ui.selectable_value(&mut self.time_view, TimeView::FromRamp, "From ramp");
+            if let Some(remark) = self.plots.remark() {
+                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+            }
+        });
+        let run = self.snapshot.run.as_ref();
+        let height = (ui.available_height() - 30.0) * 0.56;
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+            force_time_ui(ui, run, &self.plots, None, self.time_view, self.force_max);
+        });
+        ui.label(RichText::new("Force over depth").heading().strong());
+        force_depth_ui(ui, &self.plots, 0.0);
+    }
+}
+
+impl eframe::App for PlaybackApp {
+    fn logic(&mut self, ctx: &Context, _frame: &mut eframe::Frame) {
+        self.snapshot = self.thread.snapshot();
+        self.plots.update(self.snapshot.run.as_ref());
+        let shown = self.snapshot.run.as_ref();
+        let shown = shown.map_or(0.0, |run| run.now.seconds().0);
+        self.transport.read_keys(ctx, shown);
+        let passed = ctx.input(|input| f64::from(input.stable_dt));
+        if let Some(wanted) = self.transport.pass(passed, shown) {
+            // The end in seconds may be rounded to before the last input.
+            let time = match wanted < self.end.seconds().0 {
+                true => Nanos::from_seconds(Seconds(wanted)),
+                false => self.end,
+            };
+            self.thread.go_to(time);
+        }
+        if self.transport.is_playing() {
+            ctx.request_repaint_after(FRAME_PLAYING);
+        }
+    }
+
+    fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
+        let mut commands = Commands::default();
+        Panel::top("head")
+            .exact_size(HEIGHT + 14.0)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| self.head_ui(ui));
+        Panel::bottom("log")
+            .exact_size(LOG_HEIGHT)
+            .resizable(false)
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.events.ui(ui, &self.snapshot, &mut commands));
+        Panel::bottom("transport")
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| {
+                let run = self.snapshot.run.as_ref();
+                let shown = run.map_or(0.0, |run| run.now.seconds().0);
+                self.transport.ui(ui, shown);
+            });
+        Panel::right("results")
+            .exact_size(RIGHT_WIDTH)
+            .resizable(false)
+            .frame(frame(ui, false))
+            .show(ui, |ui| {
+                let area = ScrollArea::vertical().id_salt("results");
+                area.auto_shrink(false).show(ui, |ui| {
+                    findings_ui(ui, &self.snapshot, Refit::NotYet, self.plots.loops());
+                });
+            });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.plots_ui(ui));
+        // The only thing that the events ask for here.
+        if commands.take().contains(&Command::SwitchTheme) {
+            theme::switch(ui.ctx());
+        }
+    }
+}

@@ -1,0 +1,238 @@
+//! What is shown of a run, gathered from what goes into its engine and what comes out: the same for a run in
+//! progress and for one that is replayed.
+
+use super::snapshot::{LogLine, PromptView, RunView};
+use crate::base::FoundBase;
+use crate::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
+use crate::preview::StepPreview;
+use palpate_model::Nanos;
+use palpate_model::rig::Phase;
+use palpate_model::signal::LiveTrace;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_sessions::edits::Verdict;
+use std::collections::VecDeque;
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Buckets of the live plots: two points a bucket, two buckets a pixel on a wide screen.
+const TRACE_BUCKETS: usize = 2048;
+
+#[derive(Clone, Debug)]
+pub(crate) struct Board {
+    steps: Arc<Vec<StepPreview>>,
+    folder: PathBuf,
+    now: Nanos,
+    samples: u64,
+    trace: Arc<LiveTrace>,
+    force_peak: Option<Newtons>,
+    /// Where the tissue was found, should depths count from a base by now.
+    tissue: Option<Contact>,
+    base: FoundBase,
+    events: VecDeque<LogLine>,
+    phases: Arc<Vec<(f64, Phase)>>,
+    cycle_starts: Arc<Vec<(f64, u32)>>,
+    cycles: u32,
+    outcome: Option<Outcome>,
+}
+
+/// What is known of a run's log.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct LogState {
+    /// Session time through which everything is on disk.
+    pub saved_through: Nanos,
+    pub verdict: Option<(Verdict, String)>,
+    pub error: Option<String>,
+}
+
+impl Board {
+    pub fn new(config: &Config, steps: Vec<StepPreview>, folder: PathBuf) -> Self {
+        let cycles = config.plan.steps.iter().map(|planned| planned.cycle).max();
+        Self {
+            steps: Arc::new(steps),
+            folder,
+            now: Nanos::ZERO,
+            samples: 0,
+            trace: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
+            force_peak: None,
+            tissue: None,
+            base: FoundBase::default(),
+            events: VecDeque::new(),
+            phases: Arc::new(Vec::new()),
+            cycle_starts: Arc::new(Vec::new()),
+            cycles: cycles.unwrap_or(0),
+            outcome: None,
+        }
+    }
+
+    /// Session time of the newest input.
+    pub fn now(&self) -> Nanos {
+        self.now
+    }
+
+    /// Samples taken.
+    pub fn samples(&self) -> u64 {
+        self.samples
+    }
+
+    /// How it ended, once it has.
+    pub fn outcome(&self) -> Option<&Outcome> {
+        self.outcome.as_ref()
+    }
+
+    /// An input comes; samples are told once the engine has taken them.
+    pub fn input(&mut self, now: Nanos, input: &Input) {
+        self.now = now;
+        match input {
+            Input::Operator { choice } => self.note(format!("operator: {choice}"), false),
+            Input::Fault(fault) => self.note(fault.to_string(), true),
+            _ => {}
+        }
+    }
+
+    /// The engine has taken a sample.
+    pub fn sample(&mut self, state: &State) {
+        self.samples += 1;
+        let (cycle, last) = (state.cycle(), self.cycle_starts.last());
+        if cycle > 0 && last.is_none_or(|(_, last)| *last != cycle) {
+            Arc::make_mut(&mut self.cycle_starts).push((self.now.seconds().0, cycle));
+        }
+        let derived = state.derived();
+        if let Some(force) = derived.force {
+            if self.force_peak.is_none_or(|peak| force > peak) {
+                self.force_peak = Some(force);
+            }
+            let depth = derived.depth.unwrap_or(Depth(f64::NAN));
+            Arc::make_mut(&mut self.trace).push(self.now.seconds(), depth, force);
+        }
+    }
+
+    /// The engine writes something down.
+    pub fn record(&mut self, record: &Record) {
+        if let Record::PhaseStarted { phase, .. } = record {
+            Arc::make_mut(&mut self.phases).push((self.now.seconds().0, *phase));
+        }
+        if let Record::ContactFound {
+            position,
+            std_error_mm,
+        } = record
+        {
+            self.tissue = Some(Contact {
+                position: *position,
+                std_error_mm: *std_error_mm,
+            });
+        }
+        if let Some(base) = FoundBase::of(record) {
+            // Without a thickness no tissue is known in front of it.
+            self.tissue = self.tissue.filter(|_| base.thickness_mm.is_some());
+            self.base = base;
+        }
+        let is_alarm = match record {
+            Record::InterlockTripped { .. } => true,
+            Record::EndingStarted { ending, .. } => is_alarming(*ending),
+            _ => false,
+        };
+        self.note(record.to_string(), is_alarm);
+    }
+
+    /// The run has ended.
+    pub fn end(&mut self, outcome: &Outcome) {
+        let text = format!("{}: {}", outcome.ending, outcome.reason);
+        self.note(text, is_alarming(outcome.ending));
+        self.outcome = Some(outcome.clone());
+    }
+
+    /// Something happened.
+    pub fn note(&mut self, text: String, is_alarm: bool) {
+        if self.events.len() == RunView::EVENTS_MAX {
+            self.events.pop_front();
+        }
+        let at = self.now;
+        self.events.push_back(LogLine { at, text, is_alarm });
+    }
+
+    /// The run as the world may see it.
+    pub fn view(&self, state: &State, log: LogState) -> RunView {
+        let (step_index, step_started) = state.step_progress();
+        let (time_left, fraction) = self.progress(step_index, step_started);
+        RunView {
+            plan_name: state.config().plan.name.clone(),
+            folder: self.folder.clone(),
+            phase: state.phase(),
+            power: state.power(),
+            steps: Arc::clone(&self.steps),
+            step_index,
+            now: self.now,
+            time_left,
+            fraction,
+            derived: *state.derived(),
+            tare: state.tare(),
+            contact: self.contact(state),
+            base: self.base,
+            force_peak: self.force_peak,
+            live: state.live().cloned(),
+            trace: Arc::clone(&self.trace),
+            phases: Arc::clone(&self.phases),
+            samples: self.samples,
+            saved_through: log.saved_through,
+            is_motion_possible: state.is_motion_possible(),
+            pause: state.pause(),
+            prompt: state.prompt().map(|(prompt, until)| PromptView {
+                message: prompt.message.clone(),
+                time_left: until.since(self.now).seconds(),
+            }),
+            next_checkpoint: next_checkpoint(state, step_index),
+            cycle: state.cycle(),
+            cycles: self.cycles,
+            cycle_starts: Arc::clone(&self.cycle_starts),
+            holding: state.holding().cloned(),
+            can_retract: state.can_retract().map_err(String::from),
+            outcome: self.outcome.clone(),
+            verdict: log.verdict,
+            log_error: log.error,
+            events: Arc::new(self.events.iter().cloned().collect()),
+        }
+    }
+
+    /// Where the tissue begins, though depths may count from the base behind it.
+    fn contact(&self, state: &State) -> Option<Contact> {
+        let counted = state.contact()?;
+        match self.base.base_mm == Some(counted.position.0) {
+            true => self.tissue,
+            false => Some(counted),
+        }
+    }
+
+    /// Expected time left and share done, from the preview and the step in progress.
+    fn progress(&self, step_index: usize, step_started: Nanos) -> (Seconds, f64) {
+        if self.outcome.is_some() {
+            return (Seconds(0.0), 1.0);
+        }
+        let spent = self.now.since(step_started).seconds().0;
+        let left: f64 = self
+            .steps
+            .iter()
+            .enumerate()
+            .skip(step_index)
+            .map(|(i, step)| {
+                if i == step_index {
+                    (step.expected.0 - spent).max(0.0)
+                } else {
+                    step.expected.0
+                }
+            })
+            .sum();
+        let done = self.now.seconds().0;
+        (Seconds(left), done / (done + left).max(1e-9))
+    }
+}
+
+/// The nearest place ahead where a pause spoils nothing, by its name.
+fn next_checkpoint(state: &State, step_index: usize) -> Option<(usize, String)> {
+    let mut ahead = state.config().plan.checkpoints_from(step_index);
+    ahead.next().map(|(index, name)| (index, name.to_owned()))
+}
+
+/// Whether an ending needs attention; a stop the operator asked for does not.
+fn is_alarming(ending: EndingKind) -> bool {
+    !matches!(ending, EndingKind::Finish | EndingKind::Stop)
+}

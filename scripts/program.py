@@ -1,0 +1,16 @@
+"""The palpate that a script is about: PALPATE names it, else it is the development build, made if it is out of date."""
+import json
+import os
+import pathlib
+import subprocess
+
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+CACHE = pathlib.Path(os.environ.get("XDG_CACHE_HOME") or pathlib.Path.home() / ".cache") / "palpate"
+
+
+def palpate():
+    if "PALPATE" in os.environ:
+        return pathlib.Path(os.environ["PALPATE"]).resolve()
+    subprocess.run(["cargo", "build", "--quiet"], cwd=ROOT, check=True)
+    told = subprocess.run(["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True)
+    return pathlib.Path(json.loads(told.stdout)["target_directory"]) / "debug" / "palpate"

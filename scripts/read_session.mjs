@@ -1,0 +1,156 @@
+// Reads a session without palpate: the JavaScript example of docs/guide/format.md, and a reader of scripts/other-readers.
+//
+// Usage: node read_session.mjs SESSION      (needs `npm install @mcap/core fzstd` in the same folder)
+import { readFileSync, readdirSync, statSync } from "node:fs";
+import { join } from "node:path";
+import { pathToFileURL } from "node:url";
+import { McapIndexedReader, McapStreamReader } from "@mcap/core";
+import { decompress } from "fzstd";
+
+const decompressHandlers = { zstd: (data, size) => decompress(data, new Uint8Array(Number(size))) };
+const PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh " +
+  "check-home paused imported").split(" ");
+
+/** The whole numbers of a packed array, 64 bits each: seven bits a byte, lowest first, 128 where more follow. */
+function numbers(data) {
+  const values = [];
+  for (let at = 0; at < data.length; ) {
+    let low = data[at++];
+    if (low < 128) {
+      values.push(BigInt(low));
+      continue;
+    }
+    let value = BigInt(low & 127);
+    for (let shift = 7n, byte = 128; byte >= 128; shift += 7n) {
+      byte = data[at++];
+      value |= BigInt(byte & 127) << shift;
+    }
+    values.push(value);
+  }
+  return values;
+}
+
+/** A Protocol Buffers message as an object from field number to whole number, eight bytes or packed array. */
+export function fields(data) {
+  const found = {};
+  let at = 0;
+  const varint = () => {
+    const start = at;
+    while (data[at++] >= 128);
+    return Number(numbers(data.subarray(start, at))[0]);
+  };
+  while (at < data.length) {
+    const key = varint();
+    const kind = key & 7;
+    const length = kind === 1 ? 8 : varint();
+    found[key >>> 3] = kind === 0 ? length : data.subarray(at, at + length);
+    if (kind !== 0) at += length;
+  }
+  return found;
+}
+
+const signed = (data) => numbers(data).map((value) => (value >> 1n) ^ -(value & 1n));
+
+/** Values of which the differences are stored, the first from 0. */
+function summed(data, asType) {
+  let value = 0n;
+  return signed(data).map((difference) => (value = asType(64, value + difference)));
+}
+
+export function doubles(data) {
+  const view = new DataView(data.buffer, data.byteOffset, data.length);
+  return Array.from({ length: data.length / 8 }, (_, i) => view.getFloat64(8 * i, true));
+}
+
+/** The columns of a pair of blocks. A value that is not known is null; 64-bit numbers are BigInt. */
+function samples(rawBytes, derivedBytes) {
+  const raw = fields(rawBytes);
+  const derived = fields(derivedBytes);
+  const tick = summed(raw[2], BigInt.asUintN);
+  const absent = tick.map(() => null);
+  const small = (data) => numbers(data).map(Number);
+  const validity = small(derived[4]);
+  const known = (data, bit) => doubles(data).map((x, i) => (validity[i] & bit ? x : null));
+  return {
+    tick,
+    host_ns: summed(raw[3], BigInt.asUintN),
+    counts: raw[4] ? signed(raw[4]).map(Number) : absent,
+    signal_V: raw[5] ? doubles(raw[5]) : absent,
+    pulses: raw[6] ? summed(raw[6], BigInt.asIntN) : absent,
+    status: small(raw[7]),
+    force_N: known(derived[2], 1),
+    depth_mm: known(derived[3], 2),
+    phase: small(derived[5]).map((code) => PHASES[code]),
+    cycle: small(derived[6]),
+  };
+}
+
+/** [topic, sequence, bytes] of every message up to where the file ends or is cut; a wrong checksum is an error. */
+export function streamed(path) {
+  const reader = new McapStreamReader({ decompressHandlers, validateCrcs: true });
+  reader.append(readFileSync(path));
+  const topics = new Map();
+  const found = [];
+  for (let record; (record = reader.nextRecord()); ) {
+    if (record.type === "Channel") topics.set(record.id, record.topic);
+    if (record.type === "Message") found.push([topics.get(record.channelId), record.sequence, record.data]);
+  }
+  return found;
+}
+
+/** The same of a finished file through its index, in the order of time. */
+export async function indexed(path) {
+  const bytes = readFileSync(path);
+  const readable = {
+    size: async () => BigInt(bytes.length),
+    read: async (offset, size) => bytes.subarray(Number(offset), Number(offset + size)),
+  };
+  const reader = await McapIndexedReader.Initialize({ readable, decompressHandlers });
+  const found = [];
+  for await (const message of reader.readMessages()) {
+    found.push([reader.channelsById.get(message.channelId).topic, message.sequence, message.data]);
+  }
+  return found;
+}
+
+/** The columns of all samples, and of every other topic its messages' bytes. */
+export function read(session) {
+  const isFolder = statSync(session).isDirectory();
+  const names = isFolder ? readdirSync(session).filter((name) => /^\d+\.mcap$/.test(name)) : [];
+  names.sort((a, b) => parseInt(a) - parseInt(b));
+  const files = isFolder ? names.map((name) => join(session, name)) : [session];
+  return assembled(files.flatMap(streamed));
+}
+
+export function assembled(messages) {
+  const columns = {};
+  const others = {};
+  const following = {};
+  let raw;
+  for (const [topic, sequence, data] of messages) {
+    const expected = following[topic] ?? 0;
+    if (sequence > expected) throw new Error(`message ${expected} of ${topic} is missing`);
+    if (sequence < expected) continue; // It was written again after the disk had failed.
+    following[topic] = sequence + 1;
+    if (topic === "/daq/block") raw = data;
+    else if (topic === "/derived/block") {
+      for (const [name, values] of Object.entries(samples(raw, data))) (columns[name] ??= []).push(values);
+    } else (others[topic] ??= []).push(data);
+  }
+  for (const name in columns) columns[name] = columns[name].flat();
+  if (columns.tick) {
+    // Seconds since the first sample. In an imported session, which has no rig, a tick is a picosecond.
+    const { rig } = JSON.parse(new TextDecoder().decode(others["/manifest"][0]));
+    const ticks = columns.tick.map((tick) => Number(BigInt.asIntN(64, tick - columns.tick[0])));
+    columns.t_s = ticks.map((n) => (rig ? n * (rig.tick_nanos * 1e-9) : n / 1e12));
+  }
+  return { columns, others };
+}
+
+if (import.meta.url === pathToFileURL(process.argv[1]).href) {
+  const { columns, others } = read(process.argv[2]);
+  for (const [name, values] of Object.entries(columns)) {
+    console.log(`${name}: ${values.length} samples, first ${values[0]}, last ${values.at(-1)}`);
+  }
+  for (const [topic, found] of Object.entries(others)) console.log(`${topic}: ${found.length} messages`);
+}

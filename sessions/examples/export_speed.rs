@@ -1,0 +1,45 @@
+//! How fast a session becomes Parquet, from its log and from memory. `scripts/measure export` compares it with pyarrow.
+//!
+//! `cargo run --release -p palpate-sessions --example export_speed -- SESSION FOLDER`
+//! prints one JSON object, times in s; the tables stay in FOLDER.
+#![expect(clippy::print_stdout, reason = "a program that prints")]
+
+use palpate_sessions::Session;
+use palpate_sessions::export::{Beside, Feed, Format, Selection, Table};
+use std::path::Path;
+use std::time::Instant;
+
+#[expect(clippy::disallowed_methods, reason = "this program measures time")]
+fn timed(table: &Table, path: &Path, feed: Feed) -> Result<f64, Box<dyn std::error::Error>> {
+    let start = Instant::now();
+    table.write(Format::Parquet, path, feed)?;
+    Ok(start.elapsed().as_secs_f64())
+}
+
+fn main() -> Result<(), Box<dyn std::error::Error>> {
+    let mut words = std::env::args_os().skip(1);
+    let (Some(session), Some(folder)) = (words.next(), words.next()) else {
+        return Err("usage: export_speed SESSION FOLDER".into());
+    };
+    let (session, folder) = (Path::new(&session), Path::new(&folder));
+    let whole = Session::open(session)?;
+    let table = Table {
+        manifest: &whole.manifest,
+        notes: &whole.notes,
+        beside: &Beside::default(),
+        selection: &Selection::default(),
+    };
+    let from_log = timed(&table, &folder.join("from_log.parquet"), &mut |take| {
+        Session::scan(session, &mut |block| {
+            block.rows().for_each(|row| take(&row))
+        })
+        .map(|_| ())
+    })?;
+    let from_memory = timed(&table, &folder.join("from_memory.parquet"), &mut |take| {
+        whole.rows.iter().for_each(&mut *take);
+        Ok(())
+    })?;
+    let rows = whole.rows.len();
+    println!("{{\"rows\":{rows},\"from_log_s\":{from_log},\"from_memory_s\":{from_memory}}}");
+    Ok(())
+}

@@ -1,0 +1,99 @@
+//! The window of a replay, driven by accessible name: no display, no pixels.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use egui_kittest::Harness;
+use egui_kittest::kittest::Queryable;
+use palpate_app::playback::{PlaybackApp, PlaybackOptions};
+use palpate_model::units::Newtons;
+use palpate_protocols::analysis::calibration_of;
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::replay::Player;
+use palpate_protocols::runner::{RunView, TimeScale};
+use palpate_sessions::Session;
+use palpate_tests::workspace;
+use std::time::Duration;
+
+type Window = Harness<'static, PlaybackApp>;
+
+fn open(scale: TimeScale) -> Window {
+    let folder = workspace().join("tests/sessions/ramp-hold-lab");
+    let session = Session::open(&folder).unwrap();
+    let options = PlaybackOptions {
+        calibration: calibration_of(&session).unwrap(),
+        player: Player::new(session, folder).unwrap(),
+        force_max: Newtons(9.0),
+        name: "ramp-hold-lab".into(),
+        scale,
+    };
+    Harness::builder()
+        .with_size((1280.0, 800.0))
+        .build_eframe(|cc| PlaybackApp::new(options, &cc.egui_ctx).unwrap())
+}
+
+fn run(window: &Window) -> RunView {
+    window.state().snapshot().run.clone().unwrap()
+}
+
+/// Draws frames until the run is so; a minute at most.
+fn wait(window: &mut Window, what: &str, is_so: impl Fn(&RunView) -> bool) {
+    for _ in 0..12_000 {
+        window.step();
+        if is_so(&run(window)) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!(
+        "{what} did not come; the session stands at {}",
+        run(window).now
+    );
+}
+
+fn click(window: &mut Window, name: &str) {
+    window.get_by_label(name).click_accesskit();
+    window.run_steps(2);
+}
+
+#[test]
+fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
+    let mut window = open(TimeScale::Max);
+    wait(&mut window, "the end", |run| run.outcome.is_some());
+    let end = run(&window);
+    assert_eq!(end.outcome.as_ref().unwrap().ending, EndingKind::Finish);
+    assert!(
+        window
+            .query_by_label_contains("Replay of ramp-hold-lab")
+            .is_some()
+    );
+    // Nothing here can start, stop or close anything on a rig.
+    for name in ["Stop motion  F12", "Halt  F11", "Close session"] {
+        assert!(window.query_by_label(name).is_none(), "{name}");
+    }
+    // The slider, to the middle of the session: everything as it was known then.
+    window.run_steps(2);
+    let middle = end.now.seconds().0 / 2.0;
+    window
+        .get_all_by_label("session time")
+        .next()
+        .unwrap()
+        .set_value_accesskit(middle);
+    let near = move |run: &RunView| (run.now.seconds().0 - middle).abs() < 0.2;
+    wait(&mut window, "the middle", near);
+    let then = run(&window);
+    assert!(then.outcome.is_none() && then.samples < end.samples);
+    assert!(window.query_by_label("Play").is_some());
+    click(&mut window, "Back 10 s");
+    wait(&mut window, "ten seconds before", |run| {
+        (run.now.seconds().0 - middle + 10.0).abs() < 0.4
+    });
+    // At a hundred times it goes on from there.
+    click(&mut window, "100x");
+    click(&mut window, "Play");
+    wait(&mut window, "what comes after", |run| {
+        run.now.seconds().0 > middle + 5.0
+    });
+    click(&mut window, "Pause");
+    let paused = run(&window).now;
+    window.run_steps(5);
+    assert_eq!(run(&window).now, paused);
+}
