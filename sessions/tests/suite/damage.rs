@@ -139,6 +139,40 @@ fn damage_in_the_middle_is_refused_and_can_be_recovered_from() {
     }
 }
 
+/// A length that leads past the end looks like a write that was interrupted, but for what lies behind it.
+#[test]
+fn a_length_that_leads_past_the_end_hides_nothing() {
+    let original = Original::new(false);
+    let folder = quick_folder();
+    let path = folder.path().join("000.mcap");
+    let bytes = &original.bytes;
+    let length_at =
+        |place: usize| u64::from_le_bytes(bytes[place + 1..place + 9].try_into().unwrap());
+    let mut places = Vec::new();
+    let mut place = 8;
+    while place < bytes.len() {
+        // The chunks behind that of the manifest.
+        if bytes[place] == 6 {
+            places.push(place);
+        }
+        place += 9 + length_at(place) as usize;
+    }
+    assert_eq!(places.len(), 1 + 30);
+    for place in &places[1..30] {
+        let mut bytes = bytes.clone();
+        let past_end = (bytes.len() - place) as u64;
+        bytes[place + 1..place + 9].copy_from_slice(&past_end.to_le_bytes());
+        put(&path, &bytes);
+        let refusal = Session::open(&path).unwrap_err();
+        let ReadError::Damaged { offset, .. } = refusal else {
+            panic!("{refusal}");
+        };
+        assert_eq!(offset, *place as u64);
+        let kept = original.check_salvage(&path, "a wrong length");
+        assert_eq!(kept, Some(2900), "a batch and no more");
+    }
+}
+
 #[test]
 fn one_flipped_bit_costs_a_batch() {
     let rows = rows(20_000, 13);

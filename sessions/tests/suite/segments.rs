@@ -369,6 +369,30 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
 }
 
+/// That the next segment goes on without a gap does not make up for it: only one begun because of it would.
+#[test]
+fn a_wrong_checksum_in_any_segment_is_refused() {
+    let (folder, rows, _) = three_segments();
+    for number in 0..3 {
+        let path = folder.path().join(segment_file(number));
+        let whole = fs::read(&path).unwrap();
+        let mut hurt = whole.clone();
+        // In the index, where no sample is.
+        let index = hurt.len() - 100;
+        hurt[index] ^= 1;
+        fs::write(&path, &hurt).unwrap();
+        let refusal = Session::open(folder.path()).unwrap_err().to_string();
+        assert!(refusal.contains("the checksum of the index"), "{refusal}");
+        assert!(refusal.contains(&segment_file(number)), "{refusal}");
+        let (left, kept) = salvaged(folder.path());
+        assert!(same_bits(&kept, &rows));
+        let told = left.missing.sentences().join("; ");
+        assert!(told.contains(&segment_file(number)), "{told}");
+        fs::write(&path, &whole).unwrap();
+    }
+    Session::open(folder.path()).unwrap();
+}
+
 #[test]
 fn segments_of_another_session_are_refused() {
     let (folder, rows, entries) = three_segments();
