@@ -78,7 +78,11 @@ impl Stated {
             ([], _) => format!("\"{name}\" states nothing"),
             (terms, []) => format!("\"{name}\" states {}", words(terms)),
             (terms, others) => {
-                format!("\"{name}\" states {}, but not {}", words(terms), words(others))
+                format!(
+                    "\"{name}\" states {}, but not {}",
+                    words(terms),
+                    words(others)
+                )
             }
         }
     }
@@ -348,7 +352,9 @@ impl Systematic {
             };
             return format!("{names} {states} own errors, so a systematic part is not told");
         };
-        let bends = first.compliance.map(|_| "what the rig gives way".to_owned());
+        let bends = first
+            .compliance
+            .map(|_| "what the rig gives way".to_owned());
         let is_alike = |pair: &[Stated]| {
             (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
         };
