@@ -15,6 +15,8 @@ const FORCE_SHARE: f64 = 0.05;
 pub(crate) const FORCE_FLOOR: f64 = 0.05;
 /// The lowest force of a sine is the lowest mean over this share of a period: short beside it, and long beside noise.
 const SINE_SHARE: f64 = 0.02;
+/// and over so many samples at most, which hide any noise.
+const SINE_SAMPLES_MAX: f64 = 1000.0;
 /// A duration may be off by so many samples: one at each end, and the answer of the axis.
 const DURATION_SAMPLES: f64 = 5.0;
 /// Fewer samples of cruise tell no speed: the pulses are too coarse.
@@ -77,7 +79,8 @@ impl Measuring {
         let sine = match planned.step {
             Step::Sine(sine) => {
                 let samples = SINE_SHARE / (sine.frequency_hz * rig.tick().0);
-                Some((MovingMean::new(samples as usize), f64::INFINITY))
+                let samples = samples.min(SINE_SAMPLES_MAX) as usize;
+                Some((MovingMean::new(samples), f64::INFINITY))
             }
             _ => None,
         };
