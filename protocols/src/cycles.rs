@@ -1,8 +1,11 @@
 //! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
 
-use crate::analysis::{SourceError, decisions, is_saturated, table_of_imported, trusted_samples};
+use crate::analysis::{
+    SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
+};
 use crate::edited;
 use crate::engine::{Effect, Record};
+use palpate_model::calibration::Calibration;
 use palpate_model::cycles::{CycleSample, by_depth};
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
@@ -24,6 +27,8 @@ pub struct CycleSource {
     pub sines: Vec<(f64, std::ops::Range<usize>)>,
     /// Remarks, such as an interrupted recording.
     pub notes: Vec<String>,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
 }
 
 impl CycleSource {
@@ -70,11 +75,15 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let first_tick = session.rows.first().map_or(0, |row| row.tick);
     let mut source = CycleSource {
         notes: session.notes.clone(),
+<<<<<<< HEAD
         pulse: session
             .manifest
             .rig
             .as_ref()
             .map(|rig| Depth(rig.mm_per_pulse)),
+=======
+        calibration: calibration_of(session).ok(),
+>>>>>>> m
         ..CycleSource::default()
     };
     let mut left_out = 0usize;

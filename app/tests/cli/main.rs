@@ -68,6 +68,21 @@ fn short_run(folder: &Path, out: &str, more: &[&str]) -> Output {
 }
 
 #[test]
+fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = short_run(at, "short", &[]);
+    succeeded(&run);
+    let words = "live fit, its statistical part alone ('palpate fit short' tells what the calibration adds):";
+    let told = stdout(&run);
+    let live = told.split_once(words).map(|(_, live)| live);
+    assert!(live.is_some_and(|live| live.contains("tau_eps")), "{told}");
+    let fit = palpate(at, &["fit", "short"]);
+    succeeded(&fit);
+    assert!(stdout(&fit).contains(" systematic"), "{}", stdout(&fit));
+}
+
+#[test]
 fn the_main_job_works_as_the_readme_writes_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
