@@ -75,15 +75,12 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
     let first_tick = session.rows.first().map_or(0, |row| row.tick);
     let mut source = CycleSource {
         notes: session.notes.clone(),
-<<<<<<< HEAD
         pulse: session
             .manifest
             .rig
             .as_ref()
             .map(|rig| Depth(rig.mm_per_pulse)),
-=======
         calibration: calibration_of(session).ok(),
->>>>>>> m
         ..CycleSource::default()
     };
     let mut left_out = 0usize;
