@@ -205,7 +205,6 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
         let length = |lab: &Lab<SimRig>| lab.ticks_of(index).map(|(first, last)| last - first);
         let (length_now, length_before) = (length(now).unwrap(), length(before).unwrap());
         let is_exact = foreseen.is_exact;
-        println!("{what}: {is_exact} {length_now} {length_before}");
         if is_exact {
             assert!(
                 length_now.abs_diff(length_before) <= 1,
@@ -223,7 +222,6 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
         let (hard_now, hard_before) = (at_end(now, index, force), at_end(before, index, force));
         let hard = (hard_now.unwrap() - hard_before.unwrap()).abs();
         let deep = (deep_now - deep_before).abs();
-        println!("{what}: {deep:.4} mm, {hard:.4} N");
     }
 }
 
