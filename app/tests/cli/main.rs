@@ -443,6 +443,47 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
 }
 
 #[test]
+fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args([
+            "run",
+            "ramp-hold",
+            "--hold",
+            "5",
+            "--time-scale",
+            "50",
+            "--out",
+            "slept",
+        ])
+        .current_dir(at)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let pid = child.id();
+    let signal = |name: &str| {
+        let command = format!("kill -{name} {pid}");
+        let sent = Command::new("sh").args(["-c", &command]).status();
+        assert!(sent.unwrap().success(), "{command}");
+    };
+    // As a laptop does whose lid is closed, twice.
+    for _ in 0..2 {
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        signal("STOP");
+        std::thread::sleep(std::time::Duration::from_millis(700));
+        signal("CONT");
+    }
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let session = palpate_sessions::Session::open(&at.join("slept")).unwrap();
+    assert!(session.end.is_some());
+    let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    succeeded(&palpate(at, &["replay", "--check", "slept"]));
+}
+
+#[test]
 fn a_killed_run_leaves_a_session_that_opens() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();

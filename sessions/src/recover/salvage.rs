@@ -111,8 +111,8 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
             to_s: None,
         });
     }
-    // The first sample of a later part is not its first.
-    if later {
+    // The first sample of a later part that is read alone is not its first.
+    if later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
     }
     Ok(Salvage {

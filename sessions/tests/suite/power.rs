@@ -2,7 +2,7 @@
 //! synchronised dropped, reordered, zeroed, torn or replaced by what the disk held before.
 
 use crate::disk::{Disk, FATES, Fate, Step, Traced, cut};
-use crate::support::{Random, count_from, end, entries, manifest, rows, same_bits};
+use crate::support::{Random, count_from, end, entries, manifest, quick_folder, rows, same_bits};
 use palpate_model::Nanos;
 use palpate_sessions::recover::{Salvage, recover, salvage};
 use palpate_sessions::{
@@ -199,7 +199,7 @@ impl Recording {
     /// Cuts the power at a step and reads what is left. Returns how many samples are lost.
     fn check_cut(&self, at: usize, fate: Fate, seed: u64) -> usize {
         let context = format!("{fate:?} at step {at} of {}, seed {seed}", self.trace.len());
-        let folder = tempfile::tempdir().expect("a folder to write in");
+        let folder = quick_folder();
         let session = folder.path().join("one");
         std::fs::create_dir(&session).expect("a folder to write in");
         cut(&self.trace, at, fate, &mut Random(seed), &session);

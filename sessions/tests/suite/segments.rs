@@ -1,6 +1,6 @@
 //! Long recordings: segments, crashes while a new one is begun, and what is missing.
 
-use crate::support::{MemorySink, end, entries, manifest, rows, same_bits};
+use crate::support::{MemorySink, end, entries, manifest, quick_folder, rows, same_bits};
 use palpate_model::Nanos;
 use palpate_sessions::recover::{Salvage, salvage};
 use palpate_sessions::{
@@ -145,7 +145,7 @@ fn three_segments() -> (tempfile::TempDir, Vec<Row>, Vec<Entry>) {
     let entries = entries(&rows, 15);
     let journal = Journal::default();
     record(&journal, &rows, &entries).1.unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = quick_folder();
     replay_steps(&journal.0.lock().unwrap().steps, folder.path());
     assert!(folder.path().join("002.mcap").exists());
     assert!(!folder.path().join("003.mcap").exists());
@@ -166,7 +166,7 @@ fn cut(path: &Path, length: usize) {
 #[test]
 fn a_session_in_segments_comes_back_bit_for_bit() {
     for pace in [Pace::Virtual, Pace::Real] {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = quick_folder();
         let rows = rows(3000, 50);
         let entries = entries(&rows, 30);
         let source = FolderSegments::new(folder.path());
@@ -229,7 +229,7 @@ fn every_prefix_across_rotations_keeps_everything_acknowledged() {
     let (acknowledged, outcome) = record(&journal, &rows, &entries);
     outcome.unwrap();
     let steps = journal.0.lock().unwrap().steps.clone();
-    let folder = tempfile::tempdir().unwrap();
+    let folder = quick_folder();
     let mut is_open = false;
     for (i, step) in steps.iter().enumerate() {
         let reached = acknowledged.iter().rev().find(|(steps, _)| *steps <= i);
@@ -274,7 +274,7 @@ fn whatever_operation_fails_across_rotations_is_reported_and_loses_nothing() {
             panic!("{err}");
         };
         blamed.insert(path.clone());
-        let folder = tempfile::tempdir().unwrap();
+        let folder = quick_folder();
         replay_steps(&journal.0.lock().unwrap().steps, folder.path());
         if let Some((_, at_least)) = acknowledged.last() {
             let session = Session::open(folder.path()).unwrap();
@@ -369,6 +369,30 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     assert!(same_bits(&kept[before..], &rows[after..]) && after <= 4 * BATCH);
 }
 
+/// That the next segment goes on without a gap does not make up for it: only one begun because of it would.
+#[test]
+fn a_wrong_checksum_in_any_segment_is_refused() {
+    let (folder, rows, _) = three_segments();
+    for number in 0..3 {
+        let path = folder.path().join(segment_file(number));
+        let whole = fs::read(&path).unwrap();
+        let mut hurt = whole.clone();
+        // In the index, where no sample is.
+        let index = hurt.len() - 100;
+        hurt[index] ^= 1;
+        fs::write(&path, &hurt).unwrap();
+        let refusal = Session::open(folder.path()).unwrap_err().to_string();
+        assert!(refusal.contains("the checksum of the index"), "{refusal}");
+        assert!(refusal.contains(&segment_file(number)), "{refusal}");
+        let (left, kept) = salvaged(folder.path());
+        assert!(same_bits(&kept, &rows));
+        let told = left.missing.sentences().join("; ");
+        assert!(told.contains(&segment_file(number)), "{told}");
+        fs::write(&path, &whole).unwrap();
+    }
+    Session::open(folder.path()).unwrap();
+}
+
 #[test]
 fn segments_of_another_session_are_refused() {
     let (folder, rows, entries) = three_segments();
@@ -380,7 +404,7 @@ fn segments_of_another_session_are_refused() {
         log.append(batch, &[]).unwrap();
     }
     log.finish(end(Nanos::ZERO)).unwrap();
-    let theirs = tempfile::tempdir().unwrap();
+    let theirs = quick_folder();
     replay_steps(&journal.0.lock().unwrap().steps, theirs.path());
     fs::copy(
         theirs.path().join("001.mcap"),

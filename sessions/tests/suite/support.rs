@@ -239,3 +239,22 @@ pub fn count_from(variable: &str, usual: usize) -> usize {
         .and_then(|text| text.parse().ok())
         .unwrap_or(usual)
 }
+
+/// A folder in memory, where there is one: thousands of files are written for each test.
+pub fn quick_folder() -> tempfile::TempDir {
+    let memory = std::path::Path::new("/dev/shm");
+    let folder = match memory.is_dir() {
+        true => tempfile::tempdir_in(memory),
+        false => tempfile::tempdir(),
+    };
+    folder.expect("a folder to write in")
+}
+
+/// Writes a file anew: overwriting in place makes some file systems wait for the disk.
+pub fn put(path: &std::path::Path, bytes: &[u8]) {
+    if let Some(folder) = path.parent() {
+        std::fs::create_dir_all(folder).expect("a folder to write in");
+    }
+    let _ = std::fs::remove_file(path);
+    std::fs::write(path, bytes).expect("a folder to write in");
+}

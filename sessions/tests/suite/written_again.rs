@@ -1,6 +1,6 @@
 //! Disks that fail while a session is recorded: it goes on in another file and lacks nothing.
 
-use crate::support::{Random, end, entries, manifest, rows, same_bits};
+use crate::support::{Random, end, entries, manifest, quick_folder, rows, same_bits};
 use palpate_model::Nanos;
 use palpate_sessions::{
     Entry, FileSink, FolderSegments, LogError, Notice, Pace, ReadError, Row, SPARE_FILE,
@@ -172,7 +172,7 @@ fn whichever_operation_fails_the_session_lacks_nothing() {
     let mut moved = 0;
     for leaves in [Leaves::All, Leaves::Synced, Leaves::Zeros, Leaves::Garbage] {
         for fail_at in 0.. {
-            let folder = tempfile::tempdir().unwrap();
+            let folder = quick_folder();
             let source = Failing::new(folder.path(), leaves, &[fail_at]);
             let counted = Arc::clone(&source.counted);
             let context = format!("{leaves:?}, operation {fail_at}");
@@ -211,7 +211,7 @@ fn several_failures_lose_nothing_and_too_many_are_told() {
     let mut random = Random(62);
     let (mut whole, mut failed) = (0, 0);
     for case in 0..200 {
-        let folder = tempfile::tempdir().unwrap();
+        let folder = quick_folder();
         let leaves = [Leaves::All, Leaves::Synced, Leaves::Zeros, Leaves::Garbage][case % 4];
         let fail_at: Vec<u32> = (0..2 + case % 4)
             .map(|_| 3 + random.below(40) as u32)
@@ -287,7 +287,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
     }
     let rows = rows(1000, 63);
     for room in (12_000..60_000).step_by(3001) {
-        let (folder, spare) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let (folder, spare) = (quick_folder(), quick_folder());
         let own = FolderSegments::with_spare(folder.path(), spare.path()).unwrap();
         let room = Arc::new(Mutex::new(room));
         let source = Full {
@@ -340,7 +340,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
 #[test]
 fn a_crash_while_writing_again_keeps_what_the_old_file_held() {
     let rows = rows(1000, 64);
-    let folder = tempfile::tempdir().unwrap();
+    let folder = quick_folder();
     // Operations: create, manifest, sync; then appends, with one sync at the end of ten batches.
     let source = Failing::new(folder.path(), Leaves::All, &[9]);
     record(source, 100, &rows, &[]).unwrap();

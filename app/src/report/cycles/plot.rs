@@ -219,6 +219,7 @@ mod tests {
                     force: Newtons(force),
                     phase,
                     cycle,
+                    step: i / 100,
                 }
             })
         };

@@ -1,9 +1,8 @@
 //! The corpus: small files, at least one for each parser, and what is needed to make them.
 
 use super::kinds::{WEIGHTS, analysis, check, compliance};
-use super::put;
 use crate::foreign_damage::seeds;
-use crate::support::{MemorySink, end, entries, log_bytes, manifest, rows};
+use crate::support::{MemorySink, end, entries, log_bytes, manifest, put, rows};
 use crate::worker::edit;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;

@@ -9,7 +9,7 @@ mod kinds;
 mod mutate;
 mod targets;
 
-use crate::support::{Random, count_from};
+use crate::support::{Random, count_from, put, quick_folder};
 use crate::worker::{command, told};
 use kinds::{Kind, Outcome};
 use std::collections::BTreeMap;
@@ -19,25 +19,6 @@ use std::time::{Duration, Instant};
 
 /// What reading one file may take.
 const MEMORY_MAX: u64 = 64 << 20;
-
-/// A folder in memory, where there is one: thousands of files are written for each test.
-fn quick_folder() -> tempfile::TempDir {
-    let memory = Path::new("/dev/shm");
-    let folder = match memory.is_dir() {
-        true => tempfile::tempdir_in(memory),
-        false => tempfile::tempdir(),
-    };
-    folder.expect("a folder to write in")
-}
-
-/// Writes a file anew: overwriting in place makes some file systems wait for the disk.
-fn put(path: &Path, bytes: &[u8]) {
-    if let Some(folder) = path.parent() {
-        fs::create_dir_all(folder).expect("a folder to write in");
-    }
-    let _ = fs::remove_file(path);
-    fs::write(path, bytes).expect("a folder to write in");
-}
 
 /// From now on this process may not take more than so many bytes more.
 pub fn limit_memory(more: u64) {

@@ -3,7 +3,7 @@
 
 use super::corpus::{file_with_chunk, message, seal_document, seal_lines};
 use super::kinds::{check_foreign, check_table, check_weights};
-use super::put;
+use crate::support::put;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use palpate_sessions::checks::read_checks;
