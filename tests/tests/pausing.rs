@@ -222,6 +222,7 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
         let (hard_now, hard_before) = (at_end(now, index, force), at_end(before, index, force));
         let hard = (hard_now.unwrap() - hard_before.unwrap()).abs();
         let deep = (deep_now - deep_before).abs();
+        println!("{what}: {deep:.4} mm, {hard:.4} N");
     }
 }
 
