@@ -257,11 +257,6 @@ fn every_step_of(name: &str) {
         "{name}: {}",
         outcome.reason
     );
-    println!(
-        "{name}: {} steps, {}",
-        plan.steps.len(),
-        before.now.seconds()
-    );
     for (index, planned) in plan.steps.iter().enumerate() {
         let what = format!(
             "{name} paused at step {} ({})",
