@@ -1,8 +1,11 @@
 //! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
 
-use crate::analysis::{SourceError, decisions, is_saturated, table_of_imported, trusted_samples};
+use crate::analysis::{
+    SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
+};
 use crate::edited;
 use crate::engine::{Effect, Record};
+use palpate_model::calibration::Calibration;
 use palpate_model::cycles::{CycleSample, by_depth};
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
@@ -24,6 +27,8 @@ pub struct CycleSource {
     pub sines: Vec<(f64, std::ops::Range<usize>)>,
     /// Remarks, such as an interrupted recording.
     pub notes: Vec<String>,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
 }
 
 impl CycleSource {
@@ -75,6 +80,7 @@ pub fn of_session(session: &Session) -> Result<CycleSource, SourceError> {
             .rig
             .as_ref()
             .map(|rig| Depth(rig.mm_per_pulse)),
+        calibration: calibration_of(session).ok(),
         ..CycleSource::default()
     };
     let mut left_out = 0usize;
@@ -236,14 +242,14 @@ mod tests {
         assert_eq!(source.pulse, Some(Depth(rig.mm_per_pulse)));
         let plan: crate::plans::Plan =
             serde_json::from_value(session.manifest.plan.clone()).unwrap();
-        // From the first sample on the step is the one whose phase it has.
-        assert!(source.samples.len() > 100_000);
+        // The sample that led to a step is the first of it.
+        assert!(source.samples.len() > 10_000);
         for (index, one) in source.samples.iter().enumerate() {
             let planned = plan.steps[one.step as usize].step.phase();
-            assert!(
-                planned == one.phase || one.phase == Phase::Ended,
-                "{index}: {one:?}, {planned}"
-            );
+            // Contact finding ends with a rest.
+            let is_contact = planned == Phase::Contact && one.phase == Phase::Rest;
+            let is_so = planned == one.phase || is_contact || one.phase == Phase::Ended;
+            assert!(is_so, "{index}: {one:?}, {planned}");
         }
     }
 

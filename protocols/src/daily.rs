@@ -272,6 +272,37 @@ mod tests {
     }
 
     #[test]
+    fn the_usual_weight_is_one_that_the_thesis_s_cell_knows_without_a_doubt() {
+        let protocol = crate::file::built_in(DAILY_CHECK).unwrap().unwrap();
+        let plan = protocol.plan(&std::collections::BTreeMap::new()).unwrap();
+        let masses = plan.steps.iter().filter_map(|one| match &one.step {
+            Step::Weigh(weigh) if weigh.mass_g > 0.0 => Some(weigh.mass_g),
+            _ => None,
+        });
+        let calibration = Calibration::thesis();
+        let curve = calibration.curve().unwrap();
+        let mut told = Vec::new();
+        for mass_g in masses {
+            let weight = palpate_model::units::Newtons(mass_g * 9.80665e-3);
+            let records = [
+                weighed(
+                    0.0,
+                    curve
+                        .volts_from_newtons(palpate_model::units::Newtons(0.0))
+                        .0,
+                ),
+                weighed(mass_g, curve.volts_from_newtons(weight).0),
+            ];
+            let records: Vec<&Record> = records.iter().collect();
+            told.push(super::weight(&calibration, &records).unwrap());
+        }
+        let [(true, sentence)] = &told[..] else {
+            panic!("one known weight that reads right: {told:?}");
+        };
+        assert!(sentence.ends_with("within the limit of 1 %"), "{sentence}");
+    }
+
+    #[test]
     fn a_failed_check_closes_the_gate_until_one_passes() {
         let library = tempfile::tempdir().unwrap();
         let at = Some(library.path());

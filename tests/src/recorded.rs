@@ -8,7 +8,8 @@ use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, Runner, TimeScale,
 };
 use palpate_sessions::Session;
-use std::sync::mpsc::sync_channel;
+use std::path::Path;
+use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
 /// Runs as fast as the computer can until the run has ended, however it ended.
@@ -28,11 +29,38 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
 pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
+    let (runner, woken) = start(rig, calibration, plan, TimeScale::Max, &out);
+    let has_ended = |runner: &Runner| {
+        let snapshot = runner.snapshot();
+        let run = snapshot.run.as_ref();
+        run.is_some_and(|run| run.outcome.is_some())
+    };
+    while !has_ended(&runner) {
+        woken
+            .recv_timeout(Duration::from_secs(60))
+            .expect("the run does not end");
+    }
+    drop(runner);
+    Session::open(&out).expect("the session")
+}
+
+/// A run that has started, and what says that there is something new of it.
+///
+/// # Panics
+/// If the run is not started.
+#[must_use]
+pub fn start(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    plan: Plan,
+    scale: TimeScale,
+    out: &Path,
+) -> (Runner, Receiver<()>) {
     let request = RunRequest {
         plan,
         calibration,
         limits: Limits::for_travel(rig.description().travel),
-        out: Some(out.clone()),
+        out: Some(out.to_owned()),
         labels: Labels::default(),
         is_acknowledged: false,
         to_acknowledge: Vec::new(),
@@ -42,24 +70,11 @@ pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Sessi
     let (reply, answer) = sync_channel(1);
     let (wake, woken) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
-    let runner = Runner::start(rig, TimeScale::Max, Some(first), move || {
+    let runner = Runner::start(rig, scale, Some(first), move || {
         let _ = wake.try_send(());
     })
     .expect("a runner");
     let started = answer.recv().expect("an answer");
     started.expect("a start");
-    let has_ended = |runner: &Runner| {
-        let snapshot = runner.snapshot();
-        snapshot
-            .run
-            .as_ref()
-            .is_some_and(|run| run.outcome.is_some())
-    };
-    while !has_ended(&runner) {
-        woken
-            .recv_timeout(Duration::from_secs(60))
-            .expect("the run does not end");
-    }
-    drop(runner);
-    Session::open(&out).expect("the session")
+    (runner, woken)
 }

@@ -247,6 +247,22 @@ fn noise_above_the_criterion_is_refused_before_anything_moves() {
 }
 
 #[test]
+fn a_second_pass_that_felt_nothing_for_noise_says_so() {
+    let searches =
+        (1..=8).map(|seed| search(settings(seed, "200", "100"), FindContact::default(), None));
+    let reasons = searches.map(|found| found.outcome.reason);
+    let blind: Vec<String> = reasons.filter(|why| why.contains("did not feel")).collect();
+    assert!(!blind.is_empty(), "no search failed so");
+    for why in blind {
+        assert!(
+            why.contains("noise raised the criterion from 0.0")
+                && why.contains("quieten the signal"),
+            "{why}"
+        );
+    }
+}
+
+#[test]
 fn a_loaded_cell_is_refused() {
     let loaded = HandAction::LoadCell { mass_g: 100.0 };
     let plan = FindContact::default();

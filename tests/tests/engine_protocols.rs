@@ -561,12 +561,12 @@ fn a_pause_of_a_monitor_that_a_person_takes_over_stays() {
     assert_eq!(lab.state().pause(), PauseView::None);
 }
 
-#[test]
-fn depth_counts_from_the_base_once_it_is_found() {
+/// A search for the base without a specimen, on a rig that gives way by so many um/N, with steps behind it.
+fn base_search(compliance: &str, behind: Vec<Step>) -> Lab<SimRig> {
     let settings = SimSettings {
         profile: SimProfile::Ideal,
         seed: 5,
-        compliance: "60".parse::<SimCompliance>().unwrap(),
+        compliance: compliance.parse::<SimCompliance>().unwrap(),
         ..SimSettings::default()
     };
     let rig = SimRig::new(settings);
@@ -579,6 +579,26 @@ fn depth_counts_from_the_base_once_it_is_found() {
         on_timeout: OnTimeout::Stop,
         hand: Some(HandAction::Unmount),
     });
+    steps.push(Step::FindBase(FindBase::default()));
+    steps.extend(behind);
+    Lab::new(rig, curve, Plan::of("base", 1, steps))
+}
+
+#[test]
+fn a_base_that_hardly_gives_way_trips_with_what_to_do() {
+    let mut lab = base_search("0", vec![retract()]);
+    lab.run();
+    let ended = lab.outcome.as_ref().or(lab.state().holding());
+    let reason = &ended.unwrap().reason;
+    assert!(
+        reason.contains("faster than 50 N/s; what the search for the base met hardly gives way")
+            && reason.contains("give find-base a lower speed"),
+        "{reason}"
+    );
+}
+
+#[test]
+fn depth_counts_from_the_base_once_it_is_found() {
     let load = LoadTo {
         speed: MmPerS(1.5),
         force: Newtons(2.0),
@@ -590,9 +610,10 @@ fn depth_counts_from_the_base_once_it_is_found() {
         speed: MmPerS(0.3),
         clearance_mm: 0.0,
     };
-    let base = Step::FindBase(FindBase::default());
-    steps.extend([base, Step::LoadTo(load), unload, retract()]);
-    let lab = finished(Lab::new(rig, curve, Plan::of("base", 1, steps)));
+    let lab = finished(base_search(
+        "60",
+        vec![Step::LoadTo(load), unload, retract()],
+    ));
     let reached = lab.records.iter().find_map(|(_, record)| match record {
         Record::ForceReached { depth, .. } => Some(depth.0),
         _ => None,

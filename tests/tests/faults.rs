@@ -3,12 +3,14 @@
 use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::rig::AxisStatus;
+use palpate_model::rig::{AxisStatus, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds, Volts};
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::replay::replay;
+use palpate_protocols::runner::{Runner, TimeScale};
 use palpate_sessions::Session;
 use palpate_tests::recorded;
+use std::time::Duration;
 
 fn params() -> RampHold {
     RampHold {
@@ -86,4 +88,41 @@ fn a_noisy_cell_is_refused_before_anything_moves() {
             .iter()
             .all(|row| !AxisStatus(row.status).has(AxisStatus::MOVING))
     );
+}
+
+#[test]
+fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("session");
+    let place = out.clone();
+    // The window draws on a thread of its own, which also owns the runner.
+    let watcher = std::thread::Builder::new()
+        .name("watcher".into())
+        .spawn(move || {
+            let rig = SimRig::new(SimSettings::default());
+            let (calibration, plan) = (rig.calibration(), params().plan());
+            let scale = TimeScale::Factor(50.0);
+            let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
+            let is_pressing = |runner: &Runner| {
+                let snapshot = runner.snapshot();
+                let run = snapshot.run.as_ref();
+                run.is_some_and(|run| run.phase == Phase::Ramp)
+            };
+            while !is_pressing(&runner) {
+                woken.recv_timeout(Duration::from_secs(60)).unwrap();
+            }
+            panic!("as if drawing had failed");
+        })
+        .unwrap();
+    assert!(watcher.join().is_err());
+    let session = Session::open(&out).unwrap();
+    assert_eq!(
+        session.rows.last().map(|row| row.phase),
+        Some(Phase::Stopped)
+    );
+    let last = session.rows.last().unwrap();
+    assert!(!AxisStatus(last.status).has(AxisStatus::MOVING));
+    let end = session.end.as_ref().expect("the session is closed");
+    assert_eq!(end.outcome, "stop", "{}", end.reason);
+    assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
 }

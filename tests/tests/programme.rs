@@ -325,20 +325,69 @@ name = "two"
 protocol = "nothing"
 repeats = 0
 validates = "three"
+
+[[task]]
+name = "three"
+protocol = "ramp-hold"
+sett = { depth = "10 mm" }
+repeats = "two"
+rest_s = -3
+specimen = "two"
+calibrates = 1
+
+[[task]]
+name = "three"
+set = { depth = { mm = 10 } }
+validates = "two"
+
+[simulated]
+softening = 40
+
+[specimen.7]
+name = "stomach"
 "#;
     let refusal = Programme::read(wrong, &|name| Err(format!("no protocol '{name}'"))).unwrap_err();
     let text = refusal.to_string();
     for part in [
-        "line 6: a task cannot be called 'a b'",
-        "speeed",
-        "line 11: 0 repeats",
-        "no protocol 'nothing'",
-        "no task 'three'",
+        "line 7: a task cannot be called 'a b'",
+        "line 9: protocol ramp-hold has no parameter 'speeed'",
+        "line 13: no protocol 'nothing'",
+        "line 14: 0 repeats",
+        "line 15: there is no task 'three' before this one",
+        "line 20: a task has no key 'sett'; did you mean 'set'?",
+        "line 21: repeats cannot be \"two\"; give a whole number",
+        "line 22: a rest of -3 s is not possible",
+        "line 23: specimen cannot be \"two\"",
+        "line 24: calibrates cannot be 1; give true or false",
+        "line 26: a task needs 'protocol'; write protocol = \"ramp-hold\"",
+        "line 27: there is a task 'three' already",
+        "line 28: depth cannot be a table in braces; give a text in quotes",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
-    let text = Programme::read("palpate-programme = 1\nnmae = 3", &|_| Err(String::new()));
-    assert!(text.unwrap_err().to_string().starts_with("line 2:"));
+    // None twice, none that follows from another alone.
+    assert_eq!(text.lines().count(), 13, "{text}");
+    let told = |text: &str| {
+        let refusal = Programme::read(text, &|_| Err(String::new())).unwrap_err();
+        refusal.to_string()
+    };
+    let text = told("palpate-programme = 1\nnmae = 3");
+    for part in [
+        "line 1: a programme needs 'title'; write title = ",
+        "line 1: a programme needs 'task'; write [[task]]",
+        "line 2: a programme has no key 'nmae'; did you mean 'name'?",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
+    assert_eq!(text.lines().count(), 3, "{text}");
+    let text = told("palpate-programme = 2\nname = 3\n[task]\nname = \"x\"\n");
+    for part in [
+        "line 1: this is written in version 2 of the language",
+        "line 2: name cannot be 3; give a text in quotes",
+        "line 3: task cannot be a table in braces; give tables, each under [[task]]",
+    ] {
+        assert!(text.contains(part), "{part}: {text}");
+    }
 }
 
 #[test]

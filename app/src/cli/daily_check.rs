@@ -19,7 +19,7 @@ use std::path::PathBuf;
 #[derive(Debug, Args)]
 pub struct DailyCheckArgs {
     /// The known weight in g
-    #[arg(long, value_name = "G", default_value = "800", value_parser = super::run::number)]
+    #[arg(long, value_name = "G", default_value = "840", value_parser = super::run::number)]
     mass: f64,
     #[command(flatten)]
     rig: RigArgs,
@@ -153,4 +153,24 @@ fn text(checked: &Checked<'_>) -> String {
     };
     lines.extend(checked.parts.iter().map(part));
     lines.join("\n")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_usual_mass_is_that_of_the_protocol() {
+        use clap::Parser;
+        #[derive(Parser)]
+        struct Line {
+            #[command(flatten)]
+            args: DailyCheckArgs,
+        }
+        let line = Line::parse_from(["daily-check"]);
+        let protocol = built_in(DAILY_CHECK).unwrap().unwrap();
+        let named = |one: &&palpate_protocols::file::Parameter| one.name == "mass";
+        let mass = protocol.parameters.iter().find(named).unwrap();
+        assert_eq!(mass.default.text, format!("{} g", line.args.mass));
+    }
 }

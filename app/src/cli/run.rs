@@ -409,7 +409,10 @@ fn run_text(report: &RunReport) -> String {
         lines.push(format!("{verdict}: {reason}"));
     }
     if let Some(live) = &report.live {
-        lines.push("live fit:".into());
+        lines.push(format!(
+            "live fit, its statistical part alone ('palpate fit {}' tells what the calibration adds):",
+            report.session.display()
+        ));
         lines.extend(crate::report::text::parameter_lines(&live.parameters));
         let reasons = live
             .verdicts

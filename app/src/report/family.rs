@@ -1,12 +1,14 @@
 //! The fit of any model family as people read it: lines of text, and a picture with its loop of force over
 //! depth.
 
+use super::band::{self, Band};
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, legend, look, sentence_lines, span, title};
 use super::svg::{Ink, Panel, Svg};
 use super::text::{systematic, typeset};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
 use crate::widgets::uncertain::{plain, with_error};
+use palpate_model::calibration::ForceUncertainty;
 use palpate_model::families::{Family, Live};
 use palpate_model::fit::{FamilyFit, FamilyParameter, FitSample};
 use palpate_model::units::Newtons;
@@ -91,13 +93,15 @@ fn sentences(family: &dyn Family, fit: &FamilyFit) -> impl Iterator<Item = Strin
     fit.warnings.iter().cloned().chain([limits, live])
 }
 
-/// The picture of a fit to one record: force over time, force over depth, parameters and sentences.
+/// The picture of a fit to one record: force over time, force over depth, parameters and sentences. Around the fitted
+/// force lies the band of twice its calibration's standard uncertainty, where that is stated.
 #[must_use]
 pub fn picture(
     source: &str,
     family: &dyn Family,
     fit: &FamilyFit,
     record: &FittedRecord<'_>,
+    uncertainty: Option<&ForceUncertainty>,
 ) -> String {
     let samples = record.samples;
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
@@ -120,13 +124,21 @@ pub fn picture(
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, source, &quality(fit, 0, record));
     legend(&mut svg);
+    band::legend(&mut svg, uncertainty);
     for (bottom, x, x_name, [measured, fitted]) in [
         (300.0, span(samples), "time (s)", &over_time),
         (690.0, [0.0, deepest], "depth (mm)", &over_depth),
     ] {
         let top = if bottom < 400.0 { 66.0 } else { 360.0 };
-        let panel = Panel::around([LEFT, top, RIGHT, bottom], x, &[measured, fitted]);
+        let band = Band::around(fitted, uncertainty);
+        let [above, below] = band.edges();
+        let panel = Panel::around(
+            [LEFT, top, RIGHT, bottom],
+            x,
+            &[measured, fitted, above, below],
+        );
         panel.axes(&mut svg, [x_name, "force (N)"], look());
+        band.draw(&mut svg, &panel, LIGHT.series);
         panel.line(&mut svg, measured, LIGHT.series, 2.6);
         panel.line(&mut svg, fitted, LIGHT.limit, 1.4);
     }

@@ -1,13 +1,13 @@
 //! A fit as one picture: measured and fitted force over time, what is left over beneath, the
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
+use super::band::{self, Band};
 use super::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
 use super::text::{ParameterText, quality};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::fit::{FitReport, FitSample};
-use palpate_model::units::Newtons;
 
 /// Width of a picture in px.
 pub(super) const WIDTH: f64 = 960.0;
@@ -50,22 +50,17 @@ pub fn of_report(
         source,
         &format!("{}; {}", report.model, quality(report)),
     );
-    let band = band(&fitted, uncertainty);
-    let inside = [&measured, &fitted, &band[0], &band[1]].map(Vec::as_slice);
+    let band = Band::around(&fitted, uncertainty);
+    let [above, below] = band.edges();
+    let inside = [&measured, &fitted, above, below];
     let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &inside);
     upper.axes(&mut svg, ["", "force (N)"], look());
-    let [above, below] = band.map(|edge| {
-        edge.iter()
-            .map(|point| upper.at(*point))
-            .collect::<Vec<_>>()
-    });
-    if !above.is_empty() {
-        svg.band(&above, &below, LIGHT.series);
-    }
+    band.draw(&mut svg, &upper, LIGHT.series);
     // Wide under narrow, so that both are seen where they agree.
     upper.line(&mut svg, &measured, LIGHT.series, 2.6);
     upper.line(&mut svg, &fitted, LIGHT.limit, 1.4);
     legend(&mut svg);
+    band::legend(&mut svg, uncertainty);
     let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], span, &[&residual]);
     lower.axes(&mut svg, ["time (s)", "residual (mN)"], look());
     lower.line(&mut svg, &residual, LIGHT.series, 1.0);
@@ -74,17 +69,6 @@ pub fn of_report(
         y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
     }
     svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
-}
-
-/// Upper and lower edge of the band around a force over time; empty where no uncertainty is stated.
-fn band(force: &[[f64; 2]], uncertainty: Option<&ForceUncertainty>) -> [Vec<[f64; 2]>; 2] {
-    [2.0, -2.0].map(|sigmas| {
-        let edge = |&[t, force]: &[f64; 2]| {
-            let sigma = uncertainty?.sigma(Newtons(force))?;
-            Some([t, force + sigmas * sigma.0])
-        };
-        force.iter().filter_map(edge).collect()
-    })
 }
 
 /// The picture of a fit that was refused, with the sentence that says why.
@@ -192,6 +176,7 @@ pub(super) fn wrap(text: &str, letters: usize) -> Vec<String> {
 mod tests {
     use super::*;
     use palpate_model::fit::{FitOptions, fit};
+    use palpate_model::units::Newtons;
     use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
     use palpate_model::{Depth, Seconds};
 
@@ -233,7 +218,8 @@ mod tests {
         assert!(!picture.contains("<polygon"));
         let thesis = ForceUncertainty::of(&palpate_model::calibration::Calibration::thesis());
         let banded = of_report("S", &samples, &report, thesis.as_ref().ok());
-        assert_eq!(banded.matches("<polygon").count(), 1);
+        // Around the force, and in the legend.
+        assert_eq!(banded.matches("<polygon").count(), 2);
         // Three curves of at most two points a pixel, and nothing that is not a number.
         assert!(!picture.contains("NaN") && !picture.contains("inf"));
         assert!(

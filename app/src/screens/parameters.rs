@@ -42,16 +42,24 @@ pub fn parameters_ui(ui: &mut Ui, run: Option<&RunView>) {
         (Some(run), None) => remark(run.phase, found),
     };
     if let Some(live) = live {
-        let text = format!(
-            "weighted residual {:.1} mN, {} samples",
-            live.rmse_weighted_n * 1e3,
-            live.samples
-        );
-        ui.label(RichText::new(text).color(tokens.text_quiet).small());
+        for words in worth(live) {
+            ui.label(RichText::new(words).color(tokens.text_quiet).small());
+        }
     }
     if let Some(remark) = remark {
         ui.label(RichText::new(remark).color(tokens.text_quiet).small());
     }
+}
+
+/// What the numbers are worth, and what their errors leave out.
+fn worth(live: &LiveEstimate) -> [String; 2] {
+    let residual = format!(
+        "weighted residual {:.1} mN, {} samples",
+        live.rmse_weighted_n * 1e3,
+        live.samples
+    );
+    let alone = "± is statistical; the exact fit adds the calibration's".to_owned();
+    [residual, alone]
 }
 
 /// Rows of numbers read better close together.
@@ -184,6 +192,19 @@ mod tests {
             value_text(Some(&parameter("mu1", Some(0.1)))),
             "1.50 ± 0.10"
         );
+    }
+
+    #[test]
+    fn live_errors_are_told_to_be_statistical_alone() {
+        let live = LiveEstimate {
+            parameters: Vec::new(),
+            rmse_weighted_n: 0.0123,
+            samples: 1000,
+            verdicts: Vec::new(),
+        };
+        let [residual, alone] = worth(&live);
+        assert_eq!(residual, "weighted residual 12.3 mN, 1000 samples");
+        assert!(alone.contains("statistical") && alone.contains("calibration"));
     }
 
     #[test]

@@ -134,7 +134,8 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
         (&5.into(), &0.into())
     );
     let before = contents(&at.join("lake"));
-    assert_eq!(before.len(), 15);
+    // Of each: samples, events, the session itself, and the checksums of the three.
+    assert_eq!(before.len(), 20);
     let again = palpate(at, &["export", "runs", "--lake", "lake", "--json"]);
     succeeded(&again);
     assert_eq!(
@@ -150,7 +151,7 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     succeeded(&serial);
     assert_eq!(json(&serial)["made"], 5);
     let expected = contents(&at.join("serial"));
-    assert_eq!(expected.len(), 20);
+    assert_eq!(expected.len(), 25);
 
     // The same numbers, to the last digit, as of the sessions themselves.
     let direct = palpate(at, &["fit", "runs", "--json"]);
@@ -192,7 +193,7 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     first.kill().unwrap();
     first.wait().unwrap();
     let left = contents(&at.join("killed")).len();
-    println!("killed with {left} files of 20");
+    println!("killed with {left} files of 25");
     let again = palpate(at, &["fit", "killed", "--json"]);
     succeeded(&again);
     assert!(contents(&at.join("killed")) == expected, "the kill shows");

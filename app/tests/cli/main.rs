@@ -68,6 +68,21 @@ fn short_run(folder: &Path, out: &str, more: &[&str]) -> Output {
 }
 
 #[test]
+fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let run = short_run(at, "short", &[]);
+    succeeded(&run);
+    let words = "live fit, its statistical part alone ('palpate fit short' tells what the calibration adds):";
+    let told = stdout(&run);
+    let live = told.split_once(words).map(|(_, live)| live);
+    assert!(live.is_some_and(|live| live.contains("tau_eps")), "{told}");
+    let fit = palpate(at, &["fit", "short"]);
+    succeeded(&fit);
+    assert!(stdout(&fit).contains(" systematic"), "{}", stdout(&fit));
+}
+
+#[test]
 fn the_main_job_works_as_the_readme_writes_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
@@ -425,6 +440,47 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
     assert_eq!(holder.wait().unwrap().code(), Some(1));
     let info = json(&palpate(at, &["info", "held", "--json"]));
     assert_eq!(info["ending"], "stop");
+}
+
+#[test]
+fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args([
+            "run",
+            "ramp-hold",
+            "--hold",
+            "5",
+            "--time-scale",
+            "50",
+            "--out",
+            "slept",
+        ])
+        .current_dir(at)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let pid = child.id();
+    let signal = |name: &str| {
+        let command = format!("kill -{name} {pid}");
+        let sent = Command::new("sh").args(["-c", &command]).status();
+        assert!(sent.unwrap().success(), "{command}");
+    };
+    // As a laptop does whose lid is closed, twice.
+    for _ in 0..2 {
+        std::thread::sleep(std::time::Duration::from_millis(500));
+        signal("STOP");
+        std::thread::sleep(std::time::Duration::from_millis(700));
+        signal("CONT");
+    }
+    assert_eq!(child.wait().unwrap().code(), Some(0));
+    let session = palpate_sessions::Session::open(&at.join("slept")).unwrap();
+    assert!(session.end.is_some());
+    let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
+    assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    succeeded(&palpate(at, &["replay", "--check", "slept"]));
 }
 
 #[test]

@@ -242,12 +242,12 @@ fn check_looks_at_a_programme_whole() {
     for (text, words) in [
         (
             told.replace("DEPTH", "12 mm"),
-            "line 14: parameter 'depth': 12 mm is too large",
+            "line 17: parameter 'depth': 12 mm is too large",
         ),
         (
             told.replace("DEPTH", "5 mm")
                 .replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
-            "line 14: 'theirs.toml' is neither",
+            "line 16: 'theirs.toml' is neither",
         ),
         (
             told.replace("mine.toml", "ramp-hold")
@@ -355,8 +355,8 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     assert!(alone["parameters"][0]["systematic_error"].as_f64() > Some(0.0));
     assert_eq!(own["parameters"], alone["parameters"]);
     let text = report["tasks"][0]["text"].as_str().unwrap();
-    assert!(text.contains(" calibration\n"), "{text}");
-    assert!(page().contains(" calibration\n") && page().contains("one standard uncertainty"));
+    assert!(text.contains(" systematic\n"), "{text}");
+    assert!(page().contains(" systematic\n") && page().contains("one standard uncertainty"));
 
     // Without a session to compare with the page says why it does not.
     for session in ["day/first/01", "day/first/02"] {

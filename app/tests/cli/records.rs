@@ -310,7 +310,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let failed = check(&["--profile", "ideal", "--calibration", "thesis"]);
     assert_eq!(failed.status.code(), Some(1));
     assert!(
-        stderr(&failed).contains("800 g reads"),
+        stderr(&failed).contains("840 g reads"),
         "{}",
         stderr(&failed)
     );

@@ -37,8 +37,9 @@ macro_rules! amount {
 }
 
 amount!(
-    /// White noise of the ideal load cell, rms, in whole mN.
-    SimNoise, "noise", 20, (0..=1000), "0 to 1000 (whole millinewtons)"
+    /// White noise of the ideal load cell, rms, in whole mN. Without any, every sample would be the same, and the engine
+    /// takes such a cell for a dead one.
+    SimNoise, "noise", 20, (1..=1000), "1 to 1000 (whole millinewtons; a signal without noise is taken for a dead cell)"
 );
 amount!(
     /// Stiffness of the tissue in whole percent of what it usually is: `mu` and `tau_sig` alike, so that
@@ -139,6 +140,10 @@ mod tests {
         assert_eq!("50".parse::<SimStiffness>().unwrap().share(), 0.5);
         assert_eq!("40".parse::<SimCompliance>().unwrap().mm_per_newton(), 0.04);
         assert_eq!("12.3".parse::<SimThickness>().unwrap().mm(), 12.3);
+        assert_eq!(
+            "0".parse::<SimNoise>().unwrap_err().to_string(),
+            "the simulated rig's noise cannot be '0'; give 1 to 1000 (whole millinewtons; a signal without noise is taken for a dead cell)"
+        );
         for wrong in ["", "-1", "1001", "2.5", "nan", "1e9"] {
             assert!(wrong.parse::<SimNoise>().is_err(), "{wrong}");
             assert!(wrong.parse::<SimThickness>().is_err(), "{wrong}");

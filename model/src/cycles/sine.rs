@@ -17,6 +17,15 @@ const PER_CYCLE_MIN: f64 = 12.0;
 const SETTLING: f64 = 1.0;
 /// Least share of the depth's motion that has the frequency.
 const MOTION_MIN: f64 = 0.05;
+/// A force is no more than zero below so many standard deviations of the noise, as where a probe leaves on its way back,
+const NOISE: f64 = 3.0;
+/// or below this share of its amplitude: a zero that has drifted a little is zero all the same.
+const ZERO_SHARE: f64 = 0.05;
+/// Share of samples at zero above which contact was lost. Where the lowest force is six standard deviations, one sample
+/// in 700 at the very bottom is that low by its noise.
+const LOST_SHARE: f64 = 0.01;
+/// A force that swings by this share of its amplitude below zero is of a specimen that is held and pulls back.
+const PULL_SHARE: f64 = 0.5;
 
 /// What one frequency shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -42,6 +51,28 @@ pub struct Sinusoid {
     /// Total harmonic distortion of the force: the root of the sum of squares of harmonics 2 to 5 over the first, in
     /// percent.
     pub distortion_percent: f64,
+    /// Share of the samples evaluated whose force is zero within its noise; 0 where the specimen pulls as well.
+    pub zero_share: f64,
+}
+
+impl Sinusoid {
+    /// Whether the force comes back to zero, so that nothing was touched for a part of the swing.
+    #[must_use]
+    pub fn is_contact_lost(&self) -> bool {
+        self.zero_share > LOST_SHARE
+    }
+
+    /// What speaks against the numbers, in words; `None` if nothing does.
+    #[must_use]
+    pub fn remark(&self) -> Option<String> {
+        self.is_contact_lost().then(|| {
+            format!(
+                "at {} Hz the force is zero within its noise for {:.0} % of the samples: the probe lost the tissue, and stiffness, loss and phase are not those of the tissue, whatever their errors; go deeper or swing less",
+                self.frequency,
+                100.0 * self.zero_share
+            )
+        })
+    }
 }
 
 /// A record holds no sine that could be evaluated.
@@ -79,10 +110,12 @@ pub enum SinusoidError {
     },
 }
 
-/// Coefficients of one response and the standard error of those at the frequency.
+/// Coefficients of one response, the standard error of those at the frequency, and the standard deviation of what is
+/// left.
 struct Fitted {
     coefficients: [f64; COLUMNS],
     error: f64,
+    noise: f64,
 }
 
 /// Evaluates a record of a sine of known frequency in Hz, by least squares over whole cycles up to its end.
@@ -164,7 +197,22 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
             std_error: error,
         },
         distortion_percent: 100.0 * harmonics.sqrt() / force_amplitude,
+        zero_share: zero_share(used().map(|one| one.force.0), force_amplitude, force.noise),
     })
+}
+
+fn zero_share(forces: impl Iterator<Item = f64>, amplitude: f64, noise: f64) -> f64 {
+    let zero = (NOISE * noise).max(ZERO_SHARE * amplitude);
+    let (mut count, mut zeros, mut lowest) = (0usize, 0usize, f64::INFINITY);
+    for force in forces {
+        count += 1;
+        zeros += usize::from(force <= zero);
+        lowest = lowest.min(force);
+    }
+    if lowest < -(PULL_SHARE * amplitude + NOISE * noise) {
+        return 0.0;
+    }
+    zeros as f64 / count.max(1) as f64
 }
 
 /// `a cos + b sin` of a harmonic as the complex number `a - ib`.
@@ -194,6 +242,7 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
     Some(Fitted {
         coefficients,
         error: (variance * 0.5 * errors).sqrt(),
+        noise: variance.sqrt(),
     })
 }
 
@@ -265,6 +314,33 @@ mod tests {
         assert_eq!(found.cycles, 4);
         // The depth starts at its least, the force at its most.
         assert!((found.phase_degrees.value.abs() - 180.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_force_that_comes_back_to_zero_is_told() {
+        // The swing of 0.2 N about so much, cut at zero: nothing is pulled. With noise, without, and with a zero that has
+        // drifted by half a standard deviation.
+        let mut random = SplitMix::seeded(9);
+        let noise: Vec<f64> = (0..10_000).map(|_| random.normal()).collect();
+        for (mean, is_lost) in [(0.1, true), (0.18, true), (0.3, false), (1.0, false)] {
+            for (rms, drift) in [(0.0, 0.0), (0.01, 0.0), (0.01, 0.005)] {
+                let force = |t: f64| {
+                    let pressed = (mean - 0.2 * (TAU * t + 0.3).cos()).max(0.0);
+                    pressed + drift + rms * noise[(t * 1e3).round() as usize % noise.len()]
+                };
+                let found = sinusoid(&record(1.0, 10.0, force), 1.0).unwrap();
+                let told = found.remark();
+                assert_eq!(told.is_some(), is_lost, "{mean} {rms} {drift}: {found:?}");
+                if mean == 0.1 {
+                    // Below a cosine of one half it is cut for a third of the swing.
+                    assert!((0.32..0.40).contains(&found.zero_share), "{found:?}");
+                    assert!(told.unwrap().contains("lost the tissue"));
+                }
+            }
+        }
+        // What is glued on pulls as much as it presses.
+        let found = sinusoid(&record(1.0, 10.0, |t| 0.2 * (TAU * t).cos()), 1.0).unwrap();
+        assert!(!found.is_contact_lost(), "{found:?}");
     }
 
     #[test]

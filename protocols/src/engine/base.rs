@@ -3,7 +3,7 @@
 //!
 //! A stiff surface gives no time: both touches are slow, and the rig's own compliance is all that softens them.
 
-use super::contact::{NOT_TARED, above_noise};
+use super::contact::{NOT_TARED, above_noise, not_felt};
 use super::context::{Context, Progress};
 use super::input::Record;
 use super::state::Contact;
@@ -86,7 +86,8 @@ impl BaseSearch {
         let filtered = Newtons(self.filter.push(force.0));
         let at_rest = cx.at_rest()?;
         match self.stage {
-            Stage::Approach if filtered >= self.criterion => {
+            // The mean of the first sample alone is above it once in two hundred searches.
+            Stage::Approach if self.filter.is_full() && filtered >= self.criterion => {
                 self.first = position;
                 cx.stop_move();
                 self.stage = Stage::Braking;
@@ -119,7 +120,7 @@ impl BaseSearch {
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
-                    return Err("the second touch did not feel what the first one felt".into());
+                    return Err(not_felt("touch", self.plan.criterion, self.criterion));
                 }
             }
             Stage::SlowBraking if at_rest => {

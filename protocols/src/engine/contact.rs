@@ -223,7 +223,7 @@ impl ContactSearch {
                     self.record_trigger(cx, reading, 2, filtered);
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
-                    return Err("the second pass did not feel what the first one felt".into());
+                    return Err(not_felt("pass", self.plan.criterion, self.criterion));
                 }
             }
             Stage::SlowBraking if at_rest => match self.plan.press {
@@ -451,6 +451,19 @@ pub(super) fn above_noise(
     let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
     let filtered = noise.0 / (samples as f64).sqrt();
     (Newtons(wanted.0.max(CRITERION_SIGMAS * filtered)), noise)
+}
+
+/// Why a second touch ended without its trigger: `wanted` is the criterion of the plan, `criterion` the one that
+/// [`above_noise`] made of it.
+pub(super) fn not_felt(touch: &str, wanted: Newtons, criterion: Newtons) -> String {
+    let advice = if criterion > wanted {
+        format!(
+            "noise raised the criterion from {wanted:.3} to {criterion:.3}; quieten the signal, tare and search again"
+        )
+    } else {
+        "look whether the specimen or its support moved, then search again".to_owned()
+    };
+    format!("the second {touch} did not feel what the first one felt: {advice}")
 }
 
 /// Refuses a drift that surely moves the force by half of the criterion within the time an approach may take.

@@ -1,6 +1,7 @@
 //! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
 
 use super::state::{Power, State};
+use crate::plans::Step;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Limits, Phase, Reading};
 use palpate_model::units::{MmPerS, Newtons, Position, Volts};
@@ -178,7 +179,7 @@ pub(super) fn judge(
                 ),
             })
         })
-        .or_else(|| rate_trip(rate, limits.force_rate_max))
+        .or_else(|| rate_trip(rate, limits.force_rate_max, state.current_step()))
         .or(age)
         .or_else(|| motor_trip(state, reading))
         .or_else(|| {
@@ -260,11 +261,17 @@ fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<
     None
 }
 
-fn rate_trip(rate: Option<f64>, rate_max: f64) -> Option<Trip> {
+fn rate_trip(rate: Option<f64>, rate_max: f64, step: Option<&Step>) -> Option<Trip> {
     let rate = rate.filter(|rate| rate.abs() > rate_max)?;
+    let advice = match step {
+        Some(Step::FindBase(_)) => {
+            "; what the search for the base met hardly gives way: give find-base a lower speed, or let a simulated rig give way (compliance 30)"
+        }
+        _ => "",
+    };
     trip(
         Interlock::ForceRate,
-        format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s"),
+        format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s{advice}"),
     )
 }
 

@@ -1,8 +1,9 @@
 //! What one step is held to, measured sample by sample.
 
 use super::Achieved;
-use crate::plans::{PlannedStep, Step};
+use crate::plans::{HoldForce, LoadTo, PlannedStep, Step};
 use palpate_model::rig::{AxisStatus, RigDescription};
+use palpate_model::signal::MovingMean;
 use palpate_model::units::Newtons;
 use palpate_sessions::record::Row;
 
@@ -11,7 +12,11 @@ const RATE_SHARE: f64 = 0.01;
 /// A force may be off by this share of the target,
 const FORCE_SHARE: f64 = 0.05;
 /// and by this much in N in any case: what the mean of ten samples of a noisy cell hides.
-const FORCE_FLOOR: f64 = 0.05;
+pub(crate) const FORCE_FLOOR: f64 = 0.05;
+/// The lowest force of a sine is the lowest mean over this share of a period: short beside it, and long beside noise.
+const SINE_SHARE: f64 = 0.02;
+/// and over so many samples at most, which hide any noise.
+const SINE_SAMPLES_MAX: f64 = 1000.0;
 /// A duration may be off by so many samples: one at each end, and the answer of the axis.
 const DURATION_SAMPLES: f64 = 5.0;
 /// Fewer samples of cruise tell no speed: the pulses are too coarse.
@@ -65,11 +70,22 @@ pub(super) struct Measuring {
     force_reached: Option<Newtons>,
     force_sum: (f64, u64),
     has_duration: bool,
+    /// The mean of a short while of a sine, and the lowest there was.
+    sine: Option<(MovingMean, f64)>,
 }
 
 impl Measuring {
     pub fn new(step_index: usize, planned: &PlannedStep, rig: &RigDescription) -> Self {
+        let sine = match planned.step {
+            Step::Sine(sine) => {
+                let samples = SINE_SHARE / (sine.frequency_hz * rig.tick().0);
+                let samples = samples.min(SINE_SAMPLES_MAX) as usize;
+                Some((MovingMean::new(samples), f64::INFINITY))
+            }
+            _ => None,
+        };
         Self {
+            sine,
             step_index,
             planned: planned.clone(),
             mm_per_pulse: rig.mm_per_pulse,
@@ -110,6 +126,9 @@ impl Measuring {
                 }
             }
         }
+        if let (Some((mean, lowest)), Some(force)) = (&mut self.sine, row.force) {
+            *lowest = lowest.min(mean.push(force));
+        }
         if let (Step::HoldForce(hold), Some(force)) = (&self.planned.step, row.force)
             && t >= 0.5 * hold.duration.0
         {
@@ -148,11 +167,36 @@ impl Measuring {
         }
     }
 
-    /// The step is done; `last` is the last sample before the next one began.
-    pub fn finish(self, last: &Row, targets: &mut Vec<Achieved>) {
-        let Some(first) = self.first else {
-            return;
+    /// What speaks against the step although every target may be met, as a sentence.
+    fn remark(&self) -> Option<String> {
+        let doubt = match self.planned.step {
+            Step::LoadTo(LoadTo { force, .. }) | Step::HoldForce(HoldForce { force, .. })
+                if force.0 <= FORCE_FLOOR =>
+            {
+                format!(
+                    "a force of {:.4} N is no more than a force may be off, {FORCE_FLOOR} N, so nothing tells whether it was met",
+                    force.0
+                )
+            }
+            Step::Sine(_) => {
+                let (_, lowest) = self.sine.as_ref()?;
+                if *lowest > FORCE_FLOOR {
+                    return None;
+                }
+                format!(
+                    "the force came back to {lowest:.3} N, where nothing tells contact from none (below {FORCE_FLOOR} N): the probe may have lost the tissue; go deeper or swing less"
+                )
+            }
+            _ => return None,
         };
+        let (step, phase) = (self.step_index + 1, self.planned.step.phase());
+        Some(format!("step {step} ({phase}): {doubt}"))
+    }
+
+    /// The step is done; `last` is the last sample before the next one began.
+    pub fn finish(self, last: &Row, targets: &mut Vec<Achieved>) -> Option<String> {
+        let first = self.first?;
+        let remark = self.remark();
         let took = self.since(&first, last) + self.tick_secs;
         let mut add = |quantity, unit, target: f64, achieved: Option<f64>, allowed: f64| {
             let Some(achieved) = achieved else { return };
@@ -230,5 +274,6 @@ impl Measuring {
             }
             _ => {}
         }
+        remark
     }
 }

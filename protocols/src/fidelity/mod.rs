@@ -12,6 +12,7 @@ pub use verdict::first_verdict;
 use crate::analysis::{SourceError, decisions};
 use crate::engine::{Effect, EndingKind, Record};
 use crate::plans::Plan;
+pub(crate) use measure::FORCE_FLOOR;
 use measure::Measuring;
 use palpate_model::rig::{Phase, RigDescription};
 use palpate_sessions::log::Session;
@@ -106,7 +107,7 @@ pub struct Fidelity {
     pub time_use: TimeUse,
     /// Samples taken while something was measured.
     pub measured: u64,
-    /// What else speaks against the run: steps left out, monitors, missed pulses.
+    /// What else speaks against the run: steps left out, monitors, missed pulses, contact lost, targets too small to tell.
     pub remarks: Vec<String>,
 }
 
@@ -184,24 +185,30 @@ impl FidelityMeter {
             }
             Record::StepFailed { .. } => {
                 self.current = None;
-                self.remark(record);
+                self.remark(record.to_string());
             }
-            Record::MonitorTripped { .. } | Record::InterlockTripped { .. } => self.remark(record),
-            Record::HomeChecked { missed_pulses } if missed_pulses.abs() > 1 => self.remark(record),
+            Record::MonitorTripped { .. } | Record::InterlockTripped { .. } => {
+                self.remark(record.to_string());
+            }
+            Record::HomeChecked { missed_pulses } if missed_pulses.abs() > 1 => {
+                self.remark(record.to_string());
+            }
             _ => {}
         }
     }
 
-    fn remark(&mut self, record: &Record) {
+    fn remark(&mut self, remark: String) {
         if self.found.remarks.len() < REMARKS_MAX {
-            self.found.remarks.push(record.to_string());
+            self.found.remarks.push(remark);
         }
     }
 
     /// The step in progress has come to its end.
     fn complete(&mut self) {
-        if let (Some(current), Some(last)) = (self.current.take(), &self.last) {
-            current.finish(last, &mut self.found.targets);
+        if let (Some(current), Some(last)) = (self.current.take(), &self.last)
+            && let Some(remark) = current.finish(last, &mut self.found.targets)
+        {
+            self.remark(remark);
         }
     }
 

@@ -7,6 +7,10 @@ use palpate_sessions::edits::Verdict;
 /// Reasons that stand in a verdict; the report has all.
 const REASONS_MAX: usize = 3;
 
+/// A target that counts as met although it may be off by more than this share of itself is named. Forces of a newton
+/// and more may be off by as much.
+const WIDE: f64 = 0.05;
+
 /// What a session is worth by how it ended and how well it did what its plan said, and why.
 ///
 /// A run that did not finish is suspect, or rejected if nothing was measured.
@@ -30,7 +34,11 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
             Verdict::Valid,
             match fidelity.targets.len() {
                 0 => "finished, no sample missing".into(),
-                count => format!("finished, {count} targets met, no sample missing"),
+                count => {
+                    let widest =
+                        widest(fidelity).map_or(String::new(), |widest| format!("; {widest}"));
+                    format!("finished, {count} targets met, no sample missing{widest}")
+                }
             },
         ),
         count => {
@@ -43,18 +51,39 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
     }
 }
 
-fn sentence(one: &Achieved) -> String {
+/// The target that is held to least, where that is less than one in twenty.
+fn widest(fidelity: &Fidelity) -> Option<String> {
+    let share = |one: &Achieved| one.allowed / one.target.abs();
+    let known = fidelity.targets.iter().filter(|one| one.target != 0.0);
+    let widest = known.max_by(|one, next| share(one).total_cmp(&share(next)))?;
+    // A force that may be off by one in twenty is not told for a rounding.
+    (share(widest) > 1.001 * WIDE).then(|| {
+        format!(
+            "{} counts as met within {:.4} {unit} of {:.4} {unit}",
+            place(widest),
+            widest.allowed,
+            widest.target,
+            unit = widest.unit
+        )
+    })
+}
+
+fn place(one: &Achieved) -> String {
     let cycle = match one.cycle {
         0 => String::new(),
         cycle => format!(" of cycle {cycle}"),
     };
+    let (number, step) = (one.step_index + 1, one.step);
+    format!("step {number} ({step}{cycle}): {}", one.quantity)
+}
+
+fn sentence(one: &Achieved) -> String {
     format!(
-        "step {} ({}{cycle}): {} {:.4} {unit} instead of {:.4} {unit}",
-        one.step_index + 1,
-        one.step,
-        one.quantity,
+        "{} {:.4} {unit} instead of {:.4} {unit}, which may be off by {:.4} {unit}",
+        place(one),
         one.achieved,
         one.target,
+        one.allowed,
         unit = one.unit
     )
 }
@@ -95,7 +124,23 @@ mod tests {
         let of = |ending, fidelity: &Fidelity| first_verdict(&outcome(ending), fidelity);
         let (verdict, reason) = of(EndingKind::Finish, &fine);
         assert_eq!(verdict, Verdict::Valid);
-        assert!(reason.contains("1 targets met"), "{reason}");
+        assert!(
+            reason.ends_with("1 targets met, no sample missing"),
+            "{reason}"
+        );
+        // What may be off by a quarter of itself is said to be.
+        let mut wide = fine.clone();
+        wide.targets.push(Achieved {
+            quantity: "force",
+            unit: "N",
+            target: 0.2,
+            allowed: 0.05,
+            ..target(20.0)
+        });
+        let (verdict, reason) = of(EndingKind::Finish, &wide);
+        assert_eq!(verdict, Verdict::Valid);
+        let told = "step 5 (ramp of cycle 2): force counts as met within 0.0500 N of 0.2000 N";
+        assert!(reason.ends_with(told), "{reason}");
         for (change, told) in [
             (
                 Fidelity {

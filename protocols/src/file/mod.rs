@@ -9,7 +9,7 @@ mod check;
 mod document;
 mod order;
 mod parameter;
-mod problem;
+pub(crate) mod problem;
 mod procedure;
 mod quantity;
 mod reference;

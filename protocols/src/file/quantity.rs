@@ -217,10 +217,16 @@ impl Given {
         let text = &self.text;
         let write = format!("write {} like {}", kind.name(), kind.example());
         match &self.what {
+            What::Number(found, number) if *found == kind && !number.is_finite() => {
+                format!("\"{text}\" is too large to count with; {write}")
+            }
             What::Number(Kind::Count, _) => format!("{text} has no unit; {write}"),
             What::Number(found, _) => format!("\"{text}\" is {}; {write}", found.name()),
             What::Flag(_) | What::None => format!("{text} is no value here; {write}"),
             What::List(_) => format!("[{text}] is a list; {write}"),
+            What::Text if is_overflow(text) => {
+                format!("\"{text}\" is too large to count with; {write}")
+            }
             What::Text => match split(text) {
                 Some((_, "")) if kind == Kind::Count => {
                     format!("{text} is not a whole number; {write}")
@@ -243,6 +249,15 @@ impl Given {
             },
         }
     }
+}
+
+/// Whether a text begins with digits that make no finite number.
+fn is_overflow(text: &str) -> bool {
+    let number = text.split_whitespace().next().unwrap_or_default();
+    let has_digits = number
+        .trim_start_matches(['+', '-'])
+        .starts_with(|c: char| c.is_ascii_digit());
+    has_digits && number.parse().is_ok_and(f64::is_infinite)
 }
 
 fn is_whole(number: f64) -> bool {
@@ -282,7 +297,14 @@ mod tests {
             ("0,75 mm/s", Kind::Speed, "a point, not a comma"),
             ("fast", Kind::Speed, "is not a speed"),
             ("2.5", Kind::Count, "not a whole number"),
-            ("1e999 N", Kind::Force, "is not a force"),
+            ("1e999 N", Kind::Force, "is too large"),
+            ("-1e999", Kind::Count, "is too large"),
+            (
+                "1e308 h",
+                Kind::Time,
+                "\"1e308 h\" is too large to count with; write a time like",
+            ),
+            ("inf N", Kind::Force, "is not a force"),
             ("nan", Kind::Time, "is not a time"),
             ("", Kind::Time, "is not a time"),
             ("--1 s", Kind::Time, "is not a time"),

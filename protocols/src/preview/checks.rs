@@ -2,6 +2,7 @@
 
 use super::walk::Walk;
 use crate::engine::{NOT_TARED, outside_travel};
+use crate::fidelity::FORCE_FLOOR;
 use crate::plans::{HoldUntil, Press};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
 
@@ -67,6 +68,10 @@ impl Walk<'_> {
         if !(force.0 > 0.0 && force < most) {
             self.refusals.push(format!(
                 "a force of {force:.2} is not possible; give a force above 0 N and below the interlock at {most:.1}"
+            ));
+        } else if force.0 <= FORCE_FLOOR {
+            self.note(format!(
+                "a force of {force:.4} is no more than a force may be off, {FORCE_FLOOR} N, so nothing tells whether it was met; load to more"
             ));
         }
     }

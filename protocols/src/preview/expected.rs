@@ -44,6 +44,8 @@ pub(super) struct Expected {
     depth: f64,
     t: f64,
     force: f64,
+    /// Lowest force since a sine began; below zero where the tissue would have to pull.
+    lowest: f64,
     /// Highest force of the thesis body under a prescribed depth, and highest force prescribed.
     peak_of_depth: f64,
     peak_of_force: f64,
@@ -59,6 +61,7 @@ impl Expected {
             depth: 0.0,
             t: 0.0,
             force: 0.0,
+            lowest: 0.0,
             peak_of_depth: 0.0,
             peak_of_force: 0.0,
             has_outline,
@@ -91,6 +94,7 @@ impl Expected {
             let body = &ModifiedKelvin::THESIS;
             self.state.step(body, Depth(depth), Seconds(secs)).0
         };
+        self.lowest = self.lowest.min(force);
         self.force = force.max(0.0);
         self.depth = depth;
         self.t += secs;
@@ -144,7 +148,9 @@ impl Expected {
         self.t - begun
     }
 
-    pub fn oscillate(&mut self, phase: Phase, sine: &Sine) {
+    /// Swings; the lowest force on the way, below zero where the tissue would have to pull.
+    pub fn oscillate(&mut self, phase: Phase, sine: &Sine) -> Newtons {
+        self.lowest = f64::INFINITY;
         let (from, period) = (self.depth, 1.0 / sine.frequency_hz);
         let followed = sine.cycles.min(SINE_CYCLES_MAX);
         for i in 1..=followed * MOVE_POINTS {
@@ -154,6 +160,7 @@ impl Expected {
             self.peak_of_depth = self.peak_of_depth.max(self.force);
         }
         self.t += period * f64::from(sine.cycles - followed);
+        Newtons(self.lowest)
     }
 
     /// Peak force of the softest and the stiffest expected specimen.

@@ -205,7 +205,13 @@ impl Walk<'_> {
                     .extend(self.rig.check_oscillation(&command).err());
                 let deepest = 2.0 * command.amplitude_pulses as f64 * self.rig.mm_per_pulse;
                 self.check_travel("sine", deepest);
-                self.expected.oscillate(phase, sine);
+                let from = Depth(self.expected.depth());
+                if self.expected.oscillate(phase, sine).0 <= 0.0 {
+                    self.note(format!(
+                        "tissue like that of the source presses too little at {from:.1} for a swing of {} mm either way: the force would come back to zero and the probe lose the tissue; go deeper or swing less",
+                        sine.amplitude_mm
+                    ));
+                }
                 // The rig counts whole ticks of each period.
                 let ticks = u64::from(command.cycles) * u64::from(command.period_ticks);
                 let secs = self.secs(ticks + MOVE_TICKS);
@@ -234,6 +240,13 @@ impl Walk<'_> {
                 self.check_speed(*speed);
                 self.jog(phase, *distance_mm, *speed)
             }
+        }
+    }
+
+    /// Notes what the same step in a loop has not told yet.
+    pub(super) fn note(&mut self, note: String) {
+        if !self.notes.contains(&note) {
+            self.notes.push(note);
         }
     }
 

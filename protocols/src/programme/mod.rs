@@ -6,6 +6,7 @@ mod conditions;
 mod document;
 mod foreseen;
 mod progress;
+mod read;
 mod run;
 mod sound;
 mod told;

@@ -3,7 +3,8 @@
 
 use super::document::Programme;
 use crate::file::Problem;
-use crate::file::tree::{self, Entry, Table, Value};
+use crate::file::problem::Problems;
+use crate::file::tree::{Entry, Table, Value};
 use palpate_sessions::{AboutError, Labels};
 use std::collections::BTreeMap;
 
@@ -23,16 +24,12 @@ pub(super) struct Told {
 }
 
 impl Told {
-    /// Reads `[about]` and `[specimen.N]` of a programme's text; `operator` is told as if it stood in `[about]`.
-    pub fn read(text: &str, operator: &str, problems: &mut Vec<Problem>) -> Self {
+    /// Reads `[about]` and `[specimen.N]` of a programme; `operator` is told as if it stood in `[about]`.
+    pub fn read(root: &Table, operator: &str, problems: &mut Problems) -> Self {
         let mut told = Self::default();
         if !operator.trim().is_empty() {
             told.all.push(("operator".into(), operator.to_owned()));
         }
-        // A text that is not TOML was refused before.
-        let Ok(root) = tree::read(text) else {
-            return told;
-        };
         for entry in &root.entries {
             match (entry.key.as_str(), &entry.node.value) {
                 ("about", Value::Table(table)) => pairs(table, "", &mut told.all, problems),
@@ -48,7 +45,7 @@ impl Told {
         told
     }
 
-    fn read_specimens(&mut self, table: &Table, problems: &mut Vec<Problem>) {
+    fn read_specimens(&mut self, table: &Table, problems: &mut Problems) {
         for entry in &table.entries {
             let Value::Table(own) = &entry.node.value else {
                 problems.push(not_numbered(entry));
@@ -82,7 +79,7 @@ fn not_numbered(entry: &Entry) -> Problem {
 }
 
 /// The pairs of a table, `specimen.source = "pig"` like `"specimen.source" = "pig"`.
-fn pairs(table: &Table, prefix: &str, found: &mut Vec<Pair>, problems: &mut Vec<Problem>) {
+fn pairs(table: &Table, prefix: &str, found: &mut Vec<Pair>, problems: &mut Problems) {
     for entry in &table.entries {
         let key = match (prefix, entry.key.as_str()) {
             ("specimen.", "name") => SPECIMEN.to_owned(),

@@ -5,6 +5,7 @@ use super::FitArgs;
 use super::sources::{self, Recording};
 use crate::report::family::{self, FittedRecord};
 use crate::workers::fit::no_systematic;
+use palpate_model::calibration::ForceUncertainty;
 use palpate_model::families::Family;
 use palpate_model::families::by_key;
 use palpate_model::fit::{
@@ -104,7 +105,10 @@ pub(super) fn run(
         .collect();
     if let (Some(to), [record]) = (to, records.as_slice()) {
         let name = found[0].file_name().unwrap_or(found[0].as_os_str());
-        let picture = family::picture(&name.to_string_lossy(), &*family, &fit, record);
+        let calibration = named.first().and_then(|one| one.calibration.as_ref());
+        let uncertainty = calibration.and_then(|one| ForceUncertainty::of(one).ok());
+        let name = name.to_string_lossy();
+        let picture = family::picture(&name, &*family, &fit, record, uncertainty.as_ref());
         new_file::write("picture", Some(to), || picture)?;
     }
     let object = FamilyOutput {

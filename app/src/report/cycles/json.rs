@@ -146,5 +146,7 @@ fn sine(result: &Result<Sinusoid, SinusoidError>) -> Value {
         "storage_n_per_mm": number(one.storage),
         "loss_n_per_mm": number(one.loss),
         "distortion_percent": one.distortion_percent,
+        "zero_share": one.zero_share,
+        "remark": one.remark(),
     })
 }

@@ -1,11 +1,13 @@
 //! The picture of an analysis of cycles: loops, how peak and place change, and how the force relaxes.
 
 use super::CycleReport;
+use crate::report::band::{self, Band};
 use crate::report::picture::{LEFT, RIGHT, WIDTH, look, title};
 use crate::report::svg::{Anchor, Ink, Panel, Svg};
 use crate::report::thin::thin;
 use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
+use palpate_model::calibration::ForceUncertainty;
 use palpate_model::cycles::CycleSample;
 use palpate_model::rig::Phase;
 
@@ -20,7 +22,9 @@ const COLUMNS: usize = 860;
 /// Room for so many cycles at least: with fewer, marks would stand between whole numbers.
 const SLOTS_MIN: usize = 8;
 
-/// The picture of one record. The first cycle is blue, the last vermillion, those between in between.
+/// The picture of one record. The first cycle is blue, the last vermillion, those between in between. Around forces lies
+/// the band of twice their calibration's standard uncertainty, where that is stated: of loops and holds around the
+/// first and the last, as more would hide each other.
 #[must_use]
 pub fn picture(report: &CycleReport) -> String {
     let mut svg = Svg::new(WIDTH);
@@ -30,7 +34,11 @@ pub fn picture(report: &CycleReport) -> String {
         None => format!("{count} cycles"),
     };
     title(&mut svg, &report.name, &words);
-    loops(&mut svg, report);
+    let calibration = report.source.calibration.as_ref();
+    let uncertainty = calibration.and_then(|one| ForceUncertainty::of(one).ok());
+    let uncertainty = uncertainty.as_ref();
+    band::legend(&mut svg, uncertainty);
+    loops(&mut svg, report, uncertainty);
     let relaxations = relaxations(report);
     let panels = if relaxations.is_empty() { 2 } else { 3 };
     let width = (RIGHT - LEFT - GAP * f64::from(panels - 1)) / f64::from(panels);
@@ -47,6 +55,7 @@ pub fn picture(report: &CycleReport) -> String {
         place(0),
         "peak (N)",
         &peaks.collect::<Vec<_>>(),
+        uncertainty,
     );
     let shifts = report.cycles.iter().enumerate().map(|(i, one)| {
         let shift = one.at_half()?.0 - first?.0;
@@ -58,11 +67,21 @@ pub fn picture(report: &CycleReport) -> String {
         place(1),
         "shift from cycle 1 (mm)",
         &shifts.collect::<Vec<_>>(),
+        None,
     );
     if panels == 3 {
         let curves: Vec<&[[f64; 2]]> = relaxations.iter().map(|(_, curve)| &curve[..]).collect();
-        let panel = Panel::around(place(2), [0.0, longest(&curves)], &curves);
+        let ends = first_and_last(relaxations.len()).map(|i| &relaxations[i]);
+        let bands: Vec<(usize, Band)> = ends
+            .map(|(index, curve)| (*index, Band::around(curve, uncertainty)))
+            .collect();
+        let mut inside = curves.clone();
+        inside.extend(bands.iter().flat_map(|(_, band)| band.edges()));
+        let panel = Panel::around(place(2), [0.0, longest(&curves)], &inside);
         panel.axes(&mut svg, ["time of hold (s)", "force (N)"], look());
+        for (index, band) in &bands {
+            band.draw(&mut svg, &panel, color(*index, count));
+        }
         for (index, curve) in &relaxations {
             panel.line(&mut svg, curve, color(*index, count), 1.2);
         }
@@ -75,10 +94,24 @@ fn color(index: usize, count: usize) -> Color32 {
     LIGHT.series.lerp_to_gamma(LIGHT.limit, share)
 }
 
-fn loops(svg: &mut Svg, report: &CycleReport) {
+/// Indices of the first and the last of so many, each once.
+fn first_and_last(count: usize) -> impl Iterator<Item = usize> {
+    let last = count.checked_sub(1);
+    let first = last.filter(|last| *last > 0).map(|_| 0);
+    first.into_iter().chain(last)
+}
+
+fn loops(svg: &mut Svg, report: &CycleReport, uncertainty: Option<&ForceUncertainty>) {
     let count = report.cycles.len();
-    let curves: Vec<Vec<[f64; 2]>> = (0..count).map(|index| one_loop(report, index)).collect();
-    let borrowed: Vec<&[[f64; 2]]> = curves.iter().map(Vec::as_slice).collect();
+    let curves: Vec<Vec<[f64; 2]>> = (0..count)
+        .map(|index| one_loop(report, index).concat())
+        .collect();
+    let bands: Vec<(usize, Band)> = first_and_last(count)
+        .flat_map(|index| one_loop(report, index).map(|part| (index, part)))
+        .map(|(index, part)| (index, Band::around(&part, uncertainty)))
+        .collect();
+    let mut borrowed: Vec<&[[f64; 2]]> = curves.iter().map(Vec::as_slice).collect();
+    borrowed.extend(bands.iter().flat_map(|(_, band)| band.edges()));
     let depths = || {
         borrowed
             .iter()
@@ -88,6 +121,9 @@ fn loops(svg: &mut Svg, report: &CycleReport) {
     let range = [low, if high > low { high } else { low + 1.0 }];
     let panel = Panel::around([LEFT, LOOPS[0], RIGHT, LOOPS[1]], range, &borrowed);
     panel.axes(svg, ["depth (mm)", "force (N)"], look());
+    for (index, band) in &bands {
+        band.draw(svg, &panel, color(*index, count));
+    }
     for (index, curve) in curves.iter().enumerate() {
         panel.line(svg, curve, color(index, count), 1.2);
     }
@@ -108,14 +144,13 @@ fn loops(svg: &mut Svg, report: &CycleReport) {
 }
 
 /// Force over depth, thinned one phase after the other, as thinning wants depths in order.
-fn one_loop(report: &CycleReport, index: usize) -> Vec<[f64; 2]> {
+fn one_loop(report: &CycleReport, index: usize) -> [Vec<[f64; 2]>; 4] {
     let part = |phase: Phase| {
         let point = |one: &CycleSample| [one.depth.0, one.force.0];
         let all = report.samples(index).filter(move |one| one.phase == phase);
         thin(all.map(point), COLUMNS)
     };
-    let phases = [Phase::Ramp, Phase::Hold, Phase::Creep, Phase::Unload];
-    phases.into_iter().flat_map(part).collect()
+    [Phase::Ramp, Phase::Hold, Phase::Creep, Phase::Unload].map(part)
 }
 
 /// Force over time of every hold, with the index of its cycle.
@@ -137,20 +172,97 @@ fn longest(curves: &[&[[f64; 2]]]) -> f64 {
     ends.map(|point| point[0]).fold(0.0, f64::max).max(1e-3)
 }
 
-/// Dots over the number of the cycle, joined by a line.
+/// Dots over the number of the cycle, joined by a line; with a band where they are forces whose uncertainty is stated.
 fn by_cycle(
     svg: &mut Svg,
     report: &CycleReport,
     place: [f64; 4],
     name: &str,
     points: &[Option<[f64; 2]>],
+    uncertainty: Option<&ForceUncertainty>,
 ) {
     let count = report.cycles.len();
     let known: Vec<[f64; 2]> = points.iter().flatten().copied().collect();
-    let panel = Panel::around(place, [0.5, count.max(SLOTS_MIN) as f64 + 0.5], &[&known]);
+    let band = Band::around(&known, uncertainty);
+    let [above, below] = band.edges();
+    let range = [0.5, count.max(SLOTS_MIN) as f64 + 0.5];
+    let panel = Panel::around(place, range, &[&known, above, below]);
     panel.axes(svg, ["cycle", name], look());
+    band.draw(svg, &panel, LIGHT.series);
     panel.line(svg, &known, LIGHT.line, 1.0);
     for [x, y] in &known {
         svg.dot(panel.at([*x, *y]), color(*x as usize - 1, count), 3.5);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::report::cycles::Question;
+    use palpate_model::calibration::Calibration;
+    use palpate_model::units::{Depth, Newtons, Seconds, Volts};
+    use palpate_protocols::cycles::CycleSource;
+
+    /// Three cycles of a way in, a hold whose force falls, and a way back.
+    fn source(calibration: Option<Calibration>) -> CycleSource {
+        let one = |cycle: u32| {
+            (0..300u32).map(move |i| {
+                let share = f64::from(i % 100) / 100.0;
+                let (phase, depth, force) = match i / 100 {
+                    0 => (Phase::Ramp, 10.0 * share, 3.0 * share),
+                    1 => (Phase::Hold, 10.0, 3.0 - 0.5 * share),
+                    _ => (Phase::Unload, 10.0 * (1.0 - share), 2.5 * (1.0 - share)),
+                };
+                CycleSample {
+                    t: Seconds(0.02 * f64::from(300 * cycle + i)),
+                    depth: Depth(depth),
+                    force: Newtons(force),
+                    phase,
+                    cycle,
+                    step: i / 100,
+                }
+            })
+        };
+        CycleSource {
+            samples: (1..=3).flat_map(one).collect(),
+            calibration,
+            ..CycleSource::default()
+        }
+    }
+
+    /// Upper and lower edge at the left end of each band, in px.
+    fn bands(picture: &str) -> Vec<[f64; 2]> {
+        let lists = picture.split("<polygon points=\"").skip(1);
+        let lists = lists.filter_map(|rest| rest.split('"').next());
+        let height = |point: &str| point.split(',').nth(1).unwrap().parse::<f64>().unwrap();
+        lists
+            .map(|list| {
+                let points: Vec<&str> = list.split(' ').collect();
+                [height(points[0]), height(points[points.len() - 1])]
+            })
+            .collect()
+    }
+
+    #[test]
+    fn forces_carry_the_band_of_their_calibration() {
+        let drawn = |calibration| {
+            let report = CycleReport::of("S".into(), source(calibration), &Question::default());
+            assert_eq!(report.cycles.len(), 3);
+            picture(&report)
+        };
+        let banded = drawn(Some(Calibration::thesis()));
+        // The legend; the four phases of the first loop and of the last, of which one was not run; the peaks; two holds.
+        let bands = bands(&banded);
+        assert_eq!(bands.len(), 1 + 2 * 3 + 1 + 2, "{banded}");
+        assert!(banded.contains("calibration, \u{b1} 2u") && !banded.contains("NaN"));
+        // 3 N is in the flat stretch: at their left end peaks and holds are unsure by 0.1 N and more of some 3.
+        for [above, below] in &bands[7..] {
+            assert!(below - above > 5.0, "{bands:?}");
+        }
+        let straight = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0));
+        for unstated in [None, Some(straight)] {
+            let plain = drawn(unstated);
+            assert!(!plain.contains("<polygon") && !plain.contains("2u"));
+        }
     }
 }

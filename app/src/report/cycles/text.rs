@@ -24,6 +24,8 @@ pub fn whole(report: &CycleReport) -> String {
         parts.push(title.to_owned());
         parts.push(in_columns(&lines));
     }
+    let remarks = report.sines.iter().flatten().filter_map(Sinusoid::remark);
+    parts.extend(remarks.map(|remark| format!("- {remark}")));
     parts.extend(report.source.notes.iter().map(|note| format!("- {note}")));
     parts.join("\n")
 }

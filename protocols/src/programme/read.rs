@@ -1,0 +1,395 @@
+//! The text of a programme: every mistake in it, each at its line.
+
+use super::document::{Programme, ProgrammeError, Task, Validates};
+use super::sound::doubts;
+use super::told::Told;
+use crate::file::problem::{Problems, nearest, suggestion};
+use crate::file::tree::{self, Entry, Node, Table, Value};
+use crate::file::{Protocol, built_in};
+use palpate_model::units::Seconds;
+use palpate_sessions::Labels;
+use std::collections::BTreeMap;
+
+/// Version of the language that is read.
+const LANGUAGE: &str = "1";
+
+/// Most repeats of a task: more is a mistake of the keyboard.
+const REPEATS_MAX: u64 = 1000;
+
+/// Longest rest in s: a day is longer than any specimen lasts.
+const REST_MAX_S: f64 = 86_400.0;
+
+/// Keys of a programme; those that it cannot do without first.
+const KEYS: [&str; 10] = [
+    "palpate-programme",
+    "name",
+    "title",
+    "task",
+    "purpose",
+    "operator",
+    "about",
+    "specimen",
+    "acknowledge",
+    "simulated",
+];
+
+/// How many of [`KEYS`] a programme cannot do without, and how each is written.
+const NEEDED: [&str; 4] = [
+    "palpate-programme = 1 on its first line",
+    "name = \"my-day\"",
+    "title = \"What is done, in a few words\"",
+    "[[task]] and below it name = \"press\" and protocol = \"ramp-hold\"",
+];
+
+/// Keys of a task; those that it cannot do without first.
+const TASK_KEYS: [&str; 8] = [
+    "name",
+    "protocol",
+    "set",
+    "specimen",
+    "repeats",
+    "rest_s",
+    "calibrates",
+    "validates",
+];
+
+/// The same of a task.
+const TASK_NEEDED: [&str; 2] = ["name = \"press\"", "protocol = \"ramp-hold\""];
+
+/// Why a folder's name has to be plain.
+const PLAIN: &str = "use letters, digits and hyphens, since its folder is called so";
+
+impl Programme {
+    /// Reads a programme. `other` gives the text of a protocol that is not built in, by the name the programme calls
+    /// it; every problem is told.
+    pub fn read(
+        text: &str,
+        other: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Result<Self, ProgrammeError> {
+        let root = tree::read(text).map_err(|problem| ProgrammeError(vec![problem]))?;
+        let mut reader = Reader::default();
+        let whole = reader.programme(&root, other);
+        match reader.problems.has_errors() {
+            false => Ok(whole),
+            true => Err(ProgrammeError(reader.problems.into_list())),
+        }
+    }
+}
+
+#[derive(Default)]
+struct Reader {
+    problems: Problems,
+}
+
+impl Reader {
+    fn programme(
+        &mut self,
+        root: &Table,
+        other: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Programme {
+        self.check_keys(root, 1, "a programme", &KEYS, &NEEDED);
+        self.check_language(root);
+        let name = self.text(root, "name").unwrap_or_default();
+        if let Some(node) = root.get("name").filter(|_| !is_plain(&name)) {
+            // A name that is no text was told as such.
+            if matches!(node.value, Value::Text(_)) {
+                let message = format!("a programme cannot be called '{name}'; {PLAIN}");
+                self.problems.error(node.line, message);
+            }
+        }
+        let mut tasks = Tasks::default();
+        for table in self.tables(root) {
+            self.task(table, &mut tasks, other);
+        }
+        let operator = self.text(root, "operator").unwrap_or_default();
+        let told = Told::read(root, &operator, &mut self.problems);
+        let whole = Programme {
+            name,
+            title: self.text(root, "title").unwrap_or_default(),
+            purpose: self.text(root, "purpose").unwrap_or_default(),
+            usual: Labels::default(),
+            is_acknowledged: self.flag(root, "acknowledge").unwrap_or_default(),
+            simulated: self.values(root, "simulated"),
+            tasks: tasks.read,
+            told,
+        };
+        let unused = whole.told.specimens();
+        let unused = unused.filter(|(number, _)| !tasks.specimens.contains(&Some(*number)));
+        // One that cannot be read may be any of them.
+        let unused = unused.filter(|_| !tasks.specimens.contains(&None));
+        for (number, line) in unused {
+            self.problems.error(line, format!(
+                "[specimen.{number}] tells of a specimen that no task clips in; add specimen = {number} to the task that does, or take it out"
+            ));
+        }
+        whole
+    }
+
+    fn check_language(&mut self, root: &Table) {
+        let Some(node) = root.get("palpate-programme") else {
+            return;
+        };
+        let message = match &node.value {
+            Value::Number(found) if found == LANGUAGE => return,
+            Value::Number(found) => format!(
+                "this is written in version {found} of the language and this palpate reads {LANGUAGE}; use a newer palpate"
+            ),
+            _ => wrong("palpate-programme", node, "the number 1, without quotes"),
+        };
+        self.problems.error(node.line, message);
+    }
+
+    /// Tells keys that are unknown, and the `needed` first ones of `known` where they are missing.
+    fn check_keys(
+        &mut self,
+        table: &Table,
+        line: u32,
+        what: &str,
+        known: &[&str],
+        needed: &[&str],
+    ) {
+        // A key that is only misspelt is told once, not as unknown and as missing too.
+        let mut meant = Vec::new();
+        for entry in &table.entries {
+            let key = entry.key.as_str();
+            if !known.contains(&key) {
+                meant.extend(nearest(key, known.iter().copied()));
+                let hint = suggestion(key, known);
+                let message = format!("{what} has no key '{key}'; {hint}");
+                self.problems.error(entry.line, message);
+            }
+        }
+        for (key, example) in known.iter().zip(needed) {
+            if table.get(key).is_none() && !meant.contains(key) {
+                let message = format!("{what} needs '{key}'; write {example}");
+                self.problems.error(line, message);
+            }
+        }
+    }
+
+    /// The tables of the tasks.
+    fn tables<'a>(&mut self, root: &'a Table) -> Vec<&'a Table> {
+        let Some(node) = root.get("task") else {
+            return Vec::new();
+        };
+        let items = match &node.value {
+            Value::List(items) if !items.is_empty() => items.as_slice(),
+            _ => std::slice::from_ref(node),
+        };
+        let mut tables = Vec::new();
+        for item in items {
+            match &item.value {
+                Value::Table(table) if item != node => tables.push(table),
+                _ => {
+                    let message = wrong(
+                        "task",
+                        item,
+                        "tables, each under [[task]] in double brackets",
+                    );
+                    self.problems.error(item.line, message);
+                }
+            }
+        }
+        tables
+    }
+
+    /// One task: into `tasks` if it is sound, and its name and specimen in any case.
+    fn task(
+        &mut self,
+        table: &Table,
+        tasks: &mut Tasks,
+        other: &dyn Fn(&str) -> Result<String, String>,
+    ) {
+        let before = self.problems.count();
+        self.check_keys(table, table.line, "a task", &TASK_KEYS, &TASK_NEEDED);
+        let line = |key: &str| table.get(key).map_or(table.line, |node| node.line);
+        let name = self.text(table, "name").map(|name| name.trim().to_owned());
+        if let Some(name) = &name {
+            if !is_plain(name) {
+                let message = format!("a task cannot be called '{name}'; {PLAIN}");
+                self.problems.error(line("name"), message);
+            }
+            if tasks.names.contains(name) {
+                let message = format!("there is a task '{name}' already; call it otherwise");
+                self.problems.error(line("name"), message);
+            }
+        }
+        let repeats = self.whole(table, "repeats").unwrap_or(1);
+        if !(1..=REPEATS_MAX).contains(&repeats) {
+            let message = format!("{repeats} repeats are not possible; give 1 to {REPEATS_MAX}");
+            self.problems.error(line("repeats"), message);
+        }
+        let rest_s = self.number(table, "rest_s").unwrap_or(0.0);
+        if !(0.0..=REST_MAX_S).contains(&rest_s) {
+            let message = format!("a rest of {rest_s} s is not possible; give 0 to {REST_MAX_S} s");
+            self.problems.error(line("rest_s"), message);
+        }
+        let validates = self.text(table, "validates");
+        if let Some(model) = validates.as_ref().filter(|one| !tasks.names.contains(*one)) {
+            let message = format!(
+                "there is no task '{model}' before this one whose model it could be compared with"
+            );
+            self.problems.error(line("validates"), message);
+        }
+        let specimen = self.whole(table, "specimen");
+        let values = self.values(table, "set");
+        let calibrates = self.flag(table, "calibrates").unwrap_or_default();
+        let called = self.text(table, "protocol");
+        let protocol = called.and_then(|called| self.protocol(&called, line("protocol"), other));
+        let wrong = protocol.as_ref().map(|one| one.plan(&values));
+        for problem in wrong.and_then(Result::err).into_iter().flatten() {
+            self.problems.error(line("set"), problem.to_string());
+        }
+        tasks.names.extend(name.clone());
+        tasks
+            .specimens
+            .extend(table.get("specimen").map(|_| specimen));
+        let (Some(name), Some(protocol)) = (name, protocol) else {
+            return;
+        };
+        if self.problems.count() > before {
+            return;
+        }
+        let task = Task {
+            name,
+            protocol,
+            values,
+            specimen,
+            repeats: repeats as u32, // At most a thousand.
+            rest: Seconds(rest_s),
+            calibrates,
+            validates: validates.map(|task| Validates { task }),
+            line: table.line,
+        };
+        for doubt in doubts(&task, &tasks.read) {
+            self.problems.error(task.line, doubt);
+        }
+        tasks.read.push(task);
+    }
+
+    /// A protocol that is built in or given by `other`; its own mistakes stand at `line` with its name.
+    fn protocol(
+        &mut self,
+        called: &str,
+        line: u32,
+        other: &dyn Fn(&str) -> Result<String, String>,
+    ) -> Option<Protocol> {
+        let found =
+            built_in(called).map_or_else(|| other(called).map(|text| Protocol::read(&text)), Ok);
+        match self.problems.take(line, found)? {
+            Ok(protocol) => Some(protocol),
+            Err(wrong) => {
+                for problem in wrong {
+                    let message = format!("protocol '{called}': {problem}");
+                    self.problems.error(line, message);
+                }
+                None
+            }
+        }
+    }
+
+    /// What `read` makes of the value of a key; one that it makes nothing of is told. Both are `None` then, as without it.
+    fn value<T>(
+        &mut self,
+        table: &Table,
+        key: &str,
+        wanted: &str,
+        read: impl Fn(&Value) -> Option<T>,
+    ) -> Option<T> {
+        let node = table.get(key)?;
+        let value = read(&node.value).ok_or_else(|| wrong(key, node, wanted));
+        self.problems.take(node.line, value)
+    }
+
+    fn text(&mut self, table: &Table, key: &str) -> Option<String> {
+        self.value(table, key, "a text in quotes", |value| match value {
+            Value::Text(text) => Some(text.clone()),
+            _ => None,
+        })
+    }
+
+    fn flag(&mut self, table: &Table, key: &str) -> Option<bool> {
+        let wanted = "true or false, without quotes";
+        self.value(table, key, wanted, |value| match value {
+            Value::Flag(flag) => Some(*flag),
+            _ => None,
+        })
+    }
+
+    fn whole(&mut self, table: &Table, key: &str) -> Option<u64> {
+        let wanted = match key {
+            "specimen" => {
+                "a whole number without quotes, such as 2; what it is called stands in [specimen.2] as name"
+            }
+            _ => "a whole number without quotes, such as 2",
+        };
+        self.value(table, key, wanted, |value| match value {
+            Value::Number(number) => number.parse().ok(),
+            _ => None,
+        })
+    }
+
+    fn number(&mut self, table: &Table, key: &str) -> Option<f64> {
+        let wanted = "a number without quotes, such as 2.5";
+        self.value(table, key, wanted, |value| match value {
+            Value::Number(number) => number.parse().ok(),
+            _ => None,
+        })
+    }
+
+    /// Values as a protocol's parameters are given: a text, or a number without a unit; a list with commas. Whether
+    /// that is a value, the protocol says.
+    fn values(&mut self, table: &Table, key: &str) -> BTreeMap<String, String> {
+        let wanted = "values in braces, as in { depth = \"20 mm\" }";
+        let entries = self.value(table, key, wanted, |value| match value {
+            Value::Table(table) => Some(table.entries.clone()),
+            _ => None,
+        });
+        let mut values = BTreeMap::new();
+        for Entry { key, line, node } in entries.unwrap_or_default() {
+            let text = as_text(&node).ok_or_else(|| wrong(&key, &node, "a text in quotes"));
+            values.extend(self.problems.take(line, text).map(|text| (key, text)));
+        }
+        values
+    }
+}
+
+/// What is known of the tasks so far.
+#[derive(Default)]
+struct Tasks {
+    /// Those that are sound.
+    read: Vec<Task>,
+    /// Names of all.
+    names: Vec<String>,
+    /// Specimens of all that clip one in; `None` for what is no number.
+    specimens: Vec<Option<u64>>,
+}
+
+/// That a key cannot have its value, and what to give.
+fn wrong(key: &str, node: &Node, wanted: &str) -> String {
+    let found = match &node.value {
+        Value::Text(text) => format!("\"{text}\""),
+        Value::Number(number) => number.clone(),
+        Value::Flag(flag) => flag.to_string(),
+        Value::List(_) | Value::Table(_) => node.kind().to_owned(),
+    };
+    format!("{key} cannot be {found}; give {wanted}")
+}
+
+fn as_text(node: &Node) -> Option<String> {
+    match &node.value {
+        Value::Text(text) | Value::Number(text) => Some(text.clone()),
+        Value::Flag(flag) => Some(flag.to_string()),
+        Value::List(items) => {
+            let items: Option<Vec<String>> = items.iter().map(as_text).collect();
+            Some(items?.join(", "))
+        }
+        Value::Table(_) => None,
+    }
+}
+
+/// Whether a name can be that of a folder anywhere.
+fn is_plain(name: &str) -> bool {
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
+    !name.is_empty() && name.chars().all(is_plain)
+}
