@@ -96,21 +96,24 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
     let out = folder.path().join("session");
     let place = out.clone();
     // The window draws on a thread of its own, which also owns the runner.
-    let watcher = std::thread::spawn(move || {
-        let rig = SimRig::new(SimSettings::default());
-        let (calibration, plan) = (rig.calibration(), params().plan());
-        let scale = TimeScale::Factor(50.0);
-        let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
-        let is_pressing = |runner: &Runner| {
-            let snapshot = runner.snapshot();
-            let run = snapshot.run.as_ref();
-            run.is_some_and(|run| run.phase == Phase::Ramp)
-        };
-        while !is_pressing(&runner) {
-            woken.recv_timeout(Duration::from_secs(60)).unwrap();
-        }
-        panic!("as if drawing had failed");
-    });
+    let watcher = std::thread::Builder::new()
+        .name("watcher".into())
+        .spawn(move || {
+            let rig = SimRig::new(SimSettings::default());
+            let (calibration, plan) = (rig.calibration(), params().plan());
+            let scale = TimeScale::Factor(50.0);
+            let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
+            let is_pressing = |runner: &Runner| {
+                let snapshot = runner.snapshot();
+                let run = snapshot.run.as_ref();
+                run.is_some_and(|run| run.phase == Phase::Ramp)
+            };
+            while !is_pressing(&runner) {
+                woken.recv_timeout(Duration::from_secs(60)).unwrap();
+            }
+            panic!("as if drawing had failed");
+        })
+        .unwrap();
     assert!(watcher.join().is_err());
     let session = Session::open(&out).unwrap();
     assert_eq!(

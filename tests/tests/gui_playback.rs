@@ -93,7 +93,18 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
         run.now.seconds().0 > middle + 5.0
     });
     click(&mut window, "Pause");
-    let paused = run(&window).now;
-    window.run_steps(5);
+    // What was asked for before is still shown, and then nothing moves any more.
+    let mut paused = run(&window).now;
+    for _ in 0..200 {
+        std::thread::sleep(Duration::from_millis(50));
+        window.step();
+        let now = run(&window).now;
+        if std::mem::replace(&mut paused, now) == now {
+            break;
+        }
+    }
+    std::thread::sleep(Duration::from_millis(300));
+    window.step();
     assert_eq!(run(&window).now, paused);
+    assert!(paused < end.now, "{paused}");
 }

@@ -6,10 +6,10 @@ use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::Limits;
-use palpate_model::units::Seconds;
+use palpate_model::units::{MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record, State};
 use palpate_protocols::file::{BUILT_IN, built_in};
-use palpate_protocols::plans::{Plan, Step};
+use palpate_protocols::plans::{Plan, Press, Step};
 use palpate_protocols::preview::preview;
 use palpate_tests::lab::{Lab, Seen};
 use std::collections::BTreeMap;
@@ -88,7 +88,15 @@ fn plan(name: &str) -> Plan {
     for planned in &mut plan.steps {
         // Nothing in a file shortens these.
         match &mut planned.step {
-            Step::FindContact(search) => search.recovery = Seconds(2.0),
+            Step::FindContact(search) => {
+                search.recovery = Seconds(0.5);
+                search.approach_speed = MmPerS(3.0);
+                search.press = search.press.map(|press| Press {
+                    dwell: Seconds(1.0),
+                    ..press
+                });
+                search.pass_speed = MmPerS(0.3);
+            }
             Step::Tare { duration } => *duration = Seconds(1.0),
             _ => {}
         }
@@ -97,11 +105,12 @@ fn plan(name: &str) -> Plan {
 }
 
 fn lab(plan: &Plan) -> Lab<SimRig> {
-    // A base is felt by how the rig gives way.
+    // A base is felt by how the rig gives way, and no deeper below the tissue than a sine needs: the search is slow.
     let rig = SimRig::new(SimSettings {
         profile: SimProfile::Ideal,
         seed: 3,
         compliance: "30".parse().unwrap(),
+        thickness: "25".parse().unwrap(),
         ..SimSettings::default()
     });
     let curve = rig.calibration().curve().unwrap();
@@ -191,83 +200,107 @@ fn deepest(lab: &Lab<SimRig>, step_index: usize) -> Option<f64> {
         .reduce(f64::max)
 }
 
+/// What is measured to a force goes as deep as noise and creep have it: 0.18 mm apart at most in tissue of 0.1 to 0.3 N/mm.
+const DEPTH_OF_FORCE: f64 = 0.3;
+
+/// Forces at the ends of steps are 0.035 N apart at most, most of it from where contact is found.
+const FORCE: f64 = 0.06;
+
 /// Whatever was measured beside the step that was paused is as long, as deep and as hard as if there had been none.
 fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &Lab<SimRig>) {
     let rig = before.rig.description();
     let limits = Limits::for_travel(rig.travel);
     let curve = before.rig.calibration().curve().unwrap();
     let previewed = preview(plan, rig, &limits, &curve, false);
+    // Tissue goes on relaxing and recovering in a pause.
+    let has_rested = matches!(
+        plan.steps[paused].step,
+        Step::Hold { .. } | Step::HoldForce(_) | Step::Rest { .. }
+    );
     for (index, (planned, foreseen)) in plan.steps.iter().zip(&previewed.steps).enumerate() {
+        // A prompt lasts until somebody answers.
         if index == paused || matches!(planned.step, Step::Prompt(_)) {
             continue;
         }
         let what = format!("{what}, step {} ({})", index + 1, foreseen.phase);
-        let length = |lab: &Lab<SimRig>| lab.ticks_of(index).map(|(first, last)| last - first);
-        let (length_now, length_before) = (length(now).unwrap(), length(before).unwrap());
-        let is_exact = foreseen.is_exact;
-        if is_exact {
-            assert!(
-                length_now.abs_diff(length_before) <= 1,
-                "{what}: {length_now} {length_before}"
-            );
-        }
+        let length = |lab: &Lab<SimRig>| {
+            let (first, last) = lab.ticks_of(index).unwrap();
+            assert!(lab.seen.len() as u64 > last - first, "{what}");
+            last - first
+        };
+        let (long, usual) = (length(now), length(before));
+        let apart = match foreseen.is_exact {
+            true => 1,
+            // What waits for a signal or goes from where one was met: 6 % at most.
+            false => 100 + usual / 10,
+        };
+        assert!(long.abs_diff(usual) <= apart, "{what}: {long} {usual}");
         if !planned.step.is_measuring() {
             continue;
         }
-        let (deep_now, deep_before) = (
-            deepest(now, index).unwrap(),
-            deepest(before, index).unwrap(),
-        );
+        let deep = (deepest(now, index).unwrap() - deepest(before, index).unwrap()).abs();
+        let allowed = match foreseen.is_exact {
+            true => rig.mm_per_pulse + 1e-9,
+            false => DEPTH_OF_FORCE,
+        };
+        assert!(deep <= allowed, "{what}: {deep} mm");
         let force = |seen: &Seen| seen.derived.force.map(|force| force.0);
-        let (hard_now, hard_before) = (at_end(now, index, force), at_end(before, index, force));
-        let hard = (hard_now.unwrap() - hard_before.unwrap()).abs();
-        let deep = (deep_now - deep_before).abs();
+        let [hard, usual] = [now, before].map(|lab| at_end(lab, index, force).unwrap());
+        let is_alike = (hard - usual).abs() <= FORCE || has_rested && index > paused;
+        assert!(is_alike, "{what}: {hard} {usual} N");
+    }
+}
+
+fn every_step_of(name: &str) {
+    let plan = plan(name);
+    let before = undisturbed(&plan);
+    let outcome = before.outcome.as_ref();
+    let outcome = outcome.unwrap_or_else(|| panic!("{name}: {:?}", before.state().holding()));
+    assert_eq!(
+        outcome.ending,
+        EndingKind::Finish,
+        "{name}: {}",
+        outcome.reason
+    );
+    for (index, planned) in plan.steps.iter().enumerate() {
+        let what = format!(
+            "{name} paused at step {} ({})",
+            index + 1,
+            planned.step.phase()
+        );
+        let (now, can_go_on) = paused_at(index, &plan);
+        let outcome = now.outcome.as_ref();
+        let outcome = outcome.unwrap_or_else(|| panic!("{what}: {:?}", now.state().holding()));
+        assert_eq!(
+            outcome.ending,
+            EndingKind::Finish,
+            "{what}: {}",
+            outcome.reason
+        );
+        let is_motion_measured = matches!(
+            planned.step,
+            Step::Ramp { .. } | Step::LoadTo(_) | Step::Unload { .. } | Step::Sine(_)
+        );
+        assert_eq!(can_go_on, !is_motion_measured, "{what}");
+        if can_go_on {
+            compare(&what, &plan, index, &now, &before);
+        } else {
+            assert!(
+                outcome.reason.contains("early"),
+                "{what}: {}",
+                outcome.reason
+            );
+        }
     }
 }
 
 #[test]
 fn every_step_of_every_shipped_protocol_can_be_paused() {
-    for (name, _) in BUILT_IN {
-        let plan = plan(name);
-        let before = undisturbed(&plan);
-        let outcome = before.outcome.as_ref();
-        let outcome = outcome.unwrap_or_else(|| panic!("{name}: {:?}", before.state().holding()));
-        assert_eq!(
-            outcome.ending,
-            EndingKind::Finish,
-            "{name}: {}",
-            outcome.reason
-        );
-        println!("{name}: {} s", before.now.seconds());
-        for (index, planned) in plan.steps.iter().enumerate() {
-            let what = format!(
-                "{name} paused at step {} ({})",
-                index + 1,
-                planned.step.phase()
-            );
-            let (now, can_go_on) = paused_at(index, &plan);
-            let outcome = now.outcome.as_ref();
-            let outcome = outcome.unwrap_or_else(|| panic!("{what}: {:?}", now.state().holding()));
-            assert_eq!(
-                outcome.ending,
-                EndingKind::Finish,
-                "{what}: {}",
-                outcome.reason
-            );
-            let is_motion_measured = matches!(
-                planned.step,
-                Step::Ramp { .. } | Step::LoadTo(_) | Step::Unload { .. } | Step::Sine(_)
-            );
-            assert_eq!(can_go_on, !is_motion_measured, "{what}");
-            if can_go_on {
-                compare(&what, &plan, index, &now, &before);
-            } else {
-                assert!(
-                    outcome.reason.contains("early"),
-                    "{what}: {}",
-                    outcome.reason
-                );
-            }
+    // A dozen seconds of work, on two processors.
+    let (even, odd): (Vec<_>, Vec<_>) = BUILT_IN.iter().enumerate().partition(|(i, _)| i % 2 == 0);
+    std::thread::scope(|scope| {
+        for half in [even, odd] {
+            scope.spawn(move || half.iter().for_each(|(_, (name, _))| every_step_of(name)));
         }
-    }
+    });
 }

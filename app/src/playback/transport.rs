@@ -48,11 +48,7 @@ impl Transport {
         if self.is_playing {
             self.at = match self.scale {
                 // A machine that falls behind shows everything a little later, and leaves out nothing.
-                TimeScale::Factor(factor)
-                    if self.asked.is_none_or(|asked| shown >= asked - factor) =>
-                {
-                    self.at + seconds * factor
-                }
+                TimeScale::Factor(factor) if !self.is_behind(shown) => self.at + seconds * factor,
                 TimeScale::Factor(_) => self.at,
                 TimeScale::Max => self.end,
             };
@@ -62,6 +58,14 @@ impl Transport {
             self.is_playing = false;
         }
         (self.asked != Some(self.at)).then(|| *self.asked.insert(self.at))
+    }
+
+    /// Whether what is shown is more than a second of the wall behind what was asked for.
+    fn is_behind(&self, shown: f64) -> bool {
+        match self.scale {
+            TimeScale::Factor(factor) => self.asked.is_some_and(|asked| asked > shown + factor),
+            TimeScale::Max => false,
+        }
     }
 
     /// Plays on, or stays where `shown` is; at the end it begins again.
@@ -121,7 +125,7 @@ impl Transport {
             }
             let words = format!("{} of {}", clock(shown), clock(self.end));
             ui.label(words);
-            if self.asked.is_some_and(|asked| asked > shown + 1.0) && self.scale != TimeScale::Max {
+            if self.is_behind(shown) {
                 ui.label(RichText::new("catching up").color(tokens.text_quiet));
             }
         });

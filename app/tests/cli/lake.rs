@@ -151,7 +151,7 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     succeeded(&serial);
     assert_eq!(json(&serial)["made"], 5);
     let expected = contents(&at.join("serial"));
-    assert_eq!(expected.len(), 20);
+    assert_eq!(expected.len(), 25);
 
     // The same numbers, to the last digit, as of the sessions themselves.
     let direct = palpate(at, &["fit", "runs", "--json"]);

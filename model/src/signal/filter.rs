@@ -22,6 +22,12 @@ impl MovingMean {
         }
     }
 
+    /// Whether the mean is over all the values it is meant for: before, it hides less noise.
+    #[must_use]
+    pub fn is_full(&self) -> bool {
+        self.ring.len() == self.length
+    }
+
     /// Takes a value and returns the mean with it.
     pub fn push(&mut self, value: f64) -> f64 {
         if self.ring.len() < self.length {
@@ -70,5 +76,6 @@ mod tests {
             ],
             [1.0, 1.5, 2.0, 3.0]
         );
+        assert!(mean.is_full() && !MovingMean::new(2).is_full());
     }
 }

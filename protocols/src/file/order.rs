@@ -64,6 +64,7 @@ enum Missed {
     Tare,
     Contact,
     Outside,
+    Inside,
     Specimen,
 }
 
@@ -93,6 +94,10 @@ impl Known {
             let message = "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it";
             return Err((Missed::Contact, message));
         }
+        if !self.is_inside && matches!(step, Step::HoldForce(_)) {
+            let message = "keeps a force that is there already and hardly moves where there is none; put { do = \"load\", to = \"1 N\", ... } before it";
+            return Err((Missed::Inside, message));
+        }
         if self.is_bare && matches!(step, Step::FindContact(_)) {
             let message = "would run into the base, for the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }";
             return Err((Missed::Specimen, message));
@@ -111,6 +116,7 @@ impl Known {
             Missed::Tare => self.tare = true,
             Missed::Contact => self.contact = true,
             Missed::Outside => self.is_inside = false,
+            Missed::Inside => self.is_inside = true,
             Missed::Specimen => self.is_bare = false,
         }
     }
