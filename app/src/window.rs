@@ -3,7 +3,7 @@
 use crate::app::WorkbenchApp;
 use crate::command::Commands;
 use crate::plots::force_depth::force_depth_ui;
-use crate::plots::force_time::{TimeView, force_time_ui};
+use crate::plots::force_time::{force_time_ui, head_ui};
 use crate::plots::residual::residual_ui;
 use crate::screens::calibration::Facts;
 use crate::screens::form::Checked;
@@ -303,15 +303,7 @@ impl WorkbenchApp {
     }
 
     fn plots_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        ui.horizontal(|ui| {
-            ui.label(RichText::new("Force over time").heading().strong());
-            ui.selectable_value(&mut self.time_view, TimeView::Whole, "Whole run");
-            ui.selectable_value(&mut self.time_view, TimeView::FromRamp, "From ramp");
-            if let Some(remark) = self.plots.remark() {
-                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
-            }
-        });
+        head_ui(ui, &mut self.time_view, &self.plots);
         let run = self.snapshot.run.as_ref();
         let limit = self.bench.limits.force_max;
         let exact = match self.refit() {

@@ -14,7 +14,9 @@ use palpate_protocols::plans::{
     Action, FindBase, FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, Monitor, OnFailure,
     OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step, Weigh,
 };
+use palpate_protocols::replay::replay;
 use palpate_tests::lab::Lab;
+use palpate_tests::recorded;
 use std::collections::VecDeque;
 
 /// Runs in the test suite: about ten seconds.
@@ -447,5 +449,32 @@ fn whatever_happens_the_axis_stops_with_a_reason() {
         println!("{kind}: {} of {runs}", total(kind));
         // Every way of ending is tried.
         assert!(total(kind) > 0, "{kind}");
+    }
+}
+
+/// Runs through the runner and the disk: about ten seconds.
+const SESSIONS: u64 = 40;
+
+#[test]
+fn whatever_happens_the_session_is_closed_with_its_reason() {
+    for seed in 0..SESSIONS {
+        // Other seeds than those of the runs in memory.
+        let mut random = SplitMix::seeded(1 << 40 | seed);
+        let sim = SimRig::new(SimSettings {
+            seed,
+            ..SimSettings::default()
+        });
+        let calibration = sim.calibration();
+        let plan = any_plan(&mut random);
+        let fault = (random.below(2) == 0).then(|| any_fault(&mut random));
+        let about = format!("seed {seed}, {fault:?}, {:?}", plan.steps);
+        let rig = FaultyRig::new(sim, fault.into_iter().collect(), seed);
+        let session = recorded::of_plan(Box::new(rig), calibration, plan);
+        let end = session.end.as_ref().unwrap_or_else(|| panic!("{about}"));
+        assert!(!end.reason.is_empty(), "{about}");
+        assert_eq!(end.samples, session.rows.len() as u64, "{about}");
+        // And decides the same again.
+        let again = replay(&session, &[]).unwrap();
+        assert_eq!(again.first_difference, None, "{about}");
     }
 }

@@ -6,7 +6,7 @@ mod transport;
 use crate::command::{Command, Commands};
 use crate::plots::PlotCache;
 use crate::plots::force_depth::force_depth_ui;
-use crate::plots::force_time::{TimeView, force_time_ui};
+use crate::plots::force_time::{TimeView, force_time_ui, head_ui};
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
 use crate::shell::event_log::EventLog;
@@ -95,7 +95,7 @@ impl PlaybackApp {
         &self.snapshot
     }
 
-    fn head_ui(&self, ui: &mut Ui) {
+    fn state_ui(&self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             ui.set_height(HEIGHT);
@@ -122,15 +122,7 @@ impl PlaybackApp {
     }
 
     fn plots_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        ui.horizontal(|ui| {
-            ui.label(RichText::new("Force over time").heading().strong());
-            ui.selectable_value(&mut self.time_view, TimeView::Whole, "Whole run");
-            ui.selectable_value(&mut self.time_view, TimeView::FromRamp, "From ramp");
-            if let Some(remark) = self.plots.remark() {
-                ui.label(RichText::new(remark).color(tokens.text_quiet).small());
-            }
-        });
+        head_ui(ui, &mut self.time_view, &self.plots);
         let run = self.snapshot.run.as_ref();
         let height = (ui.available_height() - 30.0) * 0.56;
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
@@ -168,7 +160,7 @@ impl eframe::App for PlaybackApp {
             .exact_size(HEIGHT + 14.0)
             .resizable(false)
             .frame(frame(ui, false))
-            .show(ui, |ui| self.head_ui(ui));
+            .show(ui, |ui| self.state_ui(ui));
         Panel::bottom("log")
             .exact_size(LOG_HEIGHT)
             .resizable(false)

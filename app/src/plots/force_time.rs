@@ -4,7 +4,7 @@ use super::points::{PlotCache, phase_spans};
 use super::style::{band_of, quiet};
 use crate::theme::Tokens;
 use crate::workers::fit::ExactFit;
-use eframe::egui::{Align2, Color32, Ui, Vec2b};
+use eframe::egui::{Align2, Color32, RichText, Ui, Vec2b};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text};
 use palpate_model::rig::Phase;
 use palpate_model::units::Newtons;
@@ -19,6 +19,19 @@ pub enum TimeView {
     Whole,
     /// From two seconds before the ramp, once it began.
     FromRamp,
+}
+
+/// Draws the head of the plot: its name, how much of the run is shown, what a reader must know.
+pub fn head_ui(ui: &mut Ui, view: &mut TimeView, cache: &PlotCache) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.horizontal(|ui| {
+        ui.label(RichText::new("Force over time").heading().strong());
+        ui.selectable_value(view, TimeView::Whole, "Whole run");
+        ui.selectable_value(view, TimeView::FromRamp, "From ramp");
+        if let Some(remark) = cache.remark() {
+            ui.label(RichText::new(remark).color(tokens.text_quiet).small());
+        }
+    });
 }
 
 /// Seconds shown before the ramp.

@@ -127,7 +127,11 @@ impl Measuring {
             }
         }
         if let (Some((mean, lowest)), Some(force)) = (&mut self.sine, row.force) {
-            *lowest = lowest.min(mean.push(force));
+            let now = mean.push(force);
+            // The mean of a few samples is lower than any by its noise.
+            if mean.is_full() {
+                *lowest = lowest.min(now);
+            }
         }
         if let (Step::HoldForce(hold), Some(force)) = (&self.planned.step, row.force)
             && t >= 0.5 * hold.duration.0

@@ -143,6 +143,29 @@ fn value_of_hash(session: &Session) -> String {
     palpate_sessions::text::sha256(calibration.to_string().as_bytes())
 }
 
+/// What a script of Python's says of a file, as JSON. Where Python or a package of it is not installed it says so, and
+/// nothing is compared.
+fn python(script: &str, path: &Path) -> Option<serde_json::Value> {
+    let run = Command::new("python3")
+        .args(["-c", script])
+        .arg(path)
+        .output();
+    let output = match run {
+        Ok(output) => output,
+        Err(err) => {
+            println!("skipped: python3 does not run ({err})");
+            return None;
+        }
+    };
+    let text = String::from_utf8_lossy(&output.stdout);
+    if let Some(package) = text.trim().strip_prefix("no ") {
+        println!("skipped: python3 has no {package}");
+        return None;
+    }
+    let found = serde_json::from_str(&text);
+    Some(found.unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr))))
+}
+
 /// Another implementation reads the same, where one is installed.
 fn python_agrees(path: &Path, session: &Session) {
     const SCRIPT: &str = "
@@ -158,18 +181,9 @@ print(json.dumps([t.num_rows, str(t['counts'].type), str(t['cycle'].type), str(t
     m[b'palpate.session'].decode(), t['force_N'].null_count, t['counts'].null_count,
     t['signal_V'][2999].as_py(), t['phase'][2999].as_py(), t['t_s'][2999].as_py()]))
 ";
-    let run = Command::new("python3")
-        .args(["-c", SCRIPT])
-        .arg(path)
-        .output();
-    let output = match run {
-        Ok(output) => output,
-        Err(err) => return println!("skipped: python3 does not run ({err})"),
+    let Some(found) = python(SCRIPT, path) else {
+        return;
     };
-    let text = String::from_utf8_lossy(&output.stdout);
-    if text.trim() == "no pyarrow" {
-        return println!("skipped: python3 has no pyarrow");
-    }
     let last = &session.rows[2999];
     let nulls = session
         .rows
@@ -189,8 +203,6 @@ print(json.dumps([t.num_rows, str(t['counts'].type), str(t['cycle'].type), str(t
         last.phase.name(),
         time_of(session, 2999)
     ]);
-    let found: serde_json::Value = serde_json::from_str(&text)
-        .unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr)));
     assert_eq!(found, expected);
 }
 
@@ -218,20 +230,9 @@ print(json.dumps([session, topics]))
         log_bytes(&rows(1000, 42), &[], Some(end(Nanos::ZERO))),
     )
     .unwrap();
-    let run = Command::new("python3")
-        .args(["-c", SCRIPT])
-        .arg(&path)
-        .output();
-    let output = match run {
-        Ok(output) => output,
-        Err(err) => return println!("skipped: python3 does not run ({err})"),
+    let Some(found) = python(SCRIPT, &path) else {
+        return;
     };
-    let text = String::from_utf8_lossy(&output.stdout);
-    if text.trim() == "no mcap" {
-        return println!("skipped: python3 has no mcap");
-    }
-    let found: serde_json::Value = serde_json::from_str(&text)
-        .unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr)));
     let expected = serde_json::json!(["20260305T141507Z-0badcafe",
         // Of a second at 1 kHz with jitter one sample is shown every 20 ms.
         {"/manifest": 1, "/daq/block": 10, "/derived/block": 10, "/daq/view": 49, "/end": 1}]);
@@ -443,20 +444,9 @@ print(json.dumps([t.num_rows, t.column_names, json.loads(m[b'palpate.columns'])[
     let path = folder.path().join("one.arrow");
     let session = session();
     export(&session, Format::Arrow, &Selection::default(), &path).unwrap();
-    let run = Command::new("python3")
-        .args(["-c", SCRIPT])
-        .arg(&path)
-        .output();
-    let output = match run {
-        Ok(output) => output,
-        Err(err) => return println!("skipped: python3 does not run ({err})"),
+    let Some(found) = python(SCRIPT, &path) else {
+        return;
     };
-    let text = String::from_utf8_lossy(&output.stdout);
-    if text.trim() == "no pyarrow" {
-        return println!("skipped: python3 has no pyarrow");
-    }
-    let found: serde_json::Value = serde_json::from_str(&text)
-        .unwrap_or_else(|err| panic!("{err}: {}", String::from_utf8_lossy(&output.stderr)));
     fn each<T: serde::Serialize>(
         session: &Session,
         of: impl Fn(usize, &Row) -> T,
@@ -476,5 +466,6 @@ print(json.dumps([t.num_rows, t.column_names, json.loads(m[b'palpate.columns'])[
         each(&session, |_, row| row.pulses),
         each(&session, |i, _| time_of(&session, i)),
     ]);
+    let text = found.to_string();
     assert!(found == expected, "{text:.400}");
 }

@@ -151,6 +151,24 @@ fn a_recording_takes_little_memory_however_long_it_is() {
     assert_eq!(samples, 800_000);
 }
 
+/// What makes calls of this name on this file fail, those that `when` numbers.
+fn failing(file: &Path, call: &str, error: &str, when: &str) -> Vec<String> {
+    let shown = file.to_str().unwrap();
+    let trace = format!("trace={call}");
+    let inject = format!("inject={call}:error={error}:when={when}");
+    let quiet = ["strace", "-f", "-qq", "-o", "/dev/null"];
+    let what = ["-P", shown, "-e", &trace, "-e", &inject];
+    [&quiet[..], &what]
+        .concat()
+        .into_iter()
+        .map(Into::into)
+        .collect()
+}
+
+fn words(program: &[String]) -> Vec<&str> {
+    program.iter().map(String::as_str).collect()
+}
+
 #[test]
 fn an_error_of_the_disk_costs_a_real_recording_nothing() {
     if let Some(reason) = hindrance() {
@@ -167,25 +185,8 @@ fn an_error_of_the_disk_costs_a_real_recording_nothing() {
         let folder = tempfile::tempdir().unwrap();
         let session = folder.path().join("one");
         let log = session.join(LOG_FILE);
-        let (trace, inject) = (
-            format!("trace={call}"),
-            format!("inject={call}:error=EIO:when={number}+"),
-        );
-        let shown = log.to_str().unwrap();
-        let program = [
-            "strace",
-            "-f",
-            "-qq",
-            "-o",
-            "/dev/null",
-            "-P",
-            shown,
-            "-e",
-            &trace,
-            "-e",
-            &inject,
-        ];
-        let output = command(&program, "session 3000", &session)
+        let program = failing(&log, call, "EIO", &format!("{number}+"));
+        let output = command(&words(&program), "session 3000", &session)
             .output()
             .unwrap();
         assert!(output.status.success(), "{output:?}");
@@ -219,25 +220,10 @@ fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
         fs::write(folder.join(LOG_FILE), &bytes).unwrap();
         let copy = recovered_folder(&folder);
         let log = copy.with_extension("recovering").join(LOG_FILE);
-        let (trace, inject) = (
-            format!("trace={call}"),
-            format!("inject={call}:error={error}:when={number}"),
-        );
-        let shown = log.to_str().unwrap();
-        let program = [
-            "strace",
-            "-f",
-            "-qq",
-            "-o",
-            "/dev/null",
-            "-P",
-            shown,
-            "-e",
-            &trace,
-            "-e",
-            &inject,
-        ];
-        let output = command(&program, "recover", &folder).output().unwrap();
+        let program = failing(&log, call, error, &number.to_string());
+        let output = command(&words(&program), "recover", &folder)
+            .output()
+            .unwrap();
         let said = String::from_utf8_lossy(&output.stderr);
         assert!(!output.status.success(), "{call} {number}: {said}");
         assert!(said.contains("Disk {"), "{said}");

@@ -4,12 +4,10 @@ use super::super::{Failure, new_file, output::Output};
 use super::FitArgs;
 use super::sources::{self, Recording};
 use crate::report::family::{self, FittedRecord};
-use crate::workers::fit::no_systematic;
 use palpate_model::calibration::ForceUncertainty;
-use palpate_model::families::Family;
 use palpate_model::families::by_key;
 use palpate_model::fit::{
-    FamilyFit, FamilyOptions, FitSample, Systematic, fit_family, systematic_family,
+    FamilyFit, FamilyOptions, FitSample, Systematic, Traced, fit_family, systematic_family,
 };
 use palpate_model::signal::work;
 use palpate_model::units::Newtons;
@@ -86,12 +84,12 @@ pub(super) fn run(
     let mut fit =
         fit_family(&*family, &borrowed, FamilyOptions::default()).map_err(Failure::failed)?;
     let seconds = watch.seconds();
+    let find = |records: &[Traced<'_>]| {
+        systematic_family(&fit, &*family, records, FamilyOptions::default())
+    };
     let systematic = match args.no_systematic {
         true => None,
-        false => systematic(&fit, &*family, &named).unwrap_or_else(|reason| {
-            output.note(&no_systematic(&reason));
-            None
-        }),
+        false => sources::systematic(&named, find, output),
     };
     if let Some(found) = &systematic {
         fit = fit.with_systematic(found);
@@ -136,20 +134,6 @@ pub(super) fn run(
         lines.join("\n")
     });
     Ok(())
-}
-
-/// What calibrations and compliances add; `None` where none is known.
-fn systematic(
-    fit: &FamilyFit,
-    family: &dyn Family,
-    records: &[Recording],
-) -> Result<Option<Systematic>, String> {
-    let origins = sources::origins(records).map_err(|err| err.to_string())?;
-    let found = origins.map(|origins| {
-        let traced = sources::traced(records, &origins);
-        systematic_family(fit, family, &traced, FamilyOptions::default())
-    });
-    found.transpose().map_err(|err| err.to_string())
 }
 
 fn forces(fit: &FamilyFit, records: &[(&str, &[FitSample])]) -> Result<Vec<Vec<Newtons>>, Failure> {

@@ -4,9 +4,8 @@ use super::super::{Failure, output::Output};
 use super::Recipe;
 use super::sources::{self, Recording};
 use crate::report::text;
-use crate::workers::fit::no_systematic;
 use palpate_model::fit::{
-    FitSample, JointReport, NamedReport, Parameter, Systematic, fit_joint, systematic_joint,
+    FitSample, JointReport, NamedReport, Parameter, Systematic, Traced, fit_joint, systematic_joint,
 };
 use palpate_protocols::compliance::Correction;
 use palpate_protocols::runner::Stopwatch;
@@ -60,11 +59,9 @@ pub(super) fn run(
         }
     })?;
     let seconds = watch.seconds();
+    let find = |records: &[Traced<'_>]| systematic_joint(records, &recipe.options, &shared);
     let systematic = match recipe.is_systematic {
-        true => systematic(&records, recipe, &shared).unwrap_or_else(|reason| {
-            output.note(&no_systematic(&reason));
-            None
-        }),
+        true => sources::systematic(&records, find, output),
         false => None,
     };
     if let Some(found) = &systematic {
@@ -83,20 +80,6 @@ pub(super) fn run(
         lines.join("\n")
     });
     Ok(())
-}
-
-/// What calibrations and compliances add, for each record; `None` where none is known.
-fn systematic(
-    records: &[Recording],
-    recipe: &Recipe,
-    shared: &[&str],
-) -> Result<Option<Vec<Systematic>>, String> {
-    let origins = sources::origins(records).map_err(|err| err.to_string())?;
-    let found = origins.map(|origins| {
-        let traced = sources::traced(records, &origins);
-        systematic_joint(&traced, &recipe.options, shared)
-    });
-    found.transpose().map_err(|err| err.to_string())
 }
 
 fn names(shared: &str) -> Vec<&str> {

@@ -3,8 +3,9 @@
 use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
+use crate::workers::fit::no_systematic;
 use palpate_model::calibration::{Calibration, CalibrationError};
-use palpate_model::fit::{FitSample, Traced};
+use palpate_model::fit::{FitError, FitSample, Traced};
 use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_protocols::origin::Origin;
@@ -105,21 +106,31 @@ pub(in crate::cli) struct Recording {
     pub calibration: Option<Calibration>,
 }
 
-/// Where the forces and depths of each come from, where that is known of any; `None` says that it is of none.
-pub(super) fn origins(records: &[Recording]) -> Result<Option<Vec<Origin>>, CalibrationError> {
+/// What calibrations and compliances add, as `find` tells it; `None` where neither is known of any record. What cannot be
+/// told is a note.
+pub(super) fn systematic<T>(
+    records: &[Recording],
+    find: impl FnOnce(&[Traced<'_>]) -> Result<T, FitError>,
+    output: &Output,
+) -> Option<T> {
     let each = records
         .iter()
         .map(|one| Origin::of(one.calibration.as_ref(), one.compliance.as_ref()));
-    let origins: Vec<Origin> = each.collect::<Result<_, _>>()?;
-    Ok(origins.iter().any(Origin::is_known).then_some(origins))
-}
-
-/// The records as their systematic errors are found.
-pub(super) fn traced<'a>(records: &'a [Recording], origins: &'a [Origin]) -> Vec<Traced<'a>> {
-    let pairs = records.iter().zip(origins);
-    pairs
-        .map(|(one, origin)| origin.traced(&one.name, &one.samples))
-        .collect()
+    let origins: Result<Vec<Origin>, CalibrationError> = each.collect();
+    let found = origins.map_err(|err| err.to_string()).and_then(|origins| {
+        let traced: Vec<Traced<'_>> = records
+            .iter()
+            .zip(&origins)
+            .map(|(one, origin)| origin.traced(&one.name, &one.samples))
+            .collect();
+        let is_known = origins.iter().any(Origin::is_known);
+        let found = is_known.then(|| find(&traced)).transpose();
+        found.map_err(|err| err.to_string())
+    });
+    found.unwrap_or_else(|reason| {
+        output.note(&no_systematic(&reason));
+        None
+    })
 }
 
 impl Recording {

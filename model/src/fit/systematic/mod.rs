@@ -1,0 +1,300 @@
+//! What errors of the calibration and of the rig's compliance do to fitted parameters. They are the same in every
+//! sample, so residuals do not show them and no repeat takes them away: they are told beside the statistical error,
+//! not in it.
+//!
+//! Every independent error is moved by one standard uncertainty, all forces or depths read with it are read again,
+//! and the fit is made again; the root of the sum of squared changes is the systematic standard uncertainty
+//! (JCGM 100:2008, section 5.1, with the derivatives as differences). Records read with one calibration move together.
+
+use super::family::{FamilyFit, FamilyOptions, refit_family};
+use super::options::{FitOptions, PARAMETER_NAMES};
+use super::sample::{FitError, FitSample, Named};
+use super::solve::Fitted;
+use crate::calibration::{ForceUncertainty, Term};
+use crate::families::Family;
+use crate::units::{Depth, Newtons};
+use serde::Serialize;
+use std::collections::BTreeMap;
+
+#[cfg(test)]
+mod tests;
+mod told;
+
+/// More samples of a record than this tell the change no better: it is no matter of noise, for the same samples
+/// are fitted before and after. Longer records are taken at every second, third, ... sample.
+const SAMPLES_MAX: usize = 4000;
+
+/// A record and what its forces and depths were read with.
+#[derive(Clone, Copy, Debug)]
+pub struct Traced<'a> {
+    /// Its name.
+    pub name: &'a str,
+    /// What is fitted.
+    pub samples: &'a [FitSample],
+    /// The calibration by name, and its uncertainty; `None` where it is not known, as of a table.
+    pub calibration: Option<(&'a str, &'a ForceUncertainty)>,
+    /// The compliance taken from the depths, by name, and its standard uncertainty in mm/N.
+    pub compliance: Option<(&'a str, f64)>,
+}
+
+/// What calibration and compliance add to the uncertainty of a fit.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Systematic {
+    /// The calibrations.
+    pub calibrations: Vec<Stated>,
+    /// Names of the compliances that were taken from the depths.
+    pub compliances: Vec<String>,
+    /// Every parameter; empty where nothing is stated of any error.
+    pub parameters: Vec<SystematicError>,
+    /// Whether forces beyond the heaviest weight were fitted, so that the true error is larger.
+    pub is_extrapolated: bool,
+}
+
+/// What one calibration states of its errors.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Stated {
+    /// Its name.
+    pub name: String,
+    /// Terms whose errors were moved.
+    pub terms: Vec<Term>,
+    /// Terms it does not state.
+    pub not_stated: Vec<Term>,
+}
+
+impl Stated {
+    fn of((name, own): (&str, &ForceUncertainty)) -> Self {
+        Self {
+            name: name.to_owned(),
+            terms: distinct(own.errors()),
+            not_stated: own.not_stated().to_vec(),
+        }
+    }
+}
+
+/// The systematic standard uncertainty of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SystematicError {
+    /// The parameter.
+    pub name: String,
+    /// Everything together, in its unit.
+    pub error: f64,
+    /// Each term of the calibration, in its unit.
+    pub terms: Vec<TermError>,
+    /// The part of the rig's compliance, in its unit; `None` where depths are raw.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub compliance: Option<f64>,
+}
+
+/// The part of one term.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct TermError {
+    /// Where it comes from.
+    pub term: Term,
+    /// Its standard uncertainty.
+    pub error: f64,
+}
+
+/// The systematic uncertainties of a fit of `record` with `options`.
+///
+/// Costs a fit of at most 4000 samples for each independent error, of which there are as many as twice
+/// the weights or more.
+pub fn systematic(record: Traced<'_>, options: &FitOptions) -> Result<Systematic, FitError> {
+    let refit = |records: &[Named<'_>]| {
+        let fitted = Fitted::of(records[0].1, options)?;
+        Ok(fitted.system.physical(&fitted.refined.points[0]).to_vec())
+    };
+    let spread = Spread::of(&[record], refit)?;
+    Ok(spread.told(&[record], &PARAMETER_NAMES, 0))
+}
+
+/// The same of a fit of several records together, one for each; [`super::fit_joint`] says what `shared` is.
+pub fn systematic_joint(
+    records: &[Traced<'_>],
+    options: &FitOptions,
+    shared: &[&str],
+) -> Result<Vec<Systematic>, FitError> {
+    let refit = |records: &[Named<'_>]| {
+        let fitted = Fitted::joint(records, options, shared)?;
+        let points = fitted.refined.points.iter();
+        Ok(points
+            .flat_map(|point| fitted.system.physical(point))
+            .collect())
+    };
+    let spread = Spread::of(records, refit)?;
+    let each = (0..records.len()).map(|k| k * PARAMETER_NAMES.len());
+    Ok(each
+        .map(|first| spread.told(records, &PARAMETER_NAMES, first))
+        .collect())
+}
+
+/// The same of a fit of any family, one body for all records.
+pub fn systematic_family(
+    fit: &FamilyFit,
+    family: &dyn Family,
+    records: &[Traced<'_>],
+    options: FamilyOptions,
+) -> Result<Systematic, FitError> {
+    let names: Vec<&str> = fit.parameters.iter().map(|one| one.name.as_str()).collect();
+    let spread = Spread::of(records, refit_family(family, options))?;
+    Ok(spread.told(records, &names, 0))
+}
+
+/// Squared changes of everything a fit finds.
+struct Spread {
+    terms: BTreeMap<Term, Vec<f64>>,
+    compliance: Option<Vec<f64>>,
+}
+
+impl Spread {
+    /// Of what `refit` finds in records, in an order of its own.
+    fn of(
+        records: &[Traced<'_>],
+        mut refit: impl FnMut(&[Named<'_>]) -> Result<Vec<f64>, FitError>,
+    ) -> Result<Self, FitError> {
+        let taken: Vec<Vec<FitSample>> = records.iter().map(|one| thinned(one.samples)).collect();
+        let names = records.iter().map(|one| one.name);
+        let mut values = |sets: &[Vec<FitSample>]| {
+            let borrowed: Vec<_> = names.clone().zip(sets.iter().map(Vec::as_slice)).collect();
+            refit(&borrowed)
+        };
+        let mut spread = Self {
+            terms: BTreeMap::new(),
+            compliance: None,
+        };
+        let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
+        let compliances = distinct(records.iter().filter_map(|one| one.compliance));
+        if calibrations.iter().all(|(_, one)| !one.is_stated()) && compliances.is_empty() {
+            return Ok(spread);
+        }
+        let before = values(&taken)?;
+        let mut add = |sums: &mut Vec<f64>, moved: &[Vec<FitSample>]| {
+            sums.resize(before.len(), 0.0);
+            if moved != taken {
+                let after = values(moved)?;
+                for (sum, (after, before)) in sums.iter_mut().zip(after.iter().zip(&before)) {
+                    *sum += (after - before).powi(2);
+                }
+            }
+            Ok(())
+        };
+        for own in &calibrations {
+            for (index, term) in own.1.errors().enumerate() {
+                let move_one = |one: &FitSample| {
+                    let shift = own.1.shift(index, one.force);
+                    let force = Newtons(one.force.0 + shift.0);
+                    if one.is_measured() {
+                        FitSample { force, ..*one }
+                    } else {
+                        *one
+                    }
+                };
+                let moved = moved(
+                    records,
+                    &taken,
+                    |one| one.calibration == Some(*own),
+                    |samples| samples.iter().map(move_one).collect(),
+                );
+                add(spread.terms.entry(term).or_default(), &moved)?;
+            }
+        }
+        for own in &compliances {
+            let moved = moved(
+                records,
+                &taken,
+                |one| one.compliance == Some(*own),
+                |samples| bent(samples, own.1),
+            );
+            add(spread.compliance.get_or_insert_default(), &moved)?;
+        }
+        Ok(spread)
+    }
+
+    /// The values from `first` on, by name.
+    fn told(&self, records: &[Traced<'_>], names: &[&str], first: usize) -> Systematic {
+        let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
+        let compliances = distinct(records.iter().filter_map(|one| one.compliance));
+        let is_told = self.compliance.is_some() || !self.terms.is_empty();
+        let parameters = names.iter().zip(first..).filter(|_| is_told);
+        Systematic {
+            calibrations: calibrations.iter().copied().map(Stated::of).collect(),
+            compliances: compliances
+                .iter()
+                .map(|(name, _)| (*name).to_owned())
+                .collect(),
+            is_extrapolated: records.iter().any(|one| {
+                one.calibration.is_some_and(|(_, uncertainty)| {
+                    let known = one.samples.iter().filter(|sample| sample.is_measured());
+                    known
+                        .map(|sample| sample.force)
+                        .any(|force| force > uncertainty.force_max())
+                })
+            }),
+            parameters: parameters
+                .map(|(name, k)| {
+                    let compliance = self.compliance.as_ref().map(|sums| sums[k]);
+                    let all = self.terms.values().map(|sums| sums[k]).chain(compliance);
+                    SystematicError {
+                        name: (*name).to_owned(),
+                        error: all.sum::<f64>().sqrt(),
+                        terms: self
+                            .terms
+                            .iter()
+                            .map(|(term, sums)| TermError {
+                                term: *term,
+                                error: sums[k].sqrt(),
+                            })
+                            .collect(),
+                        compliance: compliance.map(f64::sqrt),
+                    }
+                })
+                .collect(),
+        }
+    }
+}
+
+fn thinned(samples: &[FitSample]) -> Vec<FitSample> {
+    let stride = samples.len().div_ceil(SAMPLES_MAX).max(1);
+    samples.iter().step_by(stride).copied().collect()
+}
+
+/// Each once, in the order of their coming.
+fn distinct<T: PartialEq>(all: impl Iterator<Item = T>) -> Vec<T> {
+    let mut found = Vec::new();
+    for one in all {
+        if !found.contains(&one) {
+            found.push(one);
+        }
+    }
+    found
+}
+
+/// The samples taken, those of the chosen records as another calibration or compliance would have read them.
+fn moved(
+    records: &[Traced<'_>],
+    taken: &[Vec<FitSample>],
+    is_chosen: impl Fn(&Traced<'_>) -> bool,
+    read: impl Fn(&[FitSample]) -> Vec<FitSample>,
+) -> Vec<Vec<FitSample>> {
+    let pairs = records.iter().zip(taken);
+    pairs
+        .map(|(record, samples)| match is_chosen(record) {
+            true => read(samples),
+            false => samples.clone(),
+        })
+        .collect()
+}
+
+/// Depths with so much more of the force, in mm/N, taken from them. Where no force is known, the last one bends.
+fn bent(samples: &[FitSample], mm_per_newton: f64) -> Vec<FitSample> {
+    let mut force = 0.0;
+    let each = samples.iter().map(|one| {
+        if one.is_measured() {
+            force = one.force.0;
+        }
+        FitSample {
+            depth: Depth(one.depth.0 - mm_per_newton * force),
+            ..*one
+        }
+    });
+    each.collect()
+}

@@ -1,0 +1,288 @@
+use super::*;
+use crate::calibration::Calibration;
+use crate::random::SplitMix;
+use crate::units::{Depth, Seconds, Volts};
+use crate::viscoelastic::{KelvinState, ModifiedKelvin};
+
+/// The thesis's ramp and hold, so many samples a second.
+fn record(rate: f64) -> Vec<FitSample> {
+    let mut state = KelvinState::at_rest();
+    (0..(90.0 * rate) as usize)
+        .map(|i| {
+            let t = i as f64 / rate;
+            let depth = Depth((0.75 * t).min(30.0));
+            let dt = Seconds(if i == 0 { 0.0 } else { 1.0 / rate });
+            FitSample {
+                t: Seconds(t),
+                depth,
+                force: state.step(&ModifiedKelvin::THESIS, depth, dt),
+                sigma: Newtons(0.02),
+            }
+        })
+        .collect()
+}
+
+fn traced<'a>(
+    samples: &'a [FitSample],
+    name: &'a str,
+    uncertainty: &'a ForceUncertainty,
+) -> Traced<'a> {
+    Traced {
+        name,
+        samples,
+        calibration: Some((name, uncertainty)),
+        compliance: None,
+    }
+}
+
+/// The thesis's table as if it were printed with a digit more: small errors, so that the draws do not
+/// bend the curve.
+fn calibration() -> Calibration {
+    Calibration {
+        resolution: Some(Volts(0.001)),
+        ..Calibration::thesis()
+    }
+}
+
+#[test]
+fn it_is_what_draws_of_whole_calibrations_scatter() {
+    let (samples, options) = (record(5.0), FitOptions::default());
+    let calibration = calibration();
+    let uncertainty = ForceUncertainty::of(&calibration).unwrap();
+    let found = systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
+    let curve = calibration.curve().unwrap();
+    let tare = curve.volts_from_newtons(Newtons(0.0));
+    let mut random = SplitMix::seeded(5);
+    let values = |samples: &[FitSample]| {
+        let fitted = Fitted::of(samples, &options).unwrap();
+        fitted.system.physical(&fitted.refined.points[0])
+    };
+    let before = values(&samples);
+    let mut squares = [0.0; 8];
+    let draws = 600;
+    for _ in 0..draws {
+        let mut drawn = calibration.clone();
+        for step in &mut drawn.steps {
+            step.volts.0 += 1e-3 / 12f64.sqrt() * random.normal();
+        }
+        let drawn = drawn.curve().unwrap();
+        let zero = drawn.volts_from_newtons(Newtons(0.0));
+        let read = |one: &FitSample| FitSample {
+            force: drawn.newtons_from_volts(curve.volts_from_newtons(one.force) - tare + zero),
+            ..*one
+        };
+        let again: Vec<FitSample> = samples.iter().map(read).collect();
+        let after = values(&again);
+        for k in 0..8 {
+            squares[k] += (after[k] - before[k]).powi(2) / f64::from(draws);
+        }
+    }
+    for (k, own) in found.parameters.iter().enumerate().take(5) {
+        let digits = own
+            .terms
+            .iter()
+            .find(|one| one.term == Term::Resolution)
+            .unwrap();
+        let drawn = squares[k].sqrt();
+        // 600 draws know a standard deviation to 3 %, three times that and a little bend.
+        assert!(
+            (digits.error / drawn - 1.0).abs() < 0.12,
+            "{}: {} against {drawn}",
+            own.name,
+            digits.error
+        );
+        let sum: f64 = own.terms.iter().map(|one| one.error.powi(2)).sum();
+        assert!((own.error - sum.sqrt()).abs() <= 1e-12 * own.error);
+    }
+}
+
+#[test]
+fn fewer_samples_tell_the_same() {
+    let options = FitOptions::default();
+    let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
+    let of = |samples: &[FitSample]| {
+        systematic(traced(samples, "thesis", &uncertainty), &options).unwrap()
+    };
+    // Of 18 000 samples every fifth is taken; 1800 are taken whole.
+    let (long, short) = (of(&record(200.0)), of(&record(20.0)));
+    for (a, b) in long.parameters.iter().zip(&short.parameters).take(5) {
+        assert!(
+            (a.error / b.error - 1.0).abs() < 0.01,
+            "{}: {} {}",
+            a.name,
+            a.error,
+            b.error
+        );
+    }
+}
+
+#[test]
+fn a_calibration_that_states_nothing_adds_nothing_and_says_so() {
+    let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
+    let uncertainty = ForceUncertainty::of(&line).unwrap();
+    let (samples, options) = (record(5.0), FitOptions::default());
+    let found = systematic(traced(&samples, "line", &uncertainty), &options).unwrap();
+    let report = super::super::fit(&samples, &options)
+        .unwrap()
+        .with_systematic(&found);
+    assert!(
+        report
+            .parameters
+            .iter()
+            .all(|one| one.systematic_error.is_none())
+    );
+    let sentence = report.findings.last().unwrap();
+    assert!(sentence.contains("\"line\" states nothing"), "{sentence}");
+    let uncertainty = ForceUncertainty::of(&Calibration::thesis()).unwrap();
+    let found = systematic(traced(&samples, "thesis", &uncertainty), &options).unwrap();
+    let report = super::super::fit(&samples, &options)
+        .unwrap()
+        .with_systematic(&found);
+    let sentence = report.findings.last().unwrap();
+    assert!(
+        sentence.contains("digits of the readings, interpolation; not stated: tolerance"),
+        "{sentence}"
+    );
+    assert!(!found.is_extrapolated);
+    for parameter in &report.parameters {
+        assert_eq!(
+            parameter.systematic_error.is_some(),
+            parameter.std_error.is_some()
+        );
+    }
+}
+
+#[test]
+fn records_of_one_calibration_move_together_and_of_two_apart() {
+    let (one, options) = (record(5.0), FitOptions::default());
+    let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
+    let joint = |names: [&str; 2]| {
+        let both = names.map(|name| traced(&one, name, &uncertainty));
+        systematic_joint(&both, &options, &PARAMETER_NAMES[..5]).unwrap()
+    };
+    let alone = systematic(traced(&one, "a", &uncertainty), &options).unwrap();
+    let (same, apart) = (joint(["a", "a"]), joint(["a", "b"]));
+    for (k, own) in alone.parameters.iter().enumerate().take(5) {
+        // Twice the same record with the same error: the same as once.
+        let ratio = same[0].parameters[k].error / own.error;
+        assert!((ratio - 1.0).abs() < 1e-6, "{}: {ratio}", own.name);
+        // Each moves half of the body, and both are independent: 1 / sqrt(2). Differences of a fit that bends
+        // are a few percent off.
+        let ratio = apart[1].parameters[k].error / own.error;
+        assert!(
+            (ratio - 0.5f64.sqrt()).abs() < 0.05,
+            "{}: {ratio}",
+            own.name
+        );
+    }
+    let sentence = apart[0].sentence();
+    assert!(
+        sentence.starts_with("the calibration \"a\" and the calibration \"b\" add"),
+        "{sentence}"
+    );
+    assert!(
+        sentence.contains("(digits of the readings, interpolation; not stated: tolerance"),
+        "{sentence}"
+    );
+}
+
+#[test]
+fn of_two_calibrations_it_is_told_which_states_what() {
+    let (one, options) = (record(5.0), FitOptions::default());
+    let drifting = Calibration {
+        zero_before: Some(Volts(1.28)),
+        zero_after: Some(Volts(1.29)),
+        ..calibration()
+    };
+    let straight = Calibration::linear("line", Volts(1.28), 0.15, Newtons(50.0));
+    let told = |second: &Calibration| {
+        let both = [&calibration(), second].map(|one| ForceUncertainty::of(one).unwrap());
+        let records = [traced(&one, "a", &both[0]), traced(&one, "b", &both[1])];
+        systematic_joint(&records, &options, &PARAMETER_NAMES[..5]).unwrap()[0].clone()
+    };
+    let found = told(&drifting);
+    let sentence = found.sentence();
+    assert!(
+        sentence.contains(
+            "(\"a\" states digits of the readings, interpolation, but not tolerance of the weights, repeatability, \
+             hysteresis, zero drift; \"b\" states digits of the readings, zero drift, interpolation, but not \
+             tolerance of the weights, repeatability, hysteresis)"
+        ),
+        "{sentence}"
+    );
+    assert!(found.calibrations[1].terms.contains(&Term::ZeroDrift));
+    assert!(found.calibrations[0].not_stated.contains(&Term::ZeroDrift));
+    let sentence = told(&straight).sentence();
+    assert!(sentence.contains("; \"b\" states nothing)"), "{sentence}");
+}
+
+#[test]
+fn any_family_tells_the_same_of_the_same_body() {
+    let (samples, options) = (record(5.0), FitOptions::default());
+    let uncertainty = ForceUncertainty::of(&calibration()).unwrap();
+    let traced = traced(&samples, "thesis", &uncertainty);
+    let family = crate::families::by_key("series-3").unwrap();
+    let options_of = FamilyOptions::default();
+    let fit = super::super::fit_family(&*family, &[("it", &samples)], options_of).unwrap();
+    let found = systematic_family(&fit, &*family, &[traced], options_of).unwrap();
+    let known = systematic(traced, &options).unwrap();
+    for own in &found.parameters {
+        let Some(other) = known.parameters.iter().find(|one| one.name == own.name) else {
+            continue;
+        };
+        // Two searches for the same minimum; that of a family ends where a step gains less than 1e-9 of the sum.
+        assert!(
+            (own.error / other.error - 1.0).abs() < 2e-3,
+            "{own:?} {other:?}"
+        );
+    }
+    assert!(
+        found
+            .parameters
+            .iter()
+            .filter(|one| one.error > 0.0)
+            .count()
+            >= 5
+    );
+    let told = fit.with_systematic(&found);
+    assert!(
+        told.parameters
+            .iter()
+            .all(|one| one.std_error.is_none() || one.systematic_error.is_some())
+    );
+}
+
+#[test]
+fn a_compliance_known_badly_makes_stiffness_known_badly() {
+    let (samples, options) = (record(5.0), FitOptions::default());
+    let line = Calibration::linear("line", Volts(1.0), 0.1, Newtons(10.0));
+    let uncertainty = ForceUncertainty::of(&line).unwrap();
+    let with = |std_error| {
+        let traced = Traced {
+            compliance: Some(("stand", std_error)),
+            ..traced(&samples, "line", &uncertainty)
+        };
+        systematic(traced, &options).unwrap()
+    };
+    // 1 um/N moves a depth of 30 mm by some micrometres; twice of it, twice as far.
+    let (one, two) = (with(1e-3), with(2e-3));
+    for (one, two) in one.parameters.iter().zip(&two.parameters).take(5) {
+        assert!(
+            one.error > 0.0 && one.compliance == Some(one.error),
+            "{one:?}"
+        );
+        assert!(
+            (two.error / one.error - 2.0).abs() < 0.02,
+            "{one:?} {two:?}"
+        );
+    }
+    let sentence = one.sentence();
+    assert!(
+        sentence.contains("the rig's compliance stand add"),
+        "{sentence}"
+    );
+    assert!(
+        sentence.contains("(what the rig gives way; not stated"),
+        "{sentence}"
+    );
+}

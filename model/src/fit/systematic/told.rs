@@ -1,0 +1,131 @@
+//! Systematic errors in a sentence, and beside the statistical ones of a report.
+
+use super::super::family::FamilyFit;
+use super::super::report::{FitReport, JointReport};
+use super::{Stated, Systematic};
+use crate::calibration::Term;
+
+impl Stated {
+    /// Its own part of a sentence.
+    fn words(&self) -> String {
+        let name = &self.name;
+        match (self.terms.as_slice(), self.not_stated.as_slice()) {
+            ([], _) => format!("\"{name}\" states nothing"),
+            (terms, []) => format!("\"{name}\" states {}", words(terms)),
+            (terms, others) => {
+                format!(
+                    "\"{name}\" states {}, but not {}",
+                    words(terms),
+                    words(others)
+                )
+            }
+        }
+    }
+}
+
+/// Terms in words.
+fn words(terms: &[Term]) -> String {
+    let words: Vec<&str> = terms.iter().map(|term| term.word()).collect();
+    words.join(", ")
+}
+
+impl Systematic {
+    /// One sentence on what was added and what could not be.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        let calibrations = self.calibrations.iter();
+        let calibrations = calibrations.map(|one| format!("the calibration \"{}\"", one.name));
+        let compliances = self.compliances.iter();
+        let names: Vec<String> = calibrations
+            .chain(compliances.map(|name| format!("the rig's compliance {name}")))
+            .collect();
+        let is_one = names.len() == 1;
+        let names = names.join(" and ");
+        let Some(first) = self.parameters.first() else {
+            let states = match is_one {
+                true => "states nothing of its",
+                false => "state nothing of their",
+            };
+            return format!("{names} {states} own errors, so a systematic part is not told");
+        };
+        let bends = first
+            .compliance
+            .map(|_| "what the rig gives way".to_owned());
+        let is_alike = |pair: &[Stated]| {
+            (&pair[0].terms, &pair[0].not_stated) == (&pair[1].terms, &pair[1].not_stated)
+        };
+        let parts = if self.calibrations.windows(2).all(is_alike) {
+            let terms: Vec<Term> = first.terms.iter().map(|one| one.term).collect();
+            let stated = Some(words(&terms)).filter(|words| !words.is_empty());
+            let stated: Vec<String> = stated.into_iter().chain(bends).collect();
+            match self
+                .calibrations
+                .first()
+                .map(|one| one.not_stated.as_slice())
+            {
+                None | Some([]) => stated.join(", "),
+                Some(terms) => format!("{}; not stated: {}", stated.join(", "), words(terms)),
+            }
+        } else {
+            // What one states and another does not would read as a contradiction.
+            let each = self.calibrations.iter().map(Stated::words);
+            each.chain(bends).collect::<Vec<_>>().join("; ")
+        };
+        let beyond = match self.is_extrapolated {
+            true => {
+                "; forces beyond its heaviest weight are extrapolated, so the true error is larger"
+            }
+            false => "",
+        };
+        format!(
+            "{names} {} the systematic error, one standard uncertainty that repeats do not take away ({parts}){beyond}",
+            if is_one { "adds" } else { "add" },
+        )
+    }
+
+    /// The error of a parameter, where there is one.
+    fn error(&self, name: &str) -> Option<f64> {
+        let own = self.parameters.iter().find(|one| one.name == name);
+        own.map(|own| own.error)
+    }
+}
+
+impl FitReport {
+    /// This report with the systematic errors beside the statistical ones, and the sentence on them.
+    #[must_use]
+    pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
+        self.add_systematic(systematic);
+        self.findings.push(systematic.sentence());
+        self
+    }
+
+    fn add_systematic(&mut self, systematic: &Systematic) {
+        let known = self.parameters.iter_mut();
+        for parameter in known.filter(|one| one.std_error.is_some()) {
+            parameter.systematic_error = systematic.error(&parameter.name);
+        }
+    }
+}
+
+impl JointReport {
+    /// This report with the systematic errors of every record beside the statistical ones.
+    #[must_use]
+    pub fn with_systematic(mut self, systematic: &[Systematic]) -> Self {
+        for (record, own) in self.records.iter_mut().zip(systematic) {
+            record.report.add_systematic(own);
+        }
+        self
+    }
+}
+
+impl FamilyFit {
+    /// This fit with the systematic errors beside the statistical ones.
+    #[must_use]
+    pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
+        let known = self.parameters.iter_mut();
+        for parameter in known.filter(|one| one.std_error.is_some()) {
+            parameter.systematic_error = systematic.error(&parameter.name);
+        }
+        self
+    }
+}
