@@ -30,9 +30,16 @@ pub enum LockError {
 /// Holds a lock file until dropped. The system releases it when the process dies.
 #[derive(Debug)]
 pub struct HolderLock {
-    // Closing the file releases the lock.
-    _file: File,
+    file: File,
     path: PathBuf,
+}
+
+impl Drop for HolderLock {
+    fn drop(&mut self) {
+        // Closing alone is not enough: a program that this process starts at this moment has the
+        // file too until it is loaded, and with it the lock.
+        let _ = self.file.unlock();
+    }
 }
 
 impl HolderLock {
@@ -70,7 +77,7 @@ impl HolderLock {
             .and_then(|_| file.write_all(text.as_bytes()))
             .map_err(failed)?;
         Ok(Self {
-            _file: file,
+            file,
             path: path.into(),
         })
     }
@@ -96,5 +103,26 @@ fn read_holder(file: &File) -> String {
         digits
     } else {
         "unknown".into()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A file that a child of this process got with its start is the same open file.
+    #[test]
+    fn a_lock_ends_with_its_holder_whoever_else_has_the_file() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lock");
+        let held = HolderLock::acquire(&path).unwrap();
+        let of_a_child = held.file.try_clone().unwrap();
+        assert!(matches!(
+            HolderLock::acquire(&path),
+            Err(LockError::Held { .. })
+        ));
+        drop(held);
+        HolderLock::acquire(&path).unwrap();
+        drop(of_a_child);
     }
 }

@@ -256,3 +256,40 @@ fn the_soak_script_names_its_parts() {
         assert!(is_named, "{part}: {told}");
     }
 }
+
+#[test]
+fn what_documents_point_to_exists() {
+    let tops: Vec<String> = CRATES
+        .into_iter()
+        .chain(["benches", "docs", "examples", "python", "scripts"])
+        .map(|top| format!("{top}/"))
+        .collect();
+    let mut gone = Vec::new();
+    let mut count = 0;
+    for file in files_below(&workspace(), "md") {
+        let folder = file.parent().unwrap();
+        let text = fs::read_to_string(&file).unwrap();
+        // `[words](path)` from where the document is, and `path` in a code span from the top.
+        let links = text.split("](").skip(1).filter_map(|rest| {
+            let (path, _) = rest.split_once(')')?;
+            let path = path.split('#').next()?;
+            (!path.is_empty() && !path.contains("://")).then_some((folder, path))
+        });
+        let top = workspace();
+        let spans = text.split('`').skip(1).step_by(2).filter_map(|span| {
+            let path = span.split_whitespace().next()?.trim_end_matches('/');
+            let is_ours = tops.iter().any(|top| span.starts_with(top.as_str()));
+            // Not a pattern, nor with a name to be filled in.
+            let is_plain = !path.contains(['*', '<', '{', '$']) && !path.contains("NAME");
+            (is_ours && is_plain).then_some((top.as_path(), path))
+        });
+        for (from, path) in links.chain(spans) {
+            count += 1;
+            if !from.join(path).exists() {
+                gone.push(format!("{}: {path}", file.display()));
+            }
+        }
+    }
+    assert!(gone.is_empty(), "{}", gone.join("\n"));
+    assert!(count > 100, "only {count} looked at");
+}

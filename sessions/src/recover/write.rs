@@ -104,10 +104,10 @@ pub fn recovered_folder(path: &Path) -> PathBuf {
 pub(super) fn is_in_use(path: &Path) -> bool {
     let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
     lock.is_ok_and(|file| {
-        matches!(
-            file.try_lock_shared(),
-            Err(std::fs::TryLockError::WouldBlock)
-        )
+        let looked = file.try_lock_shared();
+        // Not left to closing: a program started at this moment would hold it a little longer.
+        let _ = file.unlock();
+        matches!(looked, Err(std::fs::TryLockError::WouldBlock))
     })
 }
 
