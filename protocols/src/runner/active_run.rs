@@ -19,8 +19,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Samples between two answers of the live fit: half a second at 1 kHz.
-pub(crate) const LIVE_FIT_EVERY: u64 = 500;
+/// Milliseconds between two answers of the live fit.
+const LIVE_FIT_MS: u64 = 500;
 
 /// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
 const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
@@ -333,6 +333,8 @@ pub(crate) struct LiveFeed {
     first_tick: Option<u64>,
     tick_secs: f64,
     samples: u64,
+    /// Samples between two answers.
+    every: u64,
     deepest: Depth,
     cycle: u32,
 }
@@ -346,10 +348,11 @@ impl LiveFeed {
             first_tick: None,
             tick_secs: config.rig.tick().0,
             samples: 0,
+            every: LIVE_FIT_MS * u64::from(config.rig.samples_per_ms()),
         }
     }
 
-    /// Takes a sample after the engine did; every [`LIVE_FIT_EVERY`] samples there is an answer.
+    /// Takes a sample after the engine did; every half second there is an answer.
     pub fn push(
         &mut self,
         reading: &Reading,
@@ -371,7 +374,7 @@ impl LiveFeed {
         let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
         self.fit.push(t, depth, force, sigma);
         self.samples += 1;
-        if self.samples.is_multiple_of(LIVE_FIT_EVERY) {
+        if self.samples.is_multiple_of(self.every) {
             self.fit.estimate()
         } else {
             None
