@@ -177,7 +177,8 @@ pub(super) fn judge(
             ),
         );
     }
-    let force = state.force_from_volts(reading.volts);
+    let derived = state.derived.force;
+    let force = derived.unwrap_or_else(|| state.force_from_volts(reading.volts));
     state.watch.newest = (force, reading.volts);
     let rate = state.watch.push_rate(force.0, &state.config.rig);
     let (force_max, volts_max) = match state.watch.retract_ceiling {
