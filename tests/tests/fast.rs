@@ -95,9 +95,13 @@ fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
 #[test]
 fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
     for (name, values) in [
-        ("stiff-surface", &[][..]),
-        ("force-relaxation", &[("hold", "2 s")]),
-        ("creep", &[("hold", "2 s")]),
+        ("stiff-surface", &[("force", "1 N"), ("repeats", "1")][..]),
+        (
+            "preconditioning-force",
+            &[("force", "1 N"), ("cycles", "1"), ("rest", "0 s")],
+        ),
+        ("creep", &[("force", "1 N"), ("duration", "10 s")]),
+        ("load-cell-calibration", &[("repeats", "1")]),
     ] {
         let times = ["1000", "20000"].map(|rate| {
             let settings = SimSettings {
