@@ -4,11 +4,12 @@
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
 use palpate_model::fit::{FitOptions, fit};
-use palpate_model::rig::Phase;
+use palpate_model::rig::{Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds};
-use palpate_protocols::engine::EndingKind;
+use palpate_protocols::engine::{EndingKind, Record};
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::{Plan, RampHold};
+use palpate_protocols::preview::preview;
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::{EntryKind, Session};
@@ -125,6 +126,28 @@ fn searches_for_a_force_a_base_and_a_weight_take_as_long_as_ever() {
     }
 }
 
+#[test]
+fn moves_and_waits_take_what_the_preview_says() {
+    let rig = SimRig::new(settings(SimProfile::Lab, "20000", 3));
+    let (curve, plan) = (rig.calibration().curve().unwrap(), short().plan());
+    let limits = Limits::for_travel(rig.description().travel);
+    let expected = preview(&plan, rig.description(), &limits, &curve, false).steps;
+    let mut lab = Lab::new(rig, curve, plan).forgetful();
+    lab.run();
+    let begun = |wanted: Phase| {
+        let is_begin = |record: &Record| matches!(record, Record::PhaseStarted { phase, .. } if *phase == wanted);
+        let found = lab.records.iter().find(|(_, record)| is_begin(record));
+        found.unwrap().0.seconds().0
+    };
+    let of = |phase: Phase| expected.iter().find(|step| step.phase == phase).unwrap();
+    let took = begun(Phase::Hold) - begun(Phase::Ramp) - of(Phase::Ramp).expected.0;
+    // Reports take 1.0 to 1.5 ms, which counts once in the answer of the axis and once in when a phase is seen to begin.
+    assert!((-1.05e-3..0.55e-3).contains(&took), "ramp: {took:e}");
+    assert!(!of(Phase::Ramp).is_exact && of(Phase::Hold).is_exact);
+    let took = begun(Phase::Retract) - begun(Phase::Hold) - of(Phase::Hold).expected.0;
+    assert!(took.abs() < 0.55e-3, "hold: {took:e}");
+}
+
 /// Every tick of a recording is in it, and it replays.
 fn is_whole(session: &Session, rate: f64) {
     let end = session.end.as_ref().unwrap();
@@ -146,15 +169,15 @@ fn is_whole(session: &Session, rate: f64) {
 
 #[test]
 fn all_samples_are_on_disk_and_replay() {
-    let rig = SimRig::new(settings(SimProfile::Lab, "20000", 5));
-    let calibration = rig.calibration();
+    let rig = SimRig::new(settings(SimProfile::Ideal, "20000", 5));
+    let (calibration, tau) = (rig.calibration(), rig.truth().body.tau_eps);
     let session = recorded::session(Box::new(rig), calibration, short());
     is_whole(&session, 20_000.0);
     assert_eq!(
         session.manifest.rig.as_ref().unwrap().settings["rate"],
         "20000"
     );
-    // Two answers of the live fit a second.
+    // Two answers of the live fit a second, the last near the truth: 0.3 % is three standard errors.
     let measured = |phase| matches!(phase, Phase::Ramp | Phase::Hold);
     let samples = session
         .rows
@@ -165,7 +188,11 @@ fn all_samples_are_on_disk_and_replay() {
         .entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Fit);
-    assert!(fits.count().abs_diff(samples / 10_000) <= 1);
+    assert!(fits.clone().count().abs_diff(samples / 10_000) <= 1);
+    let last = fits.last().unwrap().body["parameters"].as_array().unwrap();
+    let found = last.iter().find(|one| one["name"] == "tau_eps").unwrap();
+    let found = found["value"].as_f64().unwrap();
+    assert!((found / tau - 1.0).abs() < 3e-3, "{found} {tau}");
 }
 
 #[test]
