@@ -184,12 +184,14 @@ fn all_samples_are_on_disk_and_replay() {
         .iter()
         .filter(|row| measured(row.phase))
         .count();
-    let fits = session
+    let mut fits = session
         .entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Fit);
     assert!(fits.clone().count().abs_diff(samples / 10_000) <= 1);
-    let last = fits.last().unwrap().body["parameters"].as_array().unwrap();
+    let last = fits.next_back().unwrap().body["parameters"]
+        .as_array()
+        .unwrap();
     let found = last.iter().find(|one| one["name"] == "tau_eps").unwrap();
     let found = found["value"].as_f64().unwrap();
     assert!((found / tau - 1.0).abs() < 3e-3, "{found} {tau}");
