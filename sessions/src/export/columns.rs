@@ -45,6 +45,9 @@ pub struct ColumnInfo {
     pub how: &'static str,
 }
 
+/// The column of times.
+pub(super) const TIME_COLUMN: &str = "t_s";
+
 /// Columns of every table, in order.
 const USUAL: [Field; 8] = [
     Field::Time,
@@ -101,7 +104,7 @@ impl Field {
                 "counted",
             ),
             Self::Time => (
-                "t_s",
+                TIME_COLUMN,
                 "s",
                 "number",
                 "time since the session's first sample; negative after a restart of the controller",

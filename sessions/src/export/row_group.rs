@@ -1,5 +1,6 @@
 //! A row group of a Parquet file, encoded and compressed apart from the file, so that several threads can each make one.
 
+use super::columns::TIME_COLUMN;
 use polars::prelude::{CompatLevel, DataFrame, PolarsError, PolarsResult};
 use polars_arrow::datatypes::ArrowSchema;
 use polars_parquet::write::{
@@ -24,9 +25,14 @@ pub(super) struct RowGroup {
 impl Recipe {
     /// Of a file with this schema.
     pub fn new<W: Write>(schema: &ArrowSchema, file: &FileWriter<W>) -> Self {
-        let encodings = schema
-            .iter_values()
-            .map(|one| get_dtype_encoding(&one.dtype));
+        let encodings = schema.iter_values().map(|one| {
+            // No two samples are of the same time, so nobody need look for values that come again.
+            if one.name == TIME_COLUMN {
+                vec![Encoding::Plain]
+            } else {
+                get_dtype_encoding(&one.dtype)
+            }
+        });
         Self {
             types: file.parquet_schema().fields().to_vec(),
             encodings: encodings.collect(),
