@@ -248,6 +248,7 @@ impl ActiveRun {
             reason: outcome.reason.clone(),
             samples: self.board.samples(),
             entries: self.order,
+            raw_bytes: 0,
             ended_at: self.board.now(),
             time_use: self
                 .time_use

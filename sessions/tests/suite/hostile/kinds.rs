@@ -19,7 +19,7 @@ use palpate_sessions::lake;
 use palpate_sessions::shelf::{self, Document};
 use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
-    Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
+    Beside, Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -390,6 +390,7 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         rows,
         end: Some(end(Nanos(5_000_000_000))),
         notes: vec!["a note".into()],
+        beside: Beside::default(),
     };
     let outline = Outline {
         path: session.path.clone(),
@@ -398,6 +399,7 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         entries: session.entries.clone(),
         end: session.end.clone(),
         notes: session.notes.clone(),
+        beside: Beside::default(),
     };
     lake::add(folder, &outline, lake::Told::default(), &mut |visit| {
         session.rows.iter().for_each(visit);
