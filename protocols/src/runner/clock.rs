@@ -4,8 +4,9 @@
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How fast simulated time runs against the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,6 +58,7 @@ pub(super) struct Pacer {
     scale: TimeScale,
     wall_anchor: Instant,
     time_anchor: Nanos,
+    lateness: Duration,
 }
 
 impl Pacer {
@@ -65,6 +67,7 @@ impl Pacer {
             scale,
             wall_anchor: Instant::now(),
             time_anchor: now,
+            lateness: Duration::ZERO,
         }
     }
 
@@ -78,17 +81,24 @@ impl Pacer {
             };
         };
         let due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
-        let elapsed = self.wall_anchor.elapsed();
-        let left = due.saturating_sub(elapsed);
-        // A suspended computer or a debugger leaves virtual time behind: do not race to catch up.
-        if elapsed > due + Duration::from_millis(250) {
-            *self = Self::new(self.scale, at);
-        }
-        match requests.recv_timeout(left) {
+        let left = due.saturating_sub(self.wall_anchor.elapsed());
+        let wake = match requests.recv_timeout(left) {
             Ok(request) => Wake::Request(request, self.now().min(at)),
             Err(RecvTimeoutError::Timeout) => Wake::Time,
             Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
+        };
+        let lateness = self.wall_anchor.elapsed().saturating_sub(due);
+        // A suspended computer or a debugger leaves virtual time behind: do not race to catch up.
+        if lateness > Duration::from_millis(250) {
+            *self = Self::new(self.scale, at);
         }
+        self.lateness = lateness;
+        wake
+    }
+
+    /// How much later than asked the last wait was over, what happened before it included.
+    pub fn lateness(&self) -> Duration {
+        self.lateness
     }
 
     /// Session time that corresponds to the wall now.
@@ -125,10 +135,42 @@ impl Throttle {
     }
 }
 
+/// The computer's clocks at one moment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HostTimes {
+    pub wall: SystemTime,
+    /// Since some moment, without the time in which the computer was suspended; nobody can set it.
+    pub awake: Duration,
+    /// Since the same moment, that time included.
+    pub all: Duration,
+}
+
+/// Reads the computer's clocks.
+pub(super) type HostClock = Arc<dyn Fn() -> HostTimes + Send + Sync>;
+
+/// The real ones (clock_gettime(2)). Where the system has no clock that goes on in suspense, none is seen.
+pub(super) fn host_times() -> HostTimes {
+    use rustix::time::{ClockId, clock_gettime};
+    let read = |id| {
+        let time = clock_gettime(id);
+        let secs = u64::try_from(time.tv_sec).unwrap_or(0);
+        Duration::new(secs, u32::try_from(time.tv_nsec).unwrap_or(0))
+    };
+    #[cfg(target_os = "linux")]
+    let all = ClockId::Boottime;
+    #[cfg(not(target_os = "linux"))]
+    let all = ClockId::Monotonic;
+    HostTimes {
+        wall: SystemTime::now(),
+        awake: read(ClockId::Monotonic),
+        all: read(all),
+    }
+}
+
 /// The wall clock, to date what is recorded.
 #[must_use]
-pub fn wall_now() -> std::time::SystemTime {
-    std::time::SystemTime::now()
+pub fn wall_now() -> SystemTime {
+    SystemTime::now()
 }
 
 /// Measures how long something took; decides nothing.

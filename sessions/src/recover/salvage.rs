@@ -121,7 +121,7 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         });
     }
     if let Some(end) = &end
-        && !(later && !path.is_dir())
+        && (!later || path.is_dir())
     {
         lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
     }

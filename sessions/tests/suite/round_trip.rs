@@ -237,7 +237,7 @@ fn raw_bytes_and_health_come_back_at_either_pace() {
 /// A disk that hangs cannot make raw bytes fill the memory.
 #[test]
 fn raw_bytes_count_in_the_bounded_queue() {
-    let (go, gate) = std::sync::mpsc::channel::<()>();
+    let (go, gate) = std::sync::mpsc::sync_channel::<()>(1);
     struct Stuck(Option<std::sync::mpsc::Receiver<()>>, usize);
     impl palpate_sessions::Sink for Stuck {
         fn append(&mut self, _: &[u8]) -> std::io::Result<()> {
