@@ -6,7 +6,10 @@
 use crate::record::EntryKind;
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
+    OneofDescriptorProto,
+};
 use std::collections::BTreeMap;
 
 /// A channel of a session log.
@@ -162,6 +165,31 @@ impl Channel {
     }
 }
 
+/// Topic of an export of one message per sample.
+pub(crate) const SAMPLE_TOPIC: &str = "/sample";
+
+/// Descriptor of its messages, where what is unknown is told apart from 0.
+pub(crate) fn sample_schema() -> Vec<u8> {
+    let always = ["t_s", "phase", "cycle", "sample"];
+    descriptor_set_with("Sample", SAMPLE_FIELDS, |name| !always.contains(&name))
+}
+
+/// Units of its fields.
+pub(crate) fn sample_metadata() -> BTreeMap<String, String> {
+    let units = [
+        ("t_s", "s since the first sample"),
+        ("depth_mm", "mm"),
+        ("force_N", "N"),
+        ("signal_V", "V"),
+        ("counts", "1"),
+        ("pulses", "1"),
+        ("cycle", "1"),
+        ("sample", "1"),
+    ];
+    let pairs = units.map(|(field, unit)| (format!("unit.{field}"), unit.to_owned()));
+    pairs.into()
+}
+
 type Field = (&'static str, i32, Label, Type);
 
 const DAQ_FIELDS: &[Field] = &[
@@ -200,9 +228,38 @@ const RAW_FIELDS: &[Field] = &[
     ("data", 6, Label::Optional, Type::Bytes),
 ];
 
+const SAMPLE_FIELDS: &[Field] = &[
+    ("t_s", 1, Label::Optional, Type::Double),
+    ("depth_mm", 2, Label::Optional, Type::Double),
+    ("force_N", 3, Label::Optional, Type::Double),
+    ("signal_V", 4, Label::Optional, Type::Double),
+    ("counts", 5, Label::Optional, Type::Sint32),
+    ("pulses", 6, Label::Optional, Type::Sint64),
+    ("phase", 7, Label::Optional, Type::String),
+    ("cycle", 8, Label::Optional, Type::Uint32),
+    ("sample", 9, Label::Optional, Type::Uint64),
+];
+
 fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
+    descriptor_set_with(message, fields, |_| false)
+}
+
+/// A field that may be absent is in a `oneof` of its own, as the language's `optional` is described.
+fn descriptor_set_with(
+    message: &str,
+    fields: &[Field],
+    may_be_absent: impl Fn(&str) -> bool,
+) -> Vec<u8> {
+    let absent: Vec<&str> = fields
+        .iter()
+        .map(|(name, ..)| *name)
+        .filter(|name| may_be_absent(name))
+        .collect();
+    let oneof_of = |name: &str| absent.iter().position(|one| *one == name);
     let field = |&(name, number, label, kind): &Field| FieldDescriptorProto {
         name: Some(name.into()),
+        oneof_index: oneof_of(name).map(|index| index as i32),
+        proto3_optional: oneof_of(name).map(|_| true),
         number: Some(number),
         label: Some(label.into()),
         r#type: Some(kind.into()),
@@ -216,6 +273,13 @@ fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
         message_type: vec![DescriptorProto {
             name: Some(message.into()),
             field: fields.iter().map(field).collect(),
+            oneof_decl: absent
+                .iter()
+                .map(|name| OneofDescriptorProto {
+                    name: Some(format!("_{name}")),
+                    ..Default::default()
+                })
+                .collect(),
             ..Default::default()
         }],
         ..Default::default()

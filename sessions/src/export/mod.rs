@@ -5,6 +5,7 @@ mod columns;
 mod dictionary;
 mod encode;
 mod harmless;
+mod messages;
 mod select;
 
 pub use atomic::Kept;

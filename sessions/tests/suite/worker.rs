@@ -2,7 +2,7 @@
 //! two do something at the same time.
 
 use crate::support::{end, entries, manifest, raw_of, rows};
-use crate::{hostile, limits};
+use crate::{foreign_damage, hostile, limits};
 use chrono::DateTime;
 use palpate_model::Nanos;
 use palpate_sessions::journal::Journal;
@@ -79,6 +79,7 @@ fn does_its_task() {
         "little" => limits::record_in_little_memory(&folder, number),
         "catalog" => limits::update_catalog(&folder),
         "hold" => hold(&folder),
+        "workbook" => foreign_damage::read_workbook(&folder),
         "damage" => hostile::damage(&folder, name.unwrap(), number),
         "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
         "greed" => hostile::be_greedy(number),

@@ -154,12 +154,8 @@ pub(super) fn with_settings(
             "softening" if args.softening == usual.softening => {
                 args.softening = value.parse().map_err(|err| wrong(&err))?;
             }
-            "preconditioning" | "softening" => {}
-            _ => {
-                return Err(Failure::usage(format!(
-                    "[simulated] has no setting '{name}'; it has preconditioning and softening"
-                )));
-            }
+            // The command line says something else; and what there is not was told when the file was read.
+            _ => {}
         }
     }
     Ok(args)
