@@ -33,8 +33,9 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
     let mut left = UNPACKED_MAX;
     for index in 0..archive.len() {
         let file = archive.by_index(index).map_err(|err| damaged(&err))?;
-        let is_xml = file.name().ends_with(".xml") || file.name().ends_with(".rels");
-        let is_kept = is_xml && !file.name().starts_with(SHEETS);
+        let name = file.name().map_err(|err| damaged(&err))?.into_owned();
+        let is_xml = name.ends_with(".xml") || name.ends_with(".rels");
+        let is_kept = is_xml && !name.starts_with(SHEETS);
         let mut most = if is_kept { left.min(KEPT_MAX) } else { left };
         let mut file = file.take(most + 1);
         let mut content = Vec::new();
