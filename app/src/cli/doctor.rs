@@ -47,7 +47,10 @@ struct Recovered {
     recovered: PathBuf,
     session_id: String,
     samples: u64,
+    raw_bytes: u64,
     missing: Missing,
+    #[serde(skip)]
+    sentences: Vec<String>,
 }
 
 /// A session that was not recovered.
@@ -191,7 +194,7 @@ pub(super) fn run_recover(args: &RecoverArgs, output: &Output) -> Result<(), Fai
     for (path, outcome) in paths.iter().zip(each(&paths, output, one)) {
         match outcome {
             Ok(one) => {
-                lines.push(recovered_text(&one));
+                lines.extend(one.sentences.iter().cloned());
                 recoveries.sessions.push(one);
             }
             // With one session there is nothing to go on with, and the error is the answer.
@@ -238,24 +241,14 @@ fn one(path: &Path) -> Result<Recovered, Failure> {
         _ => Failure::failed(err),
     })?;
     Ok(Recovered {
+        sentences: recovery.sentences(path),
         session: path.into(),
         recovered: recovery.folder,
         session_id: recovery.session_id,
         samples: recovery.salvage.samples,
+        raw_bytes: recovery.salvage.raw_bytes,
         missing: recovery.salvage.missing,
     })
-}
-
-fn recovered_text(one: &Recovered) -> String {
-    let mut lines = vec![format!(
-        "{}: {} samples kept in {}",
-        one.session.display(),
-        one.samples,
-        one.recovered.display()
-    )];
-    let missing = one.missing.sentences();
-    lines.extend(missing.iter().map(|sentence| format!("  {sentence}")));
-    lines.join("\n")
 }
 
 /// Recovers what a crash left unfinished in a library, and says so; what fails is only told.

@@ -75,8 +75,12 @@ impl Recovery {
     /// What was kept of the session at `from` and, after it, what is missing.
     #[must_use]
     pub fn sentences(&self, from: &Path) -> Vec<String> {
+        let raw = match self.salvage.raw_bytes {
+            0 => String::new(),
+            count => format!(" and {count} raw bytes"),
+        };
         let kept = format!(
-            "{}: {} samples kept in {}",
+            "{}: {} samples{raw} kept in {}",
             from.display(),
             self.salvage.samples,
             self.folder.display()

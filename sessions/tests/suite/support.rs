@@ -4,7 +4,7 @@ use chrono::{TimeZone, Utc};
 use palpate_model::rig::{AdcDescription, Limits, Phase, RawBytes, RigDescription, SignalFacts};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, Part, RECORD_VERSION,
+    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, Part, Parts, RECORD_VERSION,
     ReadError, Row, Session, Sink,
 };
 use std::io;
@@ -264,6 +264,20 @@ impl Sink for MemorySink {
 
 /// A log as bytes: batches of 100 rows, entries with the batch they follow.
 pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+    log_bytes_with(rows, entries, end, |_| Vec::new())
+}
+
+/// The same with raw bytes for each row.
+pub fn wired_log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+    log_bytes_with(rows, entries, end, raw_of)
+}
+
+fn log_bytes_with(
+    rows: &[Row],
+    entries: &[Entry],
+    end: Option<EndRecord>,
+    raw_of: impl Fn(&[Row]) -> Vec<RawBytes>,
+) -> Vec<u8> {
     let sink = MemorySink::default();
     let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
     let mut entries = entries.iter().peekable();
@@ -272,7 +286,13 @@ pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec
         while let Some(entry) = entries.next_if(|entry| entry.after_sample < (i as u64 + 1) * 100) {
             due.push(entry.clone());
         }
-        log.append(batch, &due).unwrap();
+        let parts = Parts {
+            rows: batch,
+            entries: &due,
+            raw: &raw_of(batch),
+            health: &[],
+        };
+        log.append_parts(&parts).unwrap();
     }
     if let Some(end) = end {
         log.finish(end).unwrap();
