@@ -1,4 +1,4 @@
-//! A rig as if on wires: it tells the bytes it exchanges, and its time is the wall's.
+//! A rig as if on wires: it tells the bytes it exchanges.
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
@@ -80,7 +80,7 @@ impl<R: Rig> Rig for WiredRig<R> {
     }
 
     fn is_virtual(&self) -> bool {
-        false
+        self.inner.is_virtual()
     }
 
     fn by_hand(&mut self, action: HandAction) {
