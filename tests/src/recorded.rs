@@ -5,7 +5,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::{Plan, RampHold};
 use palpate_protocols::runner::{
-    AfterStop, Answers, Labels, Request, RunRequest, Runner, TimeScale,
+    AfterStop, Answers, Labels, Request, RunRequest, Runner, StartError, TimeScale,
 };
 use palpate_sessions::Session;
 use std::path::Path;
@@ -27,9 +27,24 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
 /// If the run is not started or says nothing for a minute.
 #[must_use]
 pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
+    of_any_plan(rig, calibration, plan).expect("a start")
+}
+
+/// The same for a plan that may be refused.
+///
+/// # Errors
+/// Why it is refused.
+///
+/// # Panics
+/// If the run says nothing for a minute.
+pub fn of_any_plan(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    plan: Plan,
+) -> Result<Session, StartError> {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    let (runner, woken) = start(rig, calibration, plan, TimeScale::Max, &out);
+    let (runner, woken) = ask(rig, calibration, plan, TimeScale::Max, &out)?;
     let has_ended = |runner: &Runner| {
         let snapshot = runner.snapshot();
         let run = snapshot.run.as_ref();
@@ -41,7 +56,7 @@ pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Sessi
             .expect("the run does not end");
     }
     drop(runner);
-    Session::open(&out).expect("the session")
+    Ok(Session::open(&out).expect("the session"))
 }
 
 /// A run that has started, and what says that there is something new of it.
@@ -56,6 +71,16 @@ pub fn start(
     scale: TimeScale,
     out: &Path,
 ) -> (Runner, Receiver<()>) {
+    ask(rig, calibration, plan, scale, out).expect("a start")
+}
+
+fn ask(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    plan: Plan,
+    scale: TimeScale,
+    out: &Path,
+) -> Result<(Runner, Receiver<()>), StartError> {
     let request = RunRequest {
         plan,
         calibration,
@@ -74,7 +99,6 @@ pub fn start(
         let _ = wake.try_send(());
     })
     .expect("a runner");
-    let started = answer.recv().expect("an answer");
-    started.expect("a start");
-    (runner, woken)
+    answer.recv().expect("an answer")?;
+    Ok((runner, woken))
 }

@@ -15,6 +15,7 @@ use palpate_protocols::plans::{
     OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step, Weigh,
 };
 use palpate_protocols::replay::replay;
+use palpate_protocols::runner::StartError;
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
 use std::collections::VecDeque;
@@ -453,11 +454,12 @@ fn whatever_happens_the_axis_stops_with_a_reason() {
 }
 
 /// Runs through the runner and the disk: about ten seconds.
-const SESSIONS: u64 = 40;
+const SESSIONS: u64 = 12;
 
 #[test]
 fn whatever_happens_the_session_is_closed_with_its_reason() {
-    for seed in 0..SESSIONS {
+    let mut left = SESSIONS;
+    for seed in 0.. {
         // Other seeds than those of the runs in memory.
         let mut random = SplitMix::seeded(1 << 40 | seed);
         let sim = SimRig::new(SimSettings {
@@ -469,12 +471,24 @@ fn whatever_happens_the_session_is_closed_with_its_reason() {
         let fault = (random.below(2) == 0).then(|| any_fault(&mut random));
         let about = format!("seed {seed}, {fault:?}, {:?}", plan.steps);
         let rig = FaultyRig::new(sim, fault.into_iter().collect(), seed);
-        let session = recorded::of_plan(Box::new(rig), calibration, plan);
+        let session = match recorded::of_any_plan(Box::new(rig), calibration, plan) {
+            Ok(session) => session,
+            // Some plans ask for more than the rig can do, and say so.
+            Err(StartError::Refused(reason)) => {
+                assert!(!reason.is_empty(), "{about}");
+                continue;
+            }
+            Err(err) => panic!("{err}: {about}"),
+        };
         let end = session.end.as_ref().unwrap_or_else(|| panic!("{about}"));
         assert!(!end.reason.is_empty(), "{about}");
         assert_eq!(end.samples, session.rows.len() as u64, "{about}");
         // And decides the same again.
         let again = replay(&session, &[]).unwrap();
         assert_eq!(again.first_difference, None, "{about}");
+        left -= 1;
+        if left == 0 {
+            break;
+        }
     }
 }
