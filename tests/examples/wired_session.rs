@@ -39,7 +39,7 @@ fn record(out: &Path) -> Result<(), Box<dyn Error>> {
     let rig = SimRig::new(SimSettings::default());
     let calibration = rig.calibration();
     let plan = RampHold {
-        speed: MmPerS(5.0),
+        speed: MmPerS(4.5),
         depth: Depth(5.0),
         hold: Seconds(1.0),
         ..RampHold::default()
