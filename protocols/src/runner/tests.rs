@@ -1,4 +1,4 @@
-//! The runner with clocks that jump, a computer that stands still and a live fit that panics.
+//! The runner with clocks that jump and a live fit that panics.
 
 use super::clock::{HostTimes, TimeScale, host_times};
 use super::live_feed::{Estimator, LiveFeed};
@@ -9,7 +9,6 @@ use crate::plans::RampHold;
 use crate::replay::replay;
 use arc_swap::ArcSwap;
 use palpate_drivers::Rig;
-use palpate_drivers::doubles::WiredRig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
 use palpate_model::fit::LiveEstimate;
@@ -170,109 +169,6 @@ fn a_computer_that_was_suspended_ends_the_run() {
     );
     assert_eq!(session.beside.health.clock_jumps, 1);
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
-}
-
-/// A rig one of whose reports makes the computer stand still.
-struct Standing {
-    rig: SimRig,
-    is_virtual: bool,
-    at: Nanos,
-    pause: Option<Duration>,
-}
-
-impl Rig for Standing {
-    fn description(&self) -> &palpate_model::rig::RigDescription {
-        self.rig.description()
-    }
-
-    fn send(&mut self, command: palpate_model::rig::RigCommand) {
-        self.rig.send(command);
-    }
-
-    fn next_event(&mut self, until: Nanos) -> Option<palpate_drivers::RigEvent> {
-        if until > self.at
-            && let Some(pause) = self.pause.take()
-        {
-            std::thread::sleep(pause);
-        }
-        self.rig.next_event(until)
-    }
-
-    fn is_virtual(&self) -> bool {
-        self.is_virtual
-    }
-}
-
-#[test]
-fn a_computer_that_stands_still_before_a_rig_on_wires_ends_the_run() {
-    // The time of a simulated rig waits.
-    for (is_virtual, ending) in [(false, "abort"), (true, "finish")] {
-        let folder = tempfile::tempdir().unwrap();
-        let out = folder.path().join("session");
-        let rig = Standing {
-            rig: sim(),
-            is_virtual,
-            at: Nanos::from_millis(20_000),
-            pause: Some(Duration::from_millis(700)),
-        };
-        let scale = TimeScale::Factor(40.0);
-        run(started(Box::new(rig), scale, Box::new(host_times), &out));
-        let session = Session::open(&out).unwrap();
-        let end = session.end.as_ref().unwrap();
-        assert_eq!(end.outcome, ending, "{}", end.reason);
-        assert_eq!(
-            end.reason.contains("stood still"),
-            !is_virtual,
-            "{}",
-            end.reason
-        );
-        let worst = session.beside.health.worst.unwrap();
-        assert!(worst.lateness_s >= 0.5, "{worst:?}");
-        assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
-    }
-}
-
-#[test]
-fn bytes_of_a_rig_on_wires_are_in_its_session() {
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path().join("session");
-    let rig = Box::new(WiredRig::new(sim()));
-    run(started(
-        rig,
-        TimeScale::Factor(40.0),
-        Box::new(host_times),
-        &out,
-    ));
-    let session = Session::open(&out).unwrap();
-    let end = session.end.as_ref().unwrap();
-    assert_eq!(end.outcome, "finish", "{}", end.reason);
-    let (mut cell, mut sent, mut bytes) = (Vec::new(), String::new(), 0);
-    Session::scan_parts(&out, &mut |part| {
-        let Part::Raw(block) = part else { return };
-        bytes += block.len() as u64;
-        for piece in block.pieces() {
-            let text = String::from_utf8(piece.bytes.to_vec()).unwrap();
-            match (block.device(), piece.is_sent) {
-                ("cell", false) => cell.push((piece.at, text)),
-                ("controller", true) => sent.push_str(&text),
-                ("controller", false) => assert!(text.starts_with("Ack"), "{text}"),
-                other => panic!("{other:?}"),
-            }
-        }
-    })
-    .unwrap();
-    // Every reading is there as it was told, at its time.
-    let told: Vec<(Nanos, String)> = session
-        .rows
-        .iter()
-        .map(|row| {
-            let (counts, pulses) = (row.counts.unwrap_or_default(), row.pulses.unwrap());
-            (row.host, format!("{} {counts} {pulses}\r\n", row.tick))
-        })
-        .collect();
-    assert!(cell == told, "{} readings, {} told", told.len(), cell.len());
-    assert!(sent.starts_with("EnableMotor\r"), "{sent}");
-    assert_eq!(session.beside.raw_bytes, bytes);
 }
 
 struct Panicking(u32);
