@@ -363,7 +363,7 @@ name = "stomach"
         "line 26: a task needs 'protocol'; write protocol = \"ramp-hold\"",
         "line 27: there is a task 'three' already",
         "line 28: depth cannot be a table in braces; give a text in quotes",
-        "line 33: [simulated] has no setting 'stifness'; it has preconditioning and softening",
+        "line 33: [simulated] has no setting 'stifness'; it has preconditioning, rate and softening",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }

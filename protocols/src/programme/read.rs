@@ -34,7 +34,7 @@ const KEYS: [&str; 10] = [
 ];
 
 /// Settings of a simulated rig that a programme may say.
-const SIMULATED: [&str; 2] = ["preconditioning", "softening"];
+const SIMULATED: [&str; 3] = ["preconditioning", "rate", "softening"];
 
 /// How many of [`KEYS`] a programme cannot do without, and how each is written.
 const NEEDED: [&str; 4] = [
@@ -132,8 +132,10 @@ impl Reader {
         if let Some(Value::Table(table)) = root.get("simulated").map(|node| &node.value) {
             for Entry { key, line, .. } in &table.entries {
                 if !SIMULATED.contains(&key.as_str()) {
-                    let known = SIMULATED.join(" and ");
-                    let message = format!("[simulated] has no setting '{key}'; it has {known}");
+                    let [first, second, third] = SIMULATED;
+                    let message = format!(
+                        "[simulated] has no setting '{key}'; it has {first}, {second} and {third}"
+                    );
                     self.problems.error(*line, message);
                 }
             }

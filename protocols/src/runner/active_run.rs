@@ -3,7 +3,7 @@
 use super::board::{Board, LogState};
 use super::clock::wall_now;
 use super::live_feed::LiveFeed;
-use super::snapshot::RunView;
+use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
 use super::watch::HostWatch;
 use crate::engine::{self, Config, Effect, Input, Operator, Outcome, PauseView, State};
@@ -37,6 +37,9 @@ pub(super) struct ActiveRun {
     after_stop: AfterStop,
     answers: Answers,
     paused_since: Option<Nanos>,
+    lateness: Option<Lateness>,
+    /// What was told of time given up.
+    told_given_up: Seconds,
     order: u64,
     pub(super) live: LiveFeed,
     /// `None` at full pace, where the computer cannot be late.
@@ -75,6 +78,8 @@ impl ActiveRun {
             after_stop,
             answers,
             paused_since: None,
+            lateness: None,
+            told_given_up: Seconds(0.0),
             order: 0,
             live,
             watch,
@@ -102,6 +107,20 @@ impl ActiveRun {
     /// Session time of a time on the rig's clock.
     pub fn session_time(&self, at: Nanos) -> Nanos {
         at.since(self.origin)
+    }
+
+    /// Takes how the run keeps pace with the wall. Time given up is told each time it has doubled.
+    pub fn keep_lateness(&mut self, lateness: Option<Lateness>) {
+        self.lateness = lateness;
+        let given_up = lateness.unwrap_or_default().given_up;
+        if given_up.0 > 0.0 && given_up.0 >= 2.0 * self.told_given_up.0 {
+            self.told_given_up = given_up;
+            let text = format!(
+                "the computer does not keep up: the run is {:.1} s behind the clock and goes on from there; close other programs",
+                given_up.0
+            );
+            self.board.note(text, true);
+        }
     }
 
     /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
@@ -348,6 +367,7 @@ impl ActiveRun {
         let writer = self.writer.as_ref();
         let log = LogState {
             saved_through: writer.map_or(self.board.now(), SessionWriter::saved_through),
+            lateness: self.lateness,
             verdict: self.verdict.clone(),
             error: self.log_error.clone(),
         };

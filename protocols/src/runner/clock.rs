@@ -1,6 +1,7 @@
 //! The only place that reads a clock: pacing of virtual time against the wall.
 #![expect(clippy::disallowed_methods, reason = "this file is the clock")]
 
+use super::snapshot::Lateness;
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;
@@ -53,12 +54,18 @@ pub(super) enum Wake<T> {
     Disconnected,
 }
 
+/// Session time this far behind the wall is not caught up: after a computer was suspended, or a debugger had stopped it,
+/// nothing should race.
+const BEHIND_MAX: Duration = Duration::from_millis(250);
+
 /// Maps session time to wall time and sleeps the difference.
 pub(super) struct Pacer {
     scale: TimeScale,
     wall_anchor: Instant,
     time_anchor: Nanos,
-    lateness: Duration,
+    lateness: Lateness,
+    /// How late the last wait was over.
+    behind: Duration,
 }
 
 impl Pacer {
@@ -67,7 +74,8 @@ impl Pacer {
             scale,
             wall_anchor: Instant::now(),
             time_anchor: now,
-            lateness: Duration::ZERO,
+            lateness: Lateness::default(),
+            behind: Duration::ZERO,
         }
     }
 
@@ -87,18 +95,24 @@ impl Pacer {
             Err(RecvTimeoutError::Timeout) => Wake::Time,
             Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
         };
-        let lateness = self.wall_anchor.elapsed().saturating_sub(due);
-        // A suspended computer or a debugger leaves virtual time behind: do not race to catch up.
-        if lateness > Duration::from_millis(250) {
-            *self = Self::new(self.scale, at);
+        self.behind = self.wall_anchor.elapsed().saturating_sub(due);
+        let behind_s = self.behind.as_secs_f64();
+        self.lateness.worst.0 = self.lateness.worst.0.max(behind_s);
+        if self.behind > BEHIND_MAX {
+            self.lateness.given_up.0 += behind_s;
+            (self.wall_anchor, self.time_anchor) = (Instant::now(), at);
         }
-        self.lateness = lateness;
         wake
     }
 
-    /// How much later than asked the last wait was over, what happened before it included.
-    pub fn lateness(&self) -> Duration {
-        self.lateness
+    /// How much later than asked the last wait was over, what happened before it included. Each delay is told once.
+    pub fn behind(&self) -> Duration {
+        self.behind
+    }
+
+    /// How far session time was behind the wall; `None` at full pace.
+    pub fn lateness(&self) -> Option<Lateness> {
+        (self.scale != TimeScale::Max).then_some(self.lateness)
     }
 
     /// Session time that corresponds to the wall now.

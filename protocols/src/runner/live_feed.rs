@@ -8,8 +8,8 @@ use palpate_model::units::{Depth, Newtons, Seconds};
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
-/// Samples between two answers of the live fit: half a second at 1 kHz.
-pub(crate) const LIVE_FIT_EVERY: u64 = 500;
+/// Milliseconds between two answers of the live fit.
+const LIVE_FIT_MS: u64 = 500;
 
 /// What is fed: the live fit, or a test's stand-in.
 pub(super) trait Estimator: Send {
@@ -42,6 +42,8 @@ pub(crate) struct LiveFeed {
     first_tick: Option<u64>,
     tick_secs: f64,
     samples: u64,
+    /// Samples between two answers.
+    every: u64,
     deepest: Depth,
     cycle: u32,
 }
@@ -61,10 +63,11 @@ impl LiveFeed {
             first_tick: None,
             tick_secs: config.rig.tick().0,
             samples: 0,
+            every: LIVE_FIT_MS * u64::from(config.rig.samples_per_ms()),
         }
     }
 
-    /// Takes a sample after the engine did; every [`LIVE_FIT_EVERY`] samples there is an answer.
+    /// Takes a sample after the engine did; every half second there is an answer.
     pub fn push(&mut self, reading: &Reading, state: &State) -> Option<LiveEstimate> {
         let derived = state.derived();
         if !matches!(state.phase(), Phase::Ramp | Phase::Hold) {
@@ -81,7 +84,7 @@ impl LiveFeed {
         let first_tick = *self.first_tick.get_or_insert(reading.tick);
         let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
         self.samples += 1;
-        let is_due = self.samples.is_multiple_of(LIVE_FIT_EVERY);
+        let is_due = self.samples.is_multiple_of(self.every);
         let fit = self.fit.as_mut()?;
         let fed = catch_unwind(AssertUnwindSafe(|| {
             fit.push(t, depth, force, sigma);

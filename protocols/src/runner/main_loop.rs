@@ -166,7 +166,10 @@ impl MainLoop {
             let was_running = self.is_running();
             let target = self.now + self.stride();
             let wake_up = pacer.wait(target, requests);
-            self.watch(pacer.lateness());
+            if let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) {
+                run.keep_lateness(pacer.lateness());
+            }
+            self.watch(pacer.behind());
             let is_ending = match wake_up {
                 Wake::Time => {
                     self.advance(target);

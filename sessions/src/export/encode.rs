@@ -39,7 +39,7 @@ pub(crate) type Metadata = Vec<(String, String)>;
 
 pub(crate) enum Encoder<W: Write> {
     Csv(csv::write::BatchedWriter<W>),
-    Parquet(ParquetFile<W>, Metadata),
+    Parquet(Box<ParquetFile<W>>, Metadata),
     Arrow(FileWriter<W>),
 }
 
@@ -57,7 +57,7 @@ impl<W: Write> Encoder<W> {
                 let empty = harmless_frame(empty.clone())?;
                 Self::Csv(writer.batched(empty.schema())?)
             }
-            Format::Parquet => Self::Parquet(ParquetFile::new(file, empty)?, metadata),
+            Format::Parquet => Self::Parquet(Box::new(ParquetFile::new(file, empty)?), metadata),
             Format::Arrow => {
                 let schema = empty.schema().to_arrow(CompatLevel::oldest());
                 let options = WriteOptions { compression: None };

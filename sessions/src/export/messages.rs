@@ -1,7 +1,6 @@
 //! A session's samples as an MCAP file of one message each, for programs that draw messages, such as Foxglove and
 //! PlotJuggler. It is no session: its samples are all there, and nothing of what was decided.
 
-use super::columns::Numbered;
 use super::{ExportError, Feed, Table, atomic};
 use crate::record::Row;
 use crate::schema::{SAMPLE_TOPIC, sample_metadata, sample_schema};
@@ -42,7 +41,7 @@ impl Table<'_> {
     pub fn write_messages(&self, path: &Path, feed: Feed) -> Result<u64, ExportError> {
         atomic::write(path, |file| {
             let mut writing = Writing::begin(self, file).map_err(failed(path))?;
-            feed(&mut |row| writing.take(row))?;
+            feed(&mut |rows| rows.iter().for_each(|row| writing.take(row)))?;
             writing.finish().map_err(failed(path))
         })
     }
@@ -116,20 +115,20 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
         let first_tick = *self.first_tick.get_or_insert(row.tick);
         // As in a table: a controller that restarted counts from zero again.
         let ticks = row.tick.wrapping_sub(first_tick) as i64;
-        let one = (self.seen, self.table.manifest.time_of(ticks).0, *row);
+        let (number, t_s) = (self.seen, self.table.manifest.time_of(ticks).0);
         self.seen += 1;
-        if self.failure.is_some() || !self.table.selection.takes(&one) {
+        if self.failure.is_some() || !self.table.selection.takes(t_s, row) {
             return;
         }
         if self.selected.is_multiple_of(self.table.selection.step()) {
-            self.failure = self.put(&one).err();
+            self.failure = self.put(number, t_s, row).err();
         }
         self.selected += 1;
     }
 
-    fn put(&mut self, (number, t_s, row): &Numbered) -> mcap::McapResult<()> {
-        let sample = Sample {
-            t_s: *t_s,
+    fn put(&mut self, sample: u64, t_s: f64, row: &Row) -> mcap::McapResult<()> {
+        let message = Sample {
+            t_s,
             depth_mm: row.depth,
             force_n: row.force,
             signal_v: row.volts,
@@ -137,7 +136,7 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
             pulses: row.pulses,
             phase: row.phase.name().into(),
             cycle: row.cycle,
-            sample: *number,
+            sample,
         };
         let time = self.started_ns.saturating_add(row.host.0);
         let header = MessageHeader {
@@ -149,7 +148,7 @@ impl<'a, W: Write + Seek> Writing<'a, W> {
         };
         self.written += 1;
         self.container
-            .write_to_known_channel(&header, &sample.encode_to_vec())
+            .write_to_known_channel(&header, &message.encode_to_vec())
     }
 
     fn finish(mut self) -> mcap::McapResult<u64> {

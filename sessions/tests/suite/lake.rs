@@ -47,7 +47,7 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
         beside: session.beside.clone(),
     };
     add(lake, &outline, told, &mut |visit| {
-        session.rows.iter().for_each(visit);
+        visit(&session.rows);
         Ok(())
     })
 }

@@ -154,6 +154,9 @@ pub(super) fn with_settings(
             "softening" if args.softening == usual.softening => {
                 args.softening = value.parse().map_err(|err| wrong(&err))?;
             }
+            "rate" if args.rate == usual.rate => {
+                args.rate = value.parse().map_err(|err| wrong(&err))?;
+            }
             // The command line says something else; and what there is not was told when the file was read.
             _ => {}
         }
