@@ -7,6 +7,9 @@
 pub mod faults;
 pub mod galil;
 mod plant;
+mod pty;
+pub mod serve;
+mod wire;
 
 pub use faults::{DeviceFault, FaultError, ScheduledFault};
 pub use plant::Plant;
