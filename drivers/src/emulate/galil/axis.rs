@@ -9,8 +9,9 @@ pub const COUNTS_MAX: f64 = 2_147_483_647.0;
 
 /// A pulse counts as given when the filtered place has come this near to it, in counts.
 const NEAR: f64 = 1e-6;
-/// A filter this near to a command at rest has arrived: a tenth of what a pulse is, so that the tail has an end.
-const SETTLED: f64 = 0.1;
+/// A filter this near to a command at rest has arrived and gives its last pulse. How long the tail really lasts is not
+/// documented; so it is some ten samples.
+const SETTLED: f64 = 1e-3;
 
 /// What the axis is about to do or does.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,6 +4,7 @@
 
 use super::axis::{Axis, Motion};
 use super::model::GalilModel;
+use super::settings::Setting;
 
 /// What a record holds beside its axes.
 #[derive(Clone, Copy, Debug, Default)]
@@ -87,7 +88,7 @@ pub fn record(model: GalilModel, general: &General, axes: &[Axis], analog: &[u16
         // Torque stays zero: nothing holds a load.
         put(at + if model.is_21x3() { 26 } else { 28 }, &analog);
         if !model.is_21x3() {
-            let user = axis.settings.get(super::settings::Setting::UserVariable);
+            let user = axis.settings.get(Setting::UserVariable);
             put(at + 32, &counts(user));
         }
     }
@@ -98,12 +99,15 @@ pub fn record(model: GalilModel, general: &General, axes: &[Axis], analog: &[u16
 fn status(axis: &Axis, is_contouring: bool, model: GalilModel) -> u16 {
     let is = |bit: u32, is_set: bool| u16::from(is_set) << bit;
     let velocity = axis.profile.velocity;
-    let speed = axis.settings.get(super::settings::Setting::Speed);
+    let speed = match axis.motion {
+        Motion::Jog(speed) => speed.abs(),
+        _ => axis.settings.get(Setting::Speed),
+    };
     let is_edge =
         |homing: bool| matches!(axis.motion, Motion::Edge { is_homing, .. } if is_homing == homing);
     let is_back = matches!(axis.motion, Motion::Back { .. });
     let is_target = matches!(axis.motion, Motion::Target(_));
-    let is_off_on_error = axis.settings.get(super::settings::Setting::OffOnError) > 0.0;
+    let is_off_on_error = axis.settings.get(Setting::OffOnError) > 0.0;
     is(15, axis.is_running())
         | is(14, is_target)
         | is(13, is_target)
@@ -129,7 +133,6 @@ fn switches(axis: &Axis) -> u8 {
 
 #[cfg(test)]
 mod tests {
-    use super::super::settings::Setting;
     use super::*;
 
     fn u16_at(bytes: &[u8], at: usize) -> u16 {
