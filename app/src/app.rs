@@ -418,6 +418,9 @@ impl eframe::App for WorkbenchApp {
         let rig = &self.snapshot.rig;
         self.form
             .refresh(&rig.description, &self.bench, rig.is_homed);
+        if let Some(run) = &self.snapshot.run {
+            self.meter.run(run);
+        }
         self.plots.update(self.snapshot.run.as_ref());
         self.refitter.update(ctx, self.snapshot.run.as_ref());
         self.act(ctx, &mut commands);

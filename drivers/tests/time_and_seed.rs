@@ -4,7 +4,7 @@
 mod common;
 
 use common::{answer_to, events_with, ideal, move_to, next_reading, settings};
-use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
+use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, RigCommand};
@@ -85,10 +85,19 @@ fn the_specimen_is_the_seed_s_whatever_the_clock_and_profile() {
 
 #[test]
 fn ticks_are_one_apart_and_as_long_as_the_clock_says() {
-    for clock in [SimClock::Nominal, SimClock::Galil] {
-        let mut rig = SimRig::new(settings(SimProfile::Ideal, 25, clock));
+    for (clock, rate, nanos) in [
+        (SimClock::Nominal, "1000", 1_000_000),
+        (SimClock::Galil, "1000", 976_000),
+        (SimClock::Nominal, "16000", 62_500),
+        (SimClock::Galil, "20000", 48_800),
+    ] {
+        let settings = SimSettings {
+            rate: rate.parse().unwrap(),
+            ..settings(SimProfile::Ideal, 25, clock)
+        };
+        let mut rig = SimRig::new(settings);
         let tick_nanos = rig.description().tick_nanos;
-        assert_eq!(tick_nanos, clock.tick_nanos());
+        assert_eq!(tick_nanos, nanos);
         let (first_at, first) = next_reading(&mut rig);
         let mut before = first_at;
         for count in 1..=20_000 {

@@ -7,8 +7,8 @@ use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
-    SimClock, SimCompliance, SimNoise, SimPreconditioning, SimProfile, SimSettings, SimSoftening,
-    SimStiffness, SimThickness,
+    SimClock, SimCompliance, SimNoise, SimPreconditioning, SimProfile, SimRate, SimSettings,
+    SimSoftening, SimStiffness, SimThickness,
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
@@ -32,6 +32,9 @@ pub struct RigArgs {
     /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
     #[arg(long, default_value = "nominal")]
     pub clock: SimClock,
+    /// Simulated rig: samples a second, 1000 to 20000
+    #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
+    pub rate: SimRate,
     /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
@@ -68,6 +71,7 @@ impl Default for RigArgs {
             profile: SimProfile::Lab,
             seed: 1,
             clock: SimClock::Nominal,
+            rate: SimRate::default(),
             softening: SimSoftening::default(),
             noise: SimNoise::default(),
             stiffness: SimStiffness::default(),
@@ -89,6 +93,7 @@ impl RigArgs {
             profile: self.profile,
             seed: self.seed,
             clock: self.clock,
+            rate: self.rate,
             softening: self.softening,
             noise: self.noise,
             stiffness: self.stiffness,

@@ -148,6 +148,8 @@ struct RunReport {
     force_peak_n: Option<f64>,
     verdict: Option<Verdict>,
     verdict_reason: Option<String>,
+    late_worst_s: Option<f64>,
+    late_given_up_s: Option<f64>,
     live: Option<palpate_model::fit::LiveEstimate>,
 }
 
@@ -370,8 +372,15 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         force_peak_n: view.force_peak.map(|force| force.0),
         verdict: view.verdict.as_ref().map(|(verdict, _)| *verdict),
         verdict_reason: view.verdict.as_ref().map(|(_, reason)| reason.clone()),
+        late_worst_s: view.lateness.map(|late| late.worst.0),
+        late_given_up_s: view.lateness.map(|late| late.given_up.0),
         live: view.live.clone(),
     };
+    if let Some(late) = report.late_given_up_s.filter(|late| *late > 0.0) {
+        output.note(&format!(
+            "the computer did not keep up: the run took {late:.1} s longer than its session time"
+        ));
+    }
     output.result(&report, || run_text(&report));
     if let Some(reason) = &view.log_error {
         return Err(Failure::failed(format!(

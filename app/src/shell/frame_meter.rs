@@ -1,5 +1,6 @@
-//! Measures frames and start-up for those who ask with `PALPATE_FRAME_REPORT=path`.
+//! Measures frames, start-up and how a run kept pace for those who ask with `PALPATE_FRAME_REPORT=path`.
 
+use palpate_protocols::runner::RunView;
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -18,6 +19,9 @@ pub struct FrameMeter {
     frame_ms: Times,
     first_frame_cpu_s: Option<f64>,
     first_frame_main_thread_cpu_s: Option<f64>,
+    unsaved_s_max: f64,
+    late_worst_s: Option<f64>,
+    late_given_up_s: Option<f64>,
 }
 
 #[derive(Serialize)]
@@ -38,6 +42,11 @@ struct Report {
     /// CPU time of logic and layout alone.
     ui_cpu_ms_max: f64,
     ui_cpu_ms_median: f64,
+    /// The most of a run's session time that was not in its log at a frame.
+    unsaved_s_max: f64,
+    /// The furthest that the last run was behind the wall, and what it gave up.
+    late_worst_s: Option<f64>,
+    late_given_up_s: Option<f64>,
 }
 
 /// Milliseconds of many frames.
@@ -94,6 +103,17 @@ impl FrameMeter {
         self.frame_started_cpu_s = now;
     }
 
+    /// The run that the frame shows.
+    pub fn run(&mut self, run: &RunView) {
+        if self.report_path.is_none() {
+            return;
+        }
+        let unsaved = run.now.since(run.saved_through).seconds().0;
+        self.unsaved_s_max = self.unsaved_s_max.max(unsaved);
+        self.late_worst_s = run.lateness.map(|late| late.worst.0);
+        self.late_given_up_s = run.lateness.map(|late| late.given_up.0);
+    }
+
     /// The frame's logic and layout are done.
     pub fn end(&mut self) {
         self.frames += 1;
@@ -120,6 +140,9 @@ impl FrameMeter {
             frame_cpu_ms_median: self.frame_cpu_ms.median(),
             ui_cpu_ms_max: self.ui_cpu_ms.max,
             ui_cpu_ms_median: self.ui_cpu_ms.median(),
+            unsaved_s_max: self.unsaved_s_max,
+            late_worst_s: self.late_worst_s,
+            late_given_up_s: self.late_given_up_s,
         };
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::other)?;
         std::fs::write(path, text)

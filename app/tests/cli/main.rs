@@ -13,6 +13,7 @@ mod lake;
 mod plan;
 mod programme;
 mod protocol;
+mod rate;
 mod records;
 mod select;
 mod trade;

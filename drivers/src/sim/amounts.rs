@@ -51,6 +51,50 @@ amount!(
     SimCompliance, "compliance", 0, (0..=1000), "0 to 1000 (whole micrometres per newton)"
 );
 
+/// Samples a second in thousands. A tick of either clock divides by each of them into whole nanoseconds.
+const KILOHERTZ: [u32; 8] = [1, 2, 4, 5, 8, 10, 16, 20];
+
+/// Samples a second that the controller takes, one a tick; usually 1000. Each has the same noise.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SimRate {
+    kilohertz: u32,
+}
+
+impl SimRate {
+    /// Samples where the usual rig takes one.
+    #[must_use]
+    pub const fn per_usual_tick(self) -> u64 {
+        self.kilohertz as u64
+    }
+}
+
+impl Default for SimRate {
+    fn default() -> Self {
+        Self { kilohertz: 1 }
+    }
+}
+
+impl fmt::Display for SimRate {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        (1000 * self.kilohertz).fmt(f)
+    }
+}
+
+impl FromStr for SimRate {
+    type Err = SimSettingError;
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        let rate: Option<u32> = text.parse().ok();
+        let kilohertz = KILOHERTZ.into_iter().find(|one| rate == Some(1000 * one));
+        kilohertz
+            .map(|kilohertz| Self { kilohertz })
+            .ok_or_else(|| {
+                let choices =
+                    "1000, 2000, 4000, 5000, 8000, 10000, 16000 or 20000 (samples a second)";
+                SimSettingError::new("rate", text, choices)
+            })
+    }
+}
+
 impl SimNoise {
     /// The noise in N.
     #[must_use]
@@ -131,6 +175,7 @@ impl FromStr for SimThickness {
 
 #[cfg(test)]
 mod tests {
+    use super::super::settings::SimClock;
     use super::*;
 
     #[test]
@@ -147,6 +192,16 @@ mod tests {
         for wrong in ["", "-1", "1001", "2.5", "nan", "1e9"] {
             assert!(wrong.parse::<SimNoise>().is_err(), "{wrong}");
             assert!(wrong.parse::<SimThickness>().is_err(), "{wrong}");
+        }
+        for kilohertz in KILOHERTZ {
+            let rate: SimRate = format!("{kilohertz}000").parse().unwrap();
+            assert_eq!(rate.to_string(), format!("{kilohertz}000"));
+            for clock in [SimClock::Nominal, SimClock::Galil] {
+                assert_eq!(clock.tick_nanos() % rate.per_usual_tick(), 0);
+            }
+        }
+        for wrong in ["", "0", "1", "500", "3000", "20001", "40000", "1e3"] {
+            assert!(wrong.parse::<SimRate>().is_err(), "{wrong}");
         }
         let err = "5".parse::<SimStiffness>().unwrap_err();
         assert_eq!(

@@ -16,7 +16,7 @@ mod settings;
 mod slider;
 mod tissue;
 
-pub use amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
+pub use amounts::{SimCompliance, SimNoise, SimRate, SimStiffness, SimThickness};
 pub(crate) use bench::Bench;
 pub use load_cell::calibration;
 pub(crate) use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
@@ -265,7 +265,7 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         settings: settings.to_map(),
         mm_per_pulse: MM_PER_PULSE,
         travel: TRAVEL,
-        tick_nanos: settings.clock.tick_nanos(),
+        tick_nanos: settings.tick_nanos(),
         speed_quantum: SPEED_QUANTUM,
         speed_max: SPEED_MAX,
         acceleration: ACCELERATION,

@@ -1,6 +1,6 @@
 //! What makes one simulated rig differ from another; with these values it can be rebuilt.
 
-use super::amounts::{SimCompliance, SimNoise, SimStiffness, SimThickness};
+use super::amounts::{SimCompliance, SimNoise, SimRate, SimStiffness, SimThickness};
 use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -28,7 +28,7 @@ pub enum SimClock {
 }
 
 impl SimClock {
-    /// True length of one tick in nanoseconds.
+    /// True length of one tick in nanoseconds, at the usual rate.
     #[must_use]
     pub const fn tick_nanos(self) -> u64 {
         match self {
@@ -69,6 +69,8 @@ pub struct SimSettings {
     pub seed: u64,
     /// The controller's sample clock.
     pub clock: SimClock,
+    /// Samples a second.
+    pub rate: SimRate,
     /// What the tissue loses by having been deeper.
     pub softening: SimSoftening,
     /// White noise of the ideal load cell.
@@ -106,9 +108,15 @@ impl SimSettingError {
 }
 
 impl SimSettings {
+    /// True length of one tick in nanoseconds.
+    #[must_use]
+    pub fn tick_nanos(&self) -> u64 {
+        self.clock.tick_nanos() / self.rate.per_usual_tick()
+    }
+
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
-    /// are not the usual ones, `softening` and `preconditioning` (percent), `noise` (mN), `stiffness`
-    /// (percent), `thickness` (mm) and `compliance` (um/N).
+    /// are not the usual ones, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
+    /// (mN), `stiffness` (percent), `thickness` (mm) and `compliance` (um/N).
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
@@ -117,6 +125,7 @@ impl SimSettings {
             ("clock".to_owned(), self.clock.to_string()),
         ]);
         let unusual = [
+            unusual("rate", self.rate),
             unusual("softening", self.softening),
             unusual("noise", self.noise),
             unusual("stiffness", self.stiffness),
@@ -138,6 +147,7 @@ impl SimSettings {
                 .parse()
                 .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
             clock: text("clock").parse()?,
+            rate: usual_or(map, "rate")?,
             softening: usual_or(map, "softening")?,
             noise: usual_or(map, "noise")?,
             stiffness: usual_or(map, "stiffness")?,
@@ -248,6 +258,7 @@ mod tests {
     #[test]
     fn amounts_survive_their_map_and_usual_ones_are_not_in_it() {
         let settings = SimSettings {
+            rate: "20000".parse().unwrap(),
             noise: "5".parse().unwrap(),
             stiffness: "200".parse().unwrap(),
             thickness: "12.5".parse().unwrap(),
@@ -259,6 +270,10 @@ mod tests {
         assert_eq!(
             (map["noise"].as_str(), map["thickness"].as_str()),
             ("5", "12.5")
+        );
+        assert_eq!(
+            (settings.tick_nanos(), map["rate"].as_str()),
+            (50_000, "20000")
         );
         assert_eq!(SimSettings::default().to_map().len(), 3);
     }

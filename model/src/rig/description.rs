@@ -50,6 +50,15 @@ impl RigDescription {
         Seconds(self.tick_nanos as f64 * 1e-9)
     }
 
+    /// Samples in a millisecond, or thereabouts: 1 on a rig that samples a thousand times a second, be its millisecond
+    /// of 976 us, and 20 on one that does so twenty thousand times. What is meant to last as long as so many samples of
+    /// the one takes as many times more of the other.
+    #[must_use]
+    pub fn samples_per_ms(&self) -> u32 {
+        // Saturates for a tick of zero, which no rig has.
+        (1e6 / self.tick_nanos.max(1) as f64).round().max(1.0) as u32
+    }
+
     /// Checks that the rig can follow an oscillation, and explains a refusal.
     pub fn check_oscillation(&self, command: &Oscillation) -> Result<(), String> {
         Sine::new(Position(0.0), command, self.mm_per_pulse, self.tick())

@@ -14,7 +14,7 @@ pub struct Limits {
     pub force_min: Newtons,
     /// Highest raw signal, independent of any calibration.
     pub volts_max: Volts,
-    /// Fastest change of force between two 10-sample means, in N/s.
+    /// Fastest change of force between two means of 10 ms, in N/s.
     pub force_rate_max: f64,
 }
 

@@ -123,4 +123,13 @@ mod tests {
             "{text}"
         );
     }
+
+    #[test]
+    fn a_millisecond_has_as_many_samples_as_the_clock_means() {
+        let ticks = [
+            1_000_000, 976_000, 976_562, 2_000_000, 500_000, 50_000, 48_800,
+        ];
+        let samples = ticks.map(|tick| rig(tick).samples_per_ms());
+        assert_eq!(samples, [1, 1, 1, 1, 2, 20, 20]);
+    }
 }

@@ -6,13 +6,14 @@
 use super::contact::{NOT_TARED, above_noise, not_felt};
 use super::context::{Context, Progress};
 use super::input::Record;
+use super::millisecond::Millisecond;
 use super::state::Contact;
 use crate::plans::FindBase;
 use palpate_model::rig::{StiffSample, Thickness, Touched, fit_compliance, thickness};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Newtons, Position};
 
-/// Samples averaged before a force is compared: late by 5 ms only, a few micrometres at these speeds.
+/// Milliseconds averaged before a force is compared: late by 5 ms only, a few micrometres at these speeds.
 const FILTER_SAMPLES: usize = 10;
 
 /// How far past the first touch the second may go, in mm.
@@ -40,6 +41,7 @@ pub(crate) struct BaseSearch {
     plan: FindBase,
     criterion: Newtons,
     stage: Stage,
+    millisecond: Millisecond,
     filter: MovingMean,
     first: Position,
     samples: Vec<StiffSample>,
@@ -48,7 +50,8 @@ pub(crate) struct BaseSearch {
 impl BaseSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindBase) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, FILTER_SAMPLES);
+        let samples = FILTER_SAMPLES * cx.state.config.rig.samples_per_ms() as usize;
+        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if plan.approach_speed > FindBase::SPEED_MAX || plan.pass_speed > FindBase::SPEED_MAX {
             return Err(format!(
                 "a base is stiff; touch it at {} at most",
@@ -67,6 +70,7 @@ impl BaseSearch {
             plan,
             criterion,
             stage: Stage::Approach,
+            millisecond: Millisecond::of(&cx.state.config.rig),
             filter: MovingMean::new(FILTER_SAMPLES),
             first: Position(0.0),
             samples: Vec::new(),
@@ -83,6 +87,10 @@ impl BaseSearch {
     fn advance(&mut self, cx: &mut Context<'_>) -> Result<Progress, String> {
         let position = cx.state.derived.position;
         let force = cx.state.derived.force.unwrap_or(Newtons(0.0));
+        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
+            return Ok(Progress::Continue);
+        };
+        let force = Newtons(force);
         let filtered = Newtons(self.filter.push(force.0));
         let at_rest = cx.at_rest()?;
         match self.stage {
@@ -112,7 +120,7 @@ impl BaseSearch {
                 // Forces this small are all worth the same.
                 let sigma = Newtons(1.0);
                 self.samples.push(StiffSample {
-                    position,
+                    position: Position(felt_at),
                     force,
                     sigma,
                 });

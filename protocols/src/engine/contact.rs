@@ -7,6 +7,7 @@
 
 use super::context::{Context, Progress};
 use super::input::Record;
+use super::millisecond::Millisecond;
 use super::state::{Contact, Tare};
 use super::touch_log::{Counts, TouchLog};
 use crate::plans::FindContact;
@@ -17,14 +18,13 @@ use palpate_model::signal::{
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use std::collections::VecDeque;
 
-/// Samples averaged before a force is compared with a criterion: 50 ms at 1 kHz, two to three
-/// mains cycles.
+/// Milliseconds averaged before a force is compared with a criterion: two to three mains cycles.
 const FILTER_SAMPLES: usize = 50;
 
-/// Consecutive samples that must be above the criterion: filtered ones, and raw ones where the plan presses.
+/// Consecutive milliseconds that must be above the criterion: filtered, and raw where the plan presses.
 const CONSECUTIVE: u32 = 10;
 
-/// A mean of so few samples is late by 5 ms only: what is hard is noticed by it.
+/// A mean of so few milliseconds is late by 5 ms only: what is hard is noticed by it.
 const FAST_SAMPLES: usize = 10;
 
 /// A press ends early where the fast mean is above this: filter and brake need what is left to [`FORCE_MAX`].
@@ -50,7 +50,7 @@ const FORCE_MAX: Newtons = Newtons(0.5);
 /// How far past the first trigger the second pass may go, in mm.
 const PASS_OVERRUN_MM: f64 = 4.0;
 
-/// Raw samples averaged into one point of the fit of a second pass alone: 100 points a second at 1 kHz.
+/// Milliseconds averaged into one point of the fit of a second pass alone: 100 points a second.
 const POINT_SAMPLES: u32 = 10;
 
 /// Distance from contact at which the tissue recovers untouched, in mm.
@@ -84,11 +84,12 @@ pub(crate) struct ContactSearch {
     plan: FindContact,
     criterion: Newtons,
     stage: Stage,
+    millisecond: Millisecond,
     filter: MovingMean,
     fast: MovingMean,
     seen: usize,
     above: u32,
-    /// The newest raw forces, oldest first.
+    /// The newest raw forces, one a millisecond, oldest first.
     raw: VecDeque<Newtons>,
     false_triggers: u32,
     first_trigger: Position,
@@ -100,7 +101,7 @@ pub(crate) struct ContactSearch {
     bin: Bin,
 }
 
-/// Readings being averaged into one point.
+/// Milliseconds being averaged into one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bin {
     count: u32,
@@ -112,7 +113,8 @@ struct Bin {
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, FILTER_SAMPLES);
+        let samples = FILTER_SAMPLES * cx.state.config.rig.samples_per_ms() as usize;
+        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if criterion > CRITERION_MAX {
             return Err(format!(
                 "noise of {noise:.3} would need a contact criterion of {criterion:.3}, above {CRITERION_MAX}; quieten the signal"
@@ -131,6 +133,7 @@ impl ContactSearch {
             plan,
             criterion,
             stage: Stage::Approach,
+            millisecond: Millisecond::of(&cx.state.config.rig),
             filter: MovingMean::new(FILTER_SAMPLES),
             fast: MovingMean::new(FAST_SAMPLES),
             seen: 0,
@@ -156,9 +159,13 @@ impl ContactSearch {
     fn advance(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let position = cx.state.derived.position;
         let force = cx.state.derived.force.unwrap_or(Newtons(0.0));
+        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
+            return Ok(Progress::Continue);
+        };
+        let (felt_at, force) = (Position(felt_at), Newtons(force));
         let filtered = Newtons(self.filter.push(force.0));
         let fast = Newtons(self.fast.push(force.0));
-        self.remember(reading.tick, position, force);
+        self.remember(reading.tick, felt_at, force);
         let at_rest = cx.at_rest()?;
         self.check_force(filtered, fast)?;
         match self.stage.clone() {
@@ -212,7 +219,7 @@ impl ContactSearch {
                 self.stage = Stage::SlowPass;
             }
             Stage::SlowPass => {
-                self.collect(cx, reading, position, force);
+                self.collect(cx, reading, felt_at, force);
                 let target = Newtons(self.plan.pass_force.0.max(2.0 * self.criterion.0));
                 let is_felt = self.first_end.is_some() && filtered >= self.criterion;
                 if self.is_triggered(filtered, target) {
@@ -255,7 +262,7 @@ impl ContactSearch {
         Ok(Progress::Continue)
     }
 
-    /// Takes a sample into what is remembered, where the plan presses.
+    /// Takes a millisecond into what is remembered, where the plan presses.
     fn remember(&mut self, tick: u64, position: Position, force: Newtons) {
         self.seen += 1;
         if self.plan.press.is_none() {
@@ -309,7 +316,7 @@ impl ContactSearch {
         Ok(())
     }
 
-    /// Where the plan presses, so many raw samples in a row tell of the tissue; else filtered ones.
+    /// Where the plan presses, so many raw forces in a row tell of the tissue; else filtered ones.
     fn is_first_triggered(&mut self, force: Newtons, filtered: Newtons) -> bool {
         let judged = if self.plan.press.is_some() {
             force
@@ -367,7 +374,7 @@ impl ContactSearch {
         });
     }
 
-    /// Averages readings of the slow pass into points for the fit. Only constant speed counts:
+    /// Averages what was felt in the slow pass into points for the fit. Only constant speed counts:
     /// the fit takes the pass as one straight line in time.
     fn collect(&mut self, cx: &Context<'_>, reading: &Reading, position: Position, force: Newtons) {
         if !is_cruising(cx.state.derived.velocity, self.plan.pass_speed) {

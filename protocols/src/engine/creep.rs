@@ -7,8 +7,8 @@ use palpate_model::rig::Reading;
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, Newtons, Position};
 
-/// Samples averaged before a correction: 50 ms at 1 kHz, two to three mains cycles.
-const FILTER_SAMPLES: usize = 50;
+/// Milliseconds averaged before a correction: two to three mains cycles.
+const FILTER_MS: u32 = 50;
 
 /// Share of the error that a correction takes away if the tissue is as stiff as it is taken to be. Half stays far
 /// below the factor of two at which corrections would grow.
@@ -32,6 +32,8 @@ pub(crate) struct Creeping {
     until_tick: u64,
     /// No correction before this tick: the mean must be of the new position only.
     quiet_until: u64,
+    /// Samples in the mean.
+    filtered: u32,
     filter: MovingMean,
     /// Stiffness as a multiple of the secant's.
     stiffness: f64,
@@ -44,11 +46,13 @@ impl Creeping {
         if cx.state.contact.is_none() {
             return Err("contact is not known; find it first".into());
         }
+        let filtered = FILTER_MS * cx.state.config.rig.samples_per_ms();
         Ok(Self {
             plan,
             until_tick: cx.state.tick + cx.state.ticks(plan.duration),
-            quiet_until: cx.state.tick + FILTER_SAMPLES as u64,
-            filter: MovingMean::new(FILTER_SAMPLES),
+            quiet_until: cx.state.tick + u64::from(filtered),
+            filtered,
+            filter: MovingMean::new(filtered as usize),
             stiffness: STIFFNESS_FIRST,
             corrected: None,
         })
@@ -72,7 +76,7 @@ impl Creeping {
             ));
         }
         if !cx.at_rest()? {
-            self.quiet_until = reading.tick + FILTER_SAMPLES as u64;
+            self.quiet_until = reading.tick + u64::from(self.filtered);
             return Ok(Progress::Continue);
         }
         // A hold that is paused goes on, and goes on being controlled.

@@ -1,9 +1,10 @@
 //! Interlocks: judged on every sample before the plan sees it. No plan can switch them off.
 
+use super::millisecond::Millisecond;
 use super::state::{Power, State};
 use crate::plans::Step;
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Limits, Phase, Reading};
+use palpate_model::rig::{AxisStatus, Limits, Phase, Reading, RigDescription};
 use palpate_model::units::{MmPerS, Newtons, Position, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
@@ -64,12 +65,12 @@ pub(super) struct Trip {
     pub reason: String,
 }
 
-/// Samples in each of the two means whose difference is the force rate.
-const RATE_SAMPLES: usize = 10;
+/// Milliseconds in each of the two means whose difference is the force rate.
+const RATE_MS: usize = 10;
 
-/// So many equal samples are a dead cell: with noise of a few counts each has a chance of at
-/// most a half.
-const STUCK_SAMPLES: u32 = 100;
+/// A signal that stays the same for so many milliseconds is that of a dead cell: with noise of a few counts each sample
+/// has a chance of at most a half.
+const STUCK_MS: u32 = 100;
 
 /// While the operator retracts after an over-force the limits that stopped the run are already
 /// exceeded; the ceiling becomes what was felt at the start of the retract plus this.
@@ -77,20 +78,37 @@ const RETRACT_HEADROOM: Newtons = Newtons(0.5);
 const RETRACT_HEADROOM_VOLTS: Volts = Volts(0.05);
 
 /// What the interlocks remember between samples.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Watch {
     last_at: Option<Nanos>,
     last_tick: Option<u64>,
-    /// The newest forces, oldest first once full.
-    recent: [f64; 2 * RATE_SAMPLES],
+    millisecond: Millisecond,
+    /// The newest forces, one a millisecond, oldest first once full.
+    recent: [f64; 2 * RATE_MS],
     recent_count: usize,
     retract_ceiling: Option<(Newtons, Volts)>,
     newest: (Newtons, Volts),
-    /// Consecutive samples with exactly the newest signal.
+    /// Consecutive samples with exactly the newest signal, and how many are a dead cell.
     same_count: u32,
+    stuck: u32,
 }
 
 impl Watch {
+    /// Nothing was seen of the rig yet.
+    pub fn new(rig: &RigDescription) -> Self {
+        Self {
+            last_at: None,
+            last_tick: None,
+            millisecond: Millisecond::of(rig),
+            recent: [0.0; 2 * RATE_MS],
+            recent_count: 0,
+            retract_ceiling: None,
+            newest: (Newtons(0.0), Volts(0.0)),
+            same_count: 0,
+            stuck: STUCK_MS * rig.samples_per_ms(),
+        }
+    }
+
     /// Samples are expected from now on.
     pub fn start(&mut self, now: Nanos) {
         self.last_at.get_or_insert(now);
@@ -105,6 +123,7 @@ impl Watch {
     /// The signal's zero moved (tare): forces before and after do not compare.
     pub fn forget_rate(&mut self) {
         self.recent_count = 0;
+        self.millisecond.clear();
     }
 
     /// Whether the signal stands still; takes the newest.
@@ -114,20 +133,22 @@ impl Watch {
         } else {
             0
         };
-        self.same_count >= STUCK_SAMPLES
+        self.same_count >= self.stuck
     }
 
-    /// Change of force between the two newest means, in N/s, once there are enough samples.
-    fn push_rate(&mut self, force: f64, tick_secs: f64) -> Option<f64> {
+    /// Change of force between the two newest means, in N/s, each time a millisecond is complete and there are enough.
+    fn push_rate(&mut self, force: f64, rig: &RigDescription) -> Option<f64> {
+        let (_, force) = self.millisecond.push(0.0, force)?;
         self.recent.rotate_left(1);
-        self.recent[2 * RATE_SAMPLES - 1] = force;
-        self.recent_count = (self.recent_count + 1).min(2 * RATE_SAMPLES);
-        if self.recent_count < 2 * RATE_SAMPLES {
+        self.recent[2 * RATE_MS - 1] = force;
+        self.recent_count = (self.recent_count + 1).min(2 * RATE_MS);
+        if self.recent_count < 2 * RATE_MS {
             return None;
         }
-        let (older, newer) = self.recent.split_at(RATE_SAMPLES);
+        let (older, newer) = self.recent.split_at(RATE_MS);
         let difference = newer.iter().sum::<f64>() - older.iter().sum::<f64>();
-        Some(difference / RATE_SAMPLES as f64 / (RATE_SAMPLES as f64 * tick_secs))
+        let apart = (RATE_MS as u32 * rig.samples_per_ms()) as f64 * rig.tick().0;
+        Some(difference / RATE_MS as f64 / apart)
     }
 }
 
@@ -150,12 +171,16 @@ pub(super) fn judge(
     if state.watch.is_stuck(reading.volts) {
         return trip(
             Interlock::Signal,
-            format!("the signal has not changed for {STUCK_SAMPLES} samples; check the load cell"),
+            format!(
+                "the signal has not changed for {} samples; check the load cell",
+                state.watch.stuck
+            ),
         );
     }
-    let force = state.force_from_volts(reading.volts);
+    let derived = state.derived.force;
+    let force = derived.unwrap_or_else(|| state.force_from_volts(reading.volts));
     state.watch.newest = (force, reading.volts);
-    let rate = state.watch.push_rate(force.0, state.config.rig.tick().0);
+    let rate = state.watch.push_rate(force.0, &state.config.rig);
     let (force_max, volts_max) = match state.watch.retract_ceiling {
         Some((force, volts)) => (
             Newtons(limits.force_max.0.max(force.0)),

@@ -6,11 +6,13 @@ use crate::plans::LoadTo;
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Position};
 
-/// Samples averaged before the force is compared: short beside any ramp, and noise falls to a third.
-const FILTER_SAMPLES: usize = 10;
+/// Milliseconds averaged before the force is compared: short beside any ramp, and at a sample each noise falls to a
+/// third.
+const FILTER_MS: u32 = 10;
 
-/// Ticks from a sample to the axis's first answer: report 1.0 to 1.5 ms, command 0.5 ms, next tick.
-const ANSWER_TICKS: f64 = 3.0;
+/// Milliseconds from a sample to the axis's first answer: report 1.0 to 1.5 ms, command 0.5 ms, the next tick of a
+/// rig with one a millisecond.
+const ANSWER_MS: u32 = 3;
 
 /// Shares of the speed in the stages of a braked approach, and of the brake force at which each ends.
 const STAGES: [(f64, f64); 3] = [(1.0, 1.0), (0.1, 0.1), (0.01, 0.0)];
@@ -21,6 +23,8 @@ pub(crate) struct Loading {
     plan: LoadTo,
     stage: usize,
     is_stopping: bool,
+    /// Samples in the filter and until the answer.
+    samples: [u32; 2],
     filter: MovingMean,
     /// The filtered force of the sample before, and the smoothed slope in N/s.
     before: Option<f64>,
@@ -29,6 +33,8 @@ pub(crate) struct Loading {
 
 impl Loading {
     pub fn begin(cx: &mut Context<'_>, plan: LoadTo) -> Result<Self, String> {
+        let per_ms = cx.state.config.rig.samples_per_ms();
+        let samples = [FILTER_MS * per_ms, ANSWER_MS * per_ms];
         let mut loading = Self {
             plan,
             // Without a brake there is only the last stage, at full speed.
@@ -38,7 +44,8 @@ impl Loading {
                 STAGES.len() - 1
             },
             is_stopping: false,
-            filter: MovingMean::new(FILTER_SAMPLES),
+            samples,
+            filter: MovingMean::new(samples[0] as usize),
             before: None,
             slope: 0.0,
         };
@@ -89,10 +96,11 @@ impl Loading {
             return Err("the load cell is not tared; tare it first".into());
         };
         let tick = cx.state.config.rig.tick().0;
+        let [filtered, answer] = self.samples.map(f64::from);
         let mean = self.filter.push(force.0);
         if let Some(before) = self.before {
-            // Smoothed over the filter's own length: a slope of a mean of ten is as noisy as one sample.
-            self.slope += ((mean - before) / tick - self.slope) / FILTER_SAMPLES as f64;
+            // Smoothed over the filter's own length: the slope of a mean is as noisy as one sample.
+            self.slope += ((mean - before) / tick - self.slope) / filtered;
         }
         self.before = Some(mean);
         let depth = cx.state.derived.depth.unwrap_or(Depth(0.0));
@@ -116,7 +124,7 @@ impl Loading {
         let speed = cx.state.derived.velocity.0;
         let braking = speed / (2.0 * cx.state.config.rig.acceleration.0);
         // The mean lags by half its length; then come the answer and the way of the deceleration.
-        let ahead = (0.5 * FILTER_SAMPLES as f64 + ANSWER_TICKS) * tick + braking;
+        let ahead = (0.5 * filtered + answer) * tick + braking;
         if mean + self.slope.max(0.0) * ahead >= self.target().0 {
             if !at_rest {
                 cx.stop_move();

@@ -14,6 +14,7 @@ mod home;
 mod input;
 mod interlock;
 mod load;
+mod millisecond;
 mod monitor;
 mod pause;
 mod prompt;

@@ -239,7 +239,7 @@ impl State {
             tare: None,
             contact: None,
             derived: Derived::default(),
-            watch: Watch::default(),
+            watch: Watch::new(&config.rig),
             unacknowledged: VecDeque::new(),
             in_flight: None,
             live: None,

@@ -3,10 +3,10 @@
 use palpate_model::signal::TouchPoint;
 use palpate_model::units::{Newtons, Position, Seconds};
 
-/// Raw samples averaged into one point: 50 points a second at 1 kHz, in which the fastest approach goes 0.03 mm.
+/// Milliseconds averaged into one point: 50 points a second, in which the fastest approach goes 0.03 mm.
 const POINT_SAMPLES: u32 = 20;
 
-/// Points kept of the way to the tissue, 5 s at 1 kHz: they tell offset and drift.
+/// Points kept of the way to the tissue, 5 s: they tell offset and drift.
 const LEAD_POINTS: usize = 250;
 
 /// Points of a search in progress.
@@ -18,7 +18,7 @@ pub(super) struct TouchLog {
     points: Vec<TouchPoint>,
 }
 
-/// Samples being averaged into one point.
+/// Milliseconds being averaged into one point.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Bin {
     count: u32,
@@ -28,12 +28,12 @@ struct Bin {
     is_uncounted: bool,
 }
 
-/// Whether the force of a sample says something about the tissue.
+/// Whether the force of a millisecond says something about the tissue.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Counts {
     /// On the way to the tissue, of which only the end is kept.
     Lead,
-    /// Like every later sample.
+    /// Like every later one.
     Yes,
     /// The path matters, the force does not.
     No,

@@ -17,10 +17,11 @@ pub(crate) const FORCE_FLOOR: f64 = 0.05;
 const SINE_SHARE: f64 = 0.02;
 /// and over so many samples at most, which hide any noise.
 const SINE_SAMPLES_MAX: f64 = 1000.0;
-/// A duration may be off by so many samples: one at each end, and the answer of the axis.
-const DURATION_SAMPLES: f64 = 5.0;
-/// Fewer samples of cruise tell no speed: the pulses are too coarse.
-const CRUISE_SAMPLES_MIN: u64 = 20;
+/// A duration may be off by so many milliseconds: a sample at each end of a rig that takes one in each, and the answer
+/// of the axis.
+const DURATION_MS: f64 = 5.0;
+/// Fewer milliseconds of cruise tell no speed: the pulses are too coarse.
+const CRUISE_MS_MIN: u64 = 20;
 /// Until this share of its force target an indentation surely goes at full speed.
 const LOAD_CRUISE_SHARE: f64 = 0.5;
 
@@ -46,11 +47,11 @@ impl Slope {
         self.tx += t * x;
     }
 
-    fn slope(&self) -> Option<f64> {
+    /// The slope, once there are so many points.
+    fn slope(&self, least: u64) -> Option<f64> {
         let n = self.n as f64;
         let below = n * self.tt - self.t * self.t;
-        (self.n >= CRUISE_SAMPLES_MIN && below > 0.0)
-            .then(|| (n * self.tx - self.t * self.x) / below)
+        (self.n >= least && below > 0.0).then(|| (n * self.tx - self.t * self.x) / below)
     }
 }
 
@@ -61,6 +62,7 @@ pub(super) struct Measuring {
     planned: PlannedStep,
     mm_per_pulse: f64,
     tick_secs: f64,
+    per_ms: u32,
     acceleration: f64,
     first: Option<Row>,
     by_path: Slope,
@@ -90,6 +92,7 @@ impl Measuring {
             planned: planned.clone(),
             mm_per_pulse: rig.mm_per_pulse,
             tick_secs: rig.tick().0,
+            per_ms: rig.samples_per_ms(),
             acceleration: rig.acceleration.0,
             first: None,
             by_path: Slope::default(),
@@ -218,17 +221,18 @@ impl Measuring {
                 is_within: error.abs() <= allowed,
             });
         };
+        let cruise = CRUISE_MS_MIN * u64::from(self.per_ms);
         let mut speed = |target: f64| {
             for (name, slope) in [
                 ("speed", &self.by_path),
                 ("speed by pulses", &self.by_pulses),
             ] {
-                let achieved = slope.slope().map(f64::abs);
+                let achieved = slope.slope(cruise).map(f64::abs);
                 add(name, "mm/s", target, achieved, RATE_SHARE * target);
             }
         };
         let of_force = |target: f64| (FORCE_SHARE * target.abs()).max(FORCE_FLOOR);
-        let of_duration = DURATION_SAMPLES * self.tick_secs;
+        let of_duration = DURATION_MS * f64::from(self.per_ms) * self.tick_secs;
         let duration = self.has_duration.then_some(took);
         match self.planned.step {
             Step::Ramp { speed: v, depth } => {

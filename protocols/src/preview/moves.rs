@@ -4,9 +4,10 @@ use super::walk::{Span, Walk};
 use palpate_model::rig::{Phase, Profile};
 use palpate_model::units::{MmPerS, Position, Seconds};
 
-/// Controller ticks from the sample that begins a move to the first tick of its motion, and from its last tick to
-/// the sample that shows rest: report 1.0 to 1.5 ms and command 0.5 ms make one, the tick that shows rest the other.
-pub(super) const MOVE_TICKS: u64 = 2;
+/// Milliseconds from the sample that begins a move to the first tick of its motion, and from its last tick to the sample
+/// that shows rest: with a tick in each, report 1.0 to 1.5 ms and command 0.5 ms make one, the tick that shows rest the
+/// other. With more ticks a move takes up to half a millisecond less, by chance.
+const MOVE_MS: u64 = 2;
 
 /// Depths this near to a whole pulse, as a share of one, are whole: decimal rounding of the request and no more.
 const WHOLE: f64 = 1e-6;
@@ -74,7 +75,10 @@ impl Walk<'_> {
         if !self.refusals.is_empty() {
             return Span(0.0, 0.0, true);
         }
-        let (from, is_exact) = (self.reach, self.reach.is_known() && end.is_known());
+        let (from, is_exact) = (
+            self.reach,
+            self.reach.is_known() && end.is_known() && self.is_answer_exact(),
+        );
         let expected = self.secs(self.move_ticks(depth_mm - self.expected.depth(), speed));
         let furthest = (end.high - from.low).abs().max((end.low - from.high).abs());
         let longest = self.secs(self.move_ticks(furthest, speed));
@@ -99,8 +103,18 @@ impl Walk<'_> {
     pub(super) fn move_ticks(&self, distance_mm: f64, speed: MmPerS) -> u64 {
         match self.ticks(self.move_secs(distance_mm, speed)) {
             0 => 0,
-            ticks => ticks + MOVE_TICKS,
+            ticks => ticks + self.answer_ticks(),
         }
+    }
+
+    /// Ticks beyond those of the motion itself that a move takes, at most.
+    pub(super) fn answer_ticks(&self) -> u64 {
+        MOVE_MS * u64::from(self.rig.samples_per_ms())
+    }
+
+    /// Whether a move takes just as many ticks more: those are long enough to hide when a report arrives.
+    pub(super) fn is_answer_exact(&self) -> bool {
+        self.rig.samples_per_ms() == 1
     }
 
     /// As the engine counts: rounded up, a millionth of a tick forgiven.

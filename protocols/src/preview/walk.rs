@@ -2,7 +2,7 @@
 
 use super::StepPreview;
 use super::expected::Expected;
-use super::moves::{MOVE_TICKS, Reach};
+use super::moves::Reach;
 use crate::engine::NOT_HOMED;
 use crate::plans::{FindBase, FindContact, LoadTo, OnFailure, PlannedStep, Step};
 use palpate_model::rig::{HandAction, Limits, Phase, RigDescription};
@@ -214,8 +214,8 @@ impl Walk<'_> {
                 }
                 // The rig counts whole ticks of each period.
                 let ticks = u64::from(command.cycles) * u64::from(command.period_ticks);
-                let secs = self.secs(ticks + MOVE_TICKS);
-                Span(secs, secs, true)
+                let secs = self.secs(ticks + self.answer_ticks());
+                Span(secs, secs, self.is_answer_exact())
             }
             Step::Unload {
                 speed,
@@ -263,7 +263,7 @@ impl Walk<'_> {
         } else {
             self.expected.stay(phase, secs);
         }
-        Span(secs, secs, true)
+        Span(secs, secs, self.is_answer_exact())
     }
 
     fn load(&mut self, phase: Phase, load: &LoadTo) -> Span {

@@ -2,7 +2,7 @@
 
 use super::board::{Board, LogState};
 use super::clock::wall_now;
-use super::snapshot::RunView;
+use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
 use crate::engine::{self, Config, Effect, Input, Operator, Outcome, PauseView, State};
 use crate::fidelity::{FidelityMeter, first_verdict};
@@ -19,8 +19,8 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Samples between two answers of the live fit: half a second at 1 kHz.
-pub(crate) const LIVE_FIT_EVERY: u64 = 500;
+/// Milliseconds between two answers of the live fit.
+const LIVE_FIT_MS: u64 = 500;
 
 /// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
 const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
@@ -38,6 +38,9 @@ pub(super) struct ActiveRun {
     after_stop: AfterStop,
     answers: Answers,
     paused_since: Option<Nanos>,
+    lateness: Option<Lateness>,
+    /// What was told of time given up.
+    told_given_up: Seconds,
     order: u64,
     live: LiveFeed,
     time_use: BTreeMap<&'static str, u64>,
@@ -72,6 +75,8 @@ impl ActiveRun {
             after_stop,
             answers,
             paused_since: None,
+            lateness: None,
+            told_given_up: Seconds(0.0),
             order: 0,
             live,
             time_use: BTreeMap::new(),
@@ -94,6 +99,20 @@ impl ActiveRun {
     /// Session time of a time on the rig's clock.
     pub fn session_time(&self, at: Nanos) -> Nanos {
         at.since(self.origin)
+    }
+
+    /// Takes how the run keeps pace with the wall. Time given up is told each time it has doubled.
+    pub fn keep_lateness(&mut self, lateness: Option<Lateness>) {
+        self.lateness = lateness;
+        let given_up = lateness.unwrap_or_default().given_up;
+        if given_up.0 > 0.0 && given_up.0 >= 2.0 * self.told_given_up.0 {
+            self.told_given_up = given_up;
+            let text = format!(
+                "the computer does not keep up: the run is {:.1} s behind the clock and goes on from there; close other programs",
+                given_up.0
+            );
+            self.board.note(text, true);
+        }
     }
 
     /// Feeds one input to the engine and does what it asks: a stop leaves before anything is
@@ -284,6 +303,7 @@ impl ActiveRun {
         let writer = self.writer.as_ref();
         let log = LogState {
             saved_through: writer.map_or(self.board.now(), SessionWriter::saved_through),
+            lateness: self.lateness,
             verdict: self.verdict.clone(),
             error: self.log_error.clone(),
         };
@@ -333,6 +353,8 @@ pub(crate) struct LiveFeed {
     first_tick: Option<u64>,
     tick_secs: f64,
     samples: u64,
+    /// Samples between two answers.
+    every: u64,
     deepest: Depth,
     cycle: u32,
 }
@@ -346,10 +368,11 @@ impl LiveFeed {
             first_tick: None,
             tick_secs: config.rig.tick().0,
             samples: 0,
+            every: LIVE_FIT_MS * u64::from(config.rig.samples_per_ms()),
         }
     }
 
-    /// Takes a sample after the engine did; every [`LIVE_FIT_EVERY`] samples there is an answer.
+    /// Takes a sample after the engine did; every half second there is an answer.
     pub fn push(
         &mut self,
         reading: &Reading,
@@ -371,7 +394,7 @@ impl LiveFeed {
         let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
         self.fit.push(t, depth, force, sigma);
         self.samples += 1;
-        if self.samples.is_multiple_of(LIVE_FIT_EVERY) {
+        if self.samples.is_multiple_of(self.every) {
             self.fit.estimate()
         } else {
             None

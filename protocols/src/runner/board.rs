@@ -1,7 +1,7 @@
 //! What is shown of a run, gathered from what goes into its engine and what comes out: the same for a run in
 //! progress and for one that is replayed.
 
-use super::snapshot::{LogLine, PromptView, RunView};
+use super::snapshot::{Lateness, LogLine, PromptView, RunView};
 use crate::base::FoundBase;
 use crate::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
 use crate::preview::StepPreview;
@@ -35,11 +35,12 @@ pub(crate) struct Board {
     outcome: Option<Outcome>,
 }
 
-/// What is known of a run's log.
+/// What is known of a run's log and of its pace.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct LogState {
     /// Session time through which everything is on disk.
     pub saved_through: Nanos,
+    pub lateness: Option<Lateness>,
     pub verdict: Option<(Verdict, String)>,
     pub error: Option<String>,
 }
@@ -174,6 +175,7 @@ impl Board {
             phases: Arc::clone(&self.phases),
             samples: self.samples,
             saved_through: log.saved_through,
+            lateness: log.lateness,
             is_motion_possible: state.is_motion_possible(),
             pause: state.pause(),
             prompt: state.prompt().map(|(prompt, until)| PromptView {

@@ -1,6 +1,7 @@
 //! The only place that reads a clock: pacing of virtual time against the wall.
 #![expect(clippy::disallowed_methods, reason = "this file is the clock")]
 
+use super::snapshot::Lateness;
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;
@@ -52,11 +53,16 @@ pub(super) enum Wake<T> {
     Disconnected,
 }
 
+/// Session time this far behind the wall is not caught up: after a computer was suspended, or a debugger had stopped it,
+/// nothing should race.
+const BEHIND_MAX: Duration = Duration::from_millis(250);
+
 /// Maps session time to wall time and sleeps the difference.
 pub(super) struct Pacer {
     scale: TimeScale,
     wall_anchor: Instant,
     time_anchor: Nanos,
+    lateness: Lateness,
 }
 
 impl Pacer {
@@ -65,6 +71,7 @@ impl Pacer {
             scale,
             wall_anchor: Instant::now(),
             time_anchor: now,
+            lateness: Lateness::default(),
         }
     }
 
@@ -77,18 +84,33 @@ impl Pacer {
                 Err(TryRecvError::Disconnected) => Wake::Disconnected,
             };
         };
-        let due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
+        let mut due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
         let elapsed = self.wall_anchor.elapsed();
         let left = due.saturating_sub(elapsed);
-        // A suspended computer or a debugger leaves virtual time behind: do not race to catch up.
-        if elapsed > due + Duration::from_millis(250) {
-            *self = Self::new(self.scale, at);
+        if elapsed > due + BEHIND_MAX {
+            self.note_behind(elapsed - due);
+            self.lateness.given_up.0 += (elapsed - due).as_secs_f64();
+            (self.wall_anchor, self.time_anchor) = (Instant::now(), at);
+            due = Duration::ZERO;
         }
         match requests.recv_timeout(left) {
             Ok(request) => Wake::Request(request, self.now().min(at)),
-            Err(RecvTimeoutError::Timeout) => Wake::Time,
+            Err(RecvTimeoutError::Timeout) => {
+                self.note_behind(self.wall_anchor.elapsed().saturating_sub(due));
+                Wake::Time
+            }
             Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
         }
+    }
+
+    fn note_behind(&mut self, behind: Duration) {
+        let worst = &mut self.lateness.worst.0;
+        *worst = worst.max(behind.as_secs_f64());
+    }
+
+    /// How far session time was behind the wall; `None` at full pace.
+    pub fn lateness(&self) -> Option<Lateness> {
+        (self.scale != TimeScale::Max).then_some(self.lateness)
     }
 
     /// Session time that corresponds to the wall now.

@@ -161,7 +161,11 @@ impl MainLoop {
         loop {
             let was_running = self.is_running();
             let target = self.now + self.stride();
-            let is_ending = match pacer.wait(target, requests) {
+            let wake_up = pacer.wait(target, requests);
+            if let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) {
+                run.keep_lateness(pacer.lateness());
+            }
+            let is_ending = match wake_up {
                 Wake::Time => {
                     self.advance(target);
                     false

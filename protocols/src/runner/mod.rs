@@ -16,5 +16,5 @@ pub(crate) use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, wall_now};
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;
-pub use snapshot::{LogLine, PromptView, RigView, RunView, Snapshot};
+pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot};
 pub use start::{AfterStop, Answers, RunRequest, StartError};

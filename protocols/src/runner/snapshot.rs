@@ -38,6 +38,15 @@ pub struct RigView {
     pub link_error: Option<String>,
 }
 
+/// How a run kept pace with the wall.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Lateness {
+    /// The furthest that session time was behind.
+    pub worst: Seconds,
+    /// All that was given up where it was too far behind to catch up.
+    pub given_up: Seconds,
+}
+
 /// A run as it stands.
 #[derive(Clone, Debug)]
 pub struct RunView {
@@ -79,6 +88,8 @@ pub struct RunView {
     pub samples: u64,
     /// Session time through which everything is on disk.
     pub saved_through: Nanos,
+    /// How it keeps pace with the wall; `None` where it has none to keep.
+    pub lateness: Option<Lateness>,
     /// Whether the axis may be moving.
     pub is_motion_possible: bool,
     /// Whether it is paused or will be.

@@ -2,8 +2,9 @@
 
 use crate::manifest::Manifest;
 use crate::record::Row;
-use polars::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PolarsResult, Series};
-use polars::prelude::{NamedFrom, StringChunked};
+use polars::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
+use polars::prelude::{Series, StringChunked};
+use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, PrimitiveArray};
 
 /// What stands in a column.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -43,6 +44,9 @@ pub struct ColumnInfo {
     /// Where it comes from.
     pub how: &'static str,
 }
+
+/// The column of times.
+pub(super) const TIME_COLUMN: &str = "t_s";
 
 /// Columns of every table, in order.
 const USUAL: [Field; 8] = [
@@ -100,7 +104,7 @@ impl Field {
                 "counted",
             ),
             Self::Time => (
-                "t_s",
+                TIME_COLUMN,
                 "s",
                 "number",
                 "time since the session's first sample; negative after a restart of the controller",
@@ -262,44 +266,103 @@ impl<'a> Layout<'a> {
         })
     }
 
-    /// Some samples as a frame.
-    pub fn frame(&self, rows: &[Numbered]) -> PolarsResult<DataFrame> {
-        let columns = self
-            .columns
-            .iter()
-            .map(|column| self.series(column, rows).into());
-        DataFrame::new(rows.len(), columns.collect::<Vec<Column>>())
+    /// A frame of these columns to fill, with room for so many samples.
+    pub fn filling(&self, room: usize) -> Vec<Cells> {
+        let columns = self.columns.iter();
+        columns
+            .map(|column| Cells::new(column.field, self.manifest, room))
+            .collect()
     }
 
-    fn series(&self, column: &ColumnInfo, rows: &[Numbered]) -> Series {
-        let name = column.name.as_str().into();
-        let same = |text: &str| StringChunked::full(name, text, rows.len()).into_series();
-        let name = column.name.as_str().into();
-        macro_rules! each {
-            ($kind:ty, $of:expr) => {
-                Series::new(name, rows.iter().map($of).collect::<Vec<$kind>>())
-            };
+    /// Adds samples to a frame.
+    pub fn fill(&self, frame: &mut [Cells], rows: &[Numbered]) {
+        for (cells, column) in frame.iter_mut().zip(&self.columns) {
+            cells.extend(rows, column.field, self.beside);
         }
-        match column.field {
-            Field::SessionId => same(&self.manifest.session_id),
-            Field::Specimen => same(&self.manifest.specimen),
-            Field::Sample | Field::EveryNth => each!(u64, |(number, _, _)| *number),
-            Field::Time => each!(f64, |(_, t, _)| *t),
-            Field::Depth => each!(Option<f64>, |(_, _, row)| row.depth),
-            Field::Force => each!(Option<f64>, |(_, _, row)| row.force),
-            Field::Signal => each!(Option<f64>, |(_, _, row)| row.volts),
-            Field::Counts => each!(Option<i32>, |(_, _, row)| row.counts),
-            Field::Pulses => each!(Option<i64>, |(_, _, row)| row.pulses),
-            Field::Phase => each!(&str, |(_, _, row)| row.phase.name()),
-            Field::Cycle => each!(u32, |(_, _, row)| row.cycle),
-            Field::Tick => each!(u64, |(_, _, row)| row.tick),
-            Field::Host => each!(u64, |(_, _, row)| row.host.0),
-            Field::Status => each!(u32, |(_, _, row)| row.status),
-            Field::Beside(one) => {
-                let values = &self.beside.columns[one].2;
-                let of = |(number, _, _): &Numbered| *values.get(*number as usize)?;
-                each!(Option<f64>, of)
+    }
+
+    /// The frame of so many samples.
+    pub fn frame(&self, cells: Vec<Cells>, rows: usize) -> PolarsResult<DataFrame> {
+        let columns = self.columns.iter().zip(cells);
+        let columns =
+            columns.map(|(column, cells)| cells.series(column.name.as_str().into()).into());
+        DataFrame::new(rows, columns.collect::<Vec<Column>>())
+    }
+}
+
+/// What a column of a frame holds so far.
+pub(super) enum Cells {
+    /// A text that is the same in every row, and their number.
+    Same(String, usize),
+    Numbers(Vec<f64>),
+    Wide(Vec<u64>),
+    Whole(Vec<u32>),
+    Words(MutableBinaryViewArray<str>),
+    MaybeNumbers(MutablePrimitiveArray<f64>),
+    MaybeWide(MutablePrimitiveArray<i64>),
+    MaybeWhole(MutablePrimitiveArray<i32>),
+}
+
+impl Cells {
+    fn new(field: Field, manifest: &Manifest, room: usize) -> Self {
+        match field {
+            Field::SessionId => Self::Same(manifest.session_id.clone(), 0),
+            Field::Specimen => Self::Same(manifest.specimen.clone(), 0),
+            Field::Time => Self::Numbers(Vec::with_capacity(room)),
+            Field::Sample | Field::EveryNth | Field::Tick | Field::Host => {
+                Self::Wide(Vec::with_capacity(room))
             }
+            Field::Cycle | Field::Status => Self::Whole(Vec::with_capacity(room)),
+            Field::Phase => Self::Words(MutableBinaryViewArray::with_capacity(room)),
+            Field::Depth | Field::Force | Field::Signal | Field::Beside(_) => {
+                Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
+            }
+            Field::Pulses => Self::MaybeWide(MutablePrimitiveArray::with_capacity(room)),
+            Field::Counts => Self::MaybeWhole(MutablePrimitiveArray::with_capacity(room)),
+        }
+    }
+
+    fn extend(&mut self, rows: &[Numbered], field: Field, beside: &Beside) {
+        match self {
+            Self::Same(_, count) => *count += rows.len(),
+            Self::Numbers(cells) => cells.extend(rows.iter().map(|(_, t, _)| *t)),
+            Self::Wide(cells) => cells.extend(rows.iter().map(|(number, _, row)| match field {
+                Field::Tick => row.tick,
+                Field::Host => row.host.0,
+                _ => *number,
+            })),
+            Self::Whole(cells) => cells.extend(rows.iter().map(|(_, _, row)| match field {
+                Field::Cycle => row.cycle,
+                _ => row.status,
+            })),
+            Self::Words(cells) => {
+                cells.extend_values(rows.iter().map(|(_, _, row)| row.phase.name()));
+            }
+            Self::MaybeNumbers(cells) => match field {
+                Field::Depth => cells.extend(rows.iter().map(|(_, _, row)| row.depth)),
+                Field::Force => cells.extend(rows.iter().map(|(_, _, row)| row.force)),
+                Field::Beside(one) => {
+                    let values = &beside.columns[one].2;
+                    let of = |(number, _, _): &Numbered| *values.get(*number as usize)?;
+                    cells.extend(rows.iter().map(of));
+                }
+                _ => cells.extend(rows.iter().map(|(_, _, row)| row.volts)),
+            },
+            Self::MaybeWide(cells) => cells.extend(rows.iter().map(|(_, _, row)| row.pulses)),
+            Self::MaybeWhole(cells) => cells.extend(rows.iter().map(|(_, _, row)| row.counts)),
+        }
+    }
+
+    fn series(self, name: PlSmallStr) -> Series {
+        match self {
+            Self::Same(text, count) => StringChunked::full(name, &text, count).into_series(),
+            Self::Numbers(cells) => Series::from_array(name, PrimitiveArray::from_vec(cells)),
+            Self::Wide(cells) => Series::from_array(name, PrimitiveArray::from_vec(cells)),
+            Self::Whole(cells) => Series::from_array(name, PrimitiveArray::from_vec(cells)),
+            Self::Words(cells) => Series::from_array(name, cells.freeze()),
+            Self::MaybeNumbers(cells) => Series::from_array(name, cells.freeze()),
+            Self::MaybeWide(cells) => Series::from_array(name, cells.freeze()),
+            Self::MaybeWhole(cells) => Series::from_array(name, cells.freeze()),
         }
     }
 }

@@ -1,15 +1,13 @@
 //! A table written frame by frame in one of the formats, so that memory does not grow with it.
 
 use super::harmless::harmless_frame;
-use polars::io::{csv, parquet};
-use polars::prelude::{
-    CompatLevel, CsvWriter, DataFrame, KeyValueMetadata, ParquetCompression, ParquetWriter,
-    PolarsError, PolarsResult, SchemaExt, SerWriter,
-};
+use super::parquet::ParquetFile;
+use polars::io::csv;
+use polars::prelude::{CompatLevel, CsvWriter, DataFrame, PolarsResult, SchemaExt, SerWriter};
 use polars_arrow::io::ipc::write::{FileWriter, WriteOptions};
 use std::collections::BTreeMap;
 use std::io::Write;
-use std::sync::{Arc, PoisonError};
+use std::sync::Arc;
 
 /// The format of a table.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -41,7 +39,7 @@ pub(crate) type Metadata = Vec<(String, String)>;
 
 pub(crate) enum Encoder<W: Write> {
     Csv(csv::write::BatchedWriter<W>),
-    Parquet(Box<parquet::write::BatchedWriter<W>>, Metadata),
+    Parquet(Box<ParquetFile<W>>, Metadata),
     Arrow(FileWriter<W>),
 }
 
@@ -59,12 +57,7 @@ impl<W: Write> Encoder<W> {
                 let empty = harmless_frame(empty.clone())?;
                 Self::Csv(writer.batched(empty.schema())?)
             }
-            Format::Parquet => {
-                let writer = ParquetWriter::new(file)
-                    .with_compression(ParquetCompression::Zstd(None))
-                    .batched(empty.schema())?;
-                Self::Parquet(Box::new(writer), metadata)
-            }
+            Format::Parquet => Self::Parquet(Box::new(ParquetFile::new(file, empty)?), metadata),
             Format::Arrow => {
                 let schema = empty.schema().to_arrow(CompatLevel::oldest());
                 let options = WriteOptions { compression: None };
@@ -82,7 +75,7 @@ impl<W: Write> Encoder<W> {
     pub fn write(&mut self, frame: DataFrame) -> PolarsResult<()> {
         match self {
             Self::Csv(writer) => writer.write_batch(&harmless_frame(frame)?),
-            Self::Parquet(writer, _) => writer.write_batch(&frame),
+            Self::Parquet(file, _) => file.write(frame),
             Self::Arrow(writer) => frame
                 .iter_chunks(CompatLevel::oldest(), true)
                 .try_for_each(|chunk| writer.write(&chunk, None)),
@@ -92,21 +85,7 @@ impl<W: Write> Encoder<W> {
     pub fn finish(self) -> PolarsResult<()> {
         match self {
             Self::Csv(mut writer) => writer.finish(),
-            Self::Parquet(writer, metadata) => {
-                // The footer is written here and not by `finish`, which adds the frame's Arrow schema:
-                // with one in the file, Arrow readers show its metadata, which is empty, instead of ours
-                // (Arrow issue 8980), and texts as views, which pyarrow cannot compare with texts. All our
-                // types are told by Parquet's own.
-                let KeyValueMetadata::Static(pairs) = KeyValueMetadata::from_static(metadata)
-                else {
-                    return Err(PolarsError::ComputeError("metadata is not static".into()));
-                };
-                let mut footer = writer
-                    .get_writer()
-                    .lock()
-                    .unwrap_or_else(PoisonError::into_inner);
-                footer.end(Some(pairs)).map(|_bytes| ())
-            }
+            Self::Parquet(file, metadata) => file.finish(metadata),
             Self::Arrow(mut writer) => writer.finish(),
         }
     }

@@ -5,6 +5,8 @@ mod columns;
 mod dictionary;
 mod encode;
 mod harmless;
+mod parquet;
+mod row_group;
 mod select;
 
 pub use atomic::Kept;
@@ -19,7 +21,7 @@ use crate::log::ReadError;
 use crate::manifest::Manifest;
 use crate::record::Row;
 use crate::text::sha256;
-use columns::{Layout, Numbered};
+use columns::{Cells, Layout, Numbered};
 use encode::Metadata;
 use polars::prelude::{PolarsError, PolarsResult};
 use std::io::{self, Write};
@@ -32,6 +34,10 @@ pub const TABLE_VERSION: u32 = 1;
 /// Samples in a frame and in a row group: a reader of part of a session decodes little more than that
 /// part, and a writer holds no more in memory.
 const FRAME_ROWS: usize = 1 << 18;
+
+/// Samples that go from rows into columns at once: few enough to be still at hand, in the processor's own
+/// memory, for each column.
+const HAND_ROWS: usize = 1 << 10;
 
 /// A table could not be written.
 #[derive(Debug, Error)]
@@ -189,7 +195,10 @@ struct Filling<'a, W: Write> {
     table: &'a Table<'a>,
     layout: &'a Layout<'a>,
     encoder: Encoder<W>,
-    frame: Vec<Numbered>,
+    /// Samples that are not in the frame yet.
+    hand: Vec<Numbered>,
+    frame: Vec<Cells>,
+    frame_rows: usize,
     /// Samples seen so far, those selected of them, and those written.
     seen: u64,
     selected: u64,
@@ -206,12 +215,15 @@ impl<'a, W: Write> Filling<'a, W> {
         format: Format,
         file: W,
     ) -> PolarsResult<Self> {
-        let empty = layout.frame(&[])?;
+        let empty = layout.frame(layout.filling(0), 0)?;
         Ok(Self {
             table,
             layout,
             encoder: Encoder::new(format, file, &empty, table.metadata(layout))?,
-            frame: Vec::new(),
+            hand: Vec::with_capacity(HAND_ROWS),
+            // Grows to its size once: most sessions are no longer than a frame.
+            frame: layout.filling(0),
+            frame_rows: 0,
             seen: 0,
             selected: 0,
             written: 0,
@@ -230,27 +242,39 @@ impl<'a, W: Write> Filling<'a, W> {
             return;
         }
         if self.selected.is_multiple_of(self.table.selection.step()) {
-            self.frame.push(one);
+            self.hand.push(one);
         }
         self.selected += 1;
-        if self.frame.len() == FRAME_ROWS {
-            self.failure = self.flush().err();
+        if self.hand.len() == HAND_ROWS {
+            self.put_down();
+            if self.frame_rows == FRAME_ROWS {
+                self.failure = self.flush().err();
+            }
         }
     }
 
+    /// From the hand into the frame.
+    fn put_down(&mut self) {
+        self.layout.fill(&mut self.frame, &self.hand);
+        self.frame_rows += self.hand.len();
+        self.hand.clear();
+    }
+
     fn flush(&mut self) -> PolarsResult<()> {
-        let frame = self.layout.frame(&self.frame)?;
-        self.written += self.frame.len() as u64;
-        self.frame.clear();
-        self.encoder.write(frame)
+        let rows = std::mem::take(&mut self.frame_rows);
+        let next = self.layout.filling(rows);
+        let full = std::mem::replace(&mut self.frame, next);
+        self.written += rows as u64;
+        self.encoder.write(self.layout.frame(full, rows)?)
     }
 
     fn finish(mut self) -> PolarsResult<u64> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
+        self.put_down();
         // A table without rows has its columns all the same.
-        if !self.frame.is_empty() || self.written == 0 {
+        if self.frame_rows > 0 || self.written == 0 {
             self.flush()?;
         }
         self.encoder.finish()?;

@@ -154,10 +154,13 @@ pub(super) fn with_settings(
             "softening" if args.softening == usual.softening => {
                 args.softening = value.parse().map_err(|err| wrong(&err))?;
             }
-            "preconditioning" | "softening" => {}
+            "rate" if args.rate == usual.rate => {
+                args.rate = value.parse().map_err(|err| wrong(&err))?;
+            }
+            "preconditioning" | "rate" | "softening" => {}
             _ => {
                 return Err(Failure::usage(format!(
-                    "[simulated] has no setting '{name}'; it has preconditioning and softening"
+                    "[simulated] has no setting '{name}'; it has preconditioning, rate and softening"
                 )));
             }
         }
