@@ -12,5 +12,7 @@ mod moves;
 mod programs;
 #[path = "galil/streams.rs"]
 mod streams;
+#[path = "galil/upset.rs"]
+mod upset;
 #[path = "galil/wires.rs"]
 mod wires;
