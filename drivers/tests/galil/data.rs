@@ -52,7 +52,7 @@ fn a_recording_ends_by_itself_and_holds_what_clients_scale() {
     bench.tell("DM t[100];DM f[50];RA t[],f[];RD TIME,_AFX;RC 3");
     assert_eq!(
         bench.ask("RC 1;TC1"),
-        "? 80 Record mode already running\r\n:"
+        "?80 Record mode already running\r\n:"
     );
     bench.wait(1.0);
     assert_eq!((bench.number("_RC"), bench.number("_RD")), (0.0, 50.0));
@@ -60,8 +60,8 @@ fn a_recording_ends_by_itself_and_holds_what_clients_scale() {
     // Signed counts of +-10 V: 1.28 V without load, 1 mV of noise.
     let volts = bench.number("f[20]") * 10.0 / 32_768.0;
     assert!((volts - 1.28).abs() < 0.02, "{volts}");
-    assert_eq!(bench.ask("RC 1,51;TC1"), "? 84 Too many elements\r\n:");
-    assert_eq!(bench.ask("DM g[16000];TC1"), "? 66 Array space full\r\n:");
+    assert_eq!(bench.ask("RC 1,51;TC1"), "?84 Too many elements\r\n:");
+    assert_eq!(bench.ask("DM g[16000];TC1"), "?66 Array space full\r\n:");
 }
 
 #[test]
@@ -102,7 +102,7 @@ fn records_are_pushed_to_another_handle() {
     bench.emulator.connect(bench.now, 0);
     assert_eq!(
         bench.ask("DR 4,B;TC1"),
-        "? 126 Can not use closed Ethernet handle\r\n:"
+        "?126 Can not use closed Ethernet handle\r\n:"
     );
     bench.emulator.connect(bench.now, 1);
     bench.tell("DR 4,B");

@@ -80,11 +80,11 @@ fn stops_brake_and_aborts_do_not() {
     bench.tell("JGA=1332;BGA");
     assert_eq!(
         bench.ask("BGA;TC1"),
-        "? 21 Begin not valid while running\r\n:"
+        "?21 Begin not valid while running\r\n:"
     );
     assert_eq!(
         bench.ask("DPA=0;TC1"),
-        "? 7 Command not valid while running\r\n:"
+        "?7 Command not valid while running\r\n:"
     );
     bench.wait(1.0);
     let from = bench.number("_RPA");
@@ -135,7 +135,7 @@ fn switches_end_a_move_and_let_it_go_back() {
     assert!((-2.4..=-2.0).contains(&at), "{at}");
     assert_eq!(
         bench.ask("BGA;TC1"),
-        "? 22 Begin not possible due to Limit Switch\r\n:"
+        "?22 Begin not possible due to Limit Switch\r\n:"
     );
     bench.tell("PRA=1000;BGA");
     bench.settle();
@@ -165,7 +165,7 @@ fn a_contour_is_followed_from_a_full_buffer() {
     bench.tell("CMA;DT 2");
     assert_eq!(
         bench.ask("BGA;TC1"),
-        "? 18 Command not valid when contouring\r\n:"
+        "?18 Command not valid when contouring\r\n:"
     );
     // 4 cycles of 200 segments: a sine of 100 counts, whole increments of which nothing is lost.
     let place = |segment: u32| 100.0 * (f64::from(segment) * std::f64::consts::TAU / 200.0).sin();

@@ -29,7 +29,7 @@ fn a_program_comes_back_as_it_was_sent() {
     assert_eq!(bench.number("_XQ1"), -1.0);
     assert_eq!(
         bench.ask("XQ #B;TC1"),
-        "? 10 Empty program line or undefined label\r\n:"
+        "?10 Empty program line or undefined label\r\n:"
     );
     // A line that is refused is told at once.
     assert_eq!(bench.raw(0, b"DL\r"), b"");
@@ -80,7 +80,7 @@ fn waits_are_in_samples_of_976_microseconds() {
     assert_eq!(bench.number("w"), 0.0);
     assert_eq!(
         bench.ask("WT 10;TC1"),
-        "? 2 Command only valid from program\r\n:"
+        "?2 Command only valid from program\r\n:"
     );
 }
 

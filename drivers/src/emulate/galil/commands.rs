@@ -129,6 +129,10 @@ impl GalilEmulator {
                 continue;
             }
             if axis >= axes {
+                // ESRF BLISS asks eight axes of whatever board it has.
+                if field == "?" {
+                    continue;
+                }
                 return Err(ErrorCode::OPERAND);
             }
             all.push((axis, self.argument(field)?));

@@ -41,7 +41,7 @@ const fn axis_length(model: GalilModel) -> usize {
 pub fn lengths(model: GalilModel) -> String {
     let (general, coordinate) = if model.is_21x3() { (24, 16) } else { (52, 26) };
     format!(
-        " {}, {general}, {coordinate}, {}",
+        "{}, {general}, {coordinate}, {}",
         model.axes(),
         axis_length(model)
     )
@@ -145,8 +145,8 @@ mod tests {
 
     #[test]
     fn lengths_are_those_of_the_header_file() {
-        assert_eq!(lengths(GalilModel::Dmc4143), " 4, 52, 26, 36");
-        assert_eq!(lengths(GalilModel::Dmc2143), " 4, 24, 16, 28");
+        assert_eq!(lengths(GalilModel::Dmc4143), "4, 52, 26, 36");
+        assert_eq!(lengths(GalilModel::Dmc2143), "4, 24, 16, 28");
         let axes = vec![Axis::new(true); 8];
         let general = General::default();
         assert_eq!(record(GalilModel::Dmc4183, &general, &axes, &[]).len(), 370);

@@ -92,6 +92,8 @@ impl GalilEmulator {
                 Some(value) if (0.0..=65_535.0).contains(&value) => self.outputs = value as u16,
                 _ => return Err(ErrorCode::OUT_OF_RANGE),
             },
+            // The addresses that the DMC-30010's answer to `TH` tells too.
+            "IA" if arguments == "?" => return Ok(Answer::Text("127, 0, 0, 1".to_owned())),
             "CO" if !self.settings.model.is_40x0() => return Err(ErrorCode::UNRECOGNIZED),
             // Stored on the controller; nothing here depends on them.
             "CO" | "AO" | "DQ" | "TW" | "TR" | "IA" | "IK" | "SM" | "DH" | "PW" => {
@@ -129,14 +131,14 @@ impl GalilEmulator {
     /// `TC`, `TC0`: the number; `TC1`: number and text. Telling clears it.
     fn tell_error(&mut self, arguments: &str) -> Result<Answer, ErrorCode> {
         let has_text = match arguments {
-            "" | "0" => false,
+            "" | "0" | "?" => false,
             "1" => true,
             _ => return Err(ErrorCode::OUT_OF_RANGE),
         };
         let code = std::mem::replace(&mut self.error, ErrorCode(0));
         let text = if has_text { code.text() } else { "" };
         Ok(Answer::Text(
-            format!(" {} {text}", code.0).trim_end().to_owned(),
+            format!("{} {text}", code.0).trim_end().to_owned(),
         ))
     }
 
