@@ -145,11 +145,11 @@ fn run(streams: u64, seed: u64) {
     assert_eq!(bench.ask("MG 1"), " 1.0000\r\n:");
 }
 
-/// `PALPATE_STREAMS` asks for another number of streams than ten thousand.
+/// `PALPATE_STREAMS` asks for another number of streams than a hundred thousand.
 #[test]
 fn streams_of_random_bytes_do_no_harm() {
     let streams = std::env::var("PALPATE_STREAMS");
-    let streams = streams.map_or(10_000, |count| count.parse().expect("a number of streams"));
+    let streams = streams.map_or(100_000, |count| count.parse().expect("a number of streams"));
     run(streams, 1);
     println!("{streams} streams of random bytes");
 }
