@@ -157,6 +157,11 @@ const TRANSCRIPT: &[(&str, &str, &str)] = &[
         "KP ?,?,?,?,?,?,?,?;TB ?\r",
         " 6.000, 6.000, 6.000, 6.000\r\n: 0\r\n:",
     ),
+    (
+        "DMC-40x0 command reference, SP: range of steppers and of servos",
+        "SPA=6000002;SPB=22000000\r",
+        "?:",
+    ),
     ("a number asked for by name", "b=3;b=\r", ": 3.0000\r\n:"),
     (
         "a string of six characters in a number",
@@ -208,6 +213,25 @@ fn it_does_not_matter_how_bytes_are_split_or_lines_end() {
                 "{end:?} at {at}"
             );
         }
+    }
+}
+
+/// What EPICS Galil-3-6, ESRF BLISS, TMT galil-io and small clients send when they connect and look around.
+#[test]
+fn what_clients_send_is_accepted() {
+    let mut bench = Bench::serial(GalilModel::Dmc4143);
+    let words = "WH|QZ|DR 0|IHT=>-3|TH|ID|\x12\x16|CF I|CF S|CW 1|CW 2|EO 0|HX0|HX7|TC|TC0|TC1|TB|TI|TB ?|TI ?|TM ?|IA?\
+        |TL ?|SC|TS|TT|TV|TE|CN -1,-1|SB 1|CB 1|AO 1,0.5|AQ 1,2|AGA=0|LCA=1|YAA=2|YBA=200|OEA=0|ERA=1000|KSA=2|MTA=-2.5\
+        |LDA=0|DEA=5|FEB|HMB|STB|ABC|SHA|MOA|x=1|IT*=1|VF 10.4|PF 10.0|LV|LA|LL";
+    for line in words.split('|').map(str::trim) {
+        let answer = bench.ask(line);
+        // `ABC` is a variable's name to a client, and to the controller `AB` with an axis.
+        assert_eq!(answer.ends_with(':'), line != "ABC", "{line}: {answer}");
+    }
+    let operands = "_BGA _MOA _TPA _RPA _TDA _TEA _TVA _SCA _LFA _LRA _HMA _MTA _KSA _YAA _LDA _OEA _ERA _AQ1 _DQ0 _CN0 \
+        _CA _TM _TC _XQ0 _NO _BN _AB TIME @AN[1] @IN[1] @OUT[1] _PAA _PRA _JGA _SPA _ACA _FLA _BLA _HX0 _ED _DM _BGS";
+    for operand in operands.split_whitespace() {
+        bench.number(operand);
     }
 }
 

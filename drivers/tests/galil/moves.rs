@@ -61,6 +61,25 @@ fn a_move_follows_its_trapezoid_and_pulses_come_later() {
 }
 
 #[test]
+fn a_relative_move_is_made_again_and_an_absolute_one_is_not() {
+    let mut bench = ready();
+    bench.tell("PRA=100");
+    for place in [100.0, 200.0] {
+        bench.tell("BGA");
+        bench.settle();
+        assert_eq!(bench.number("_RPA"), place);
+    }
+    bench.tell("PAA=50");
+    for _ in 0..2 {
+        bench.tell("BGA");
+        bench.settle();
+        assert_eq!((bench.number("_RPA"), bench.number("_SCA")), (50.0, 1.0));
+    }
+    bench.tell("PRA=2147483647;MG 1");
+    assert_eq!(bench.ask("BGA;TC1"), "?6 Number out of range\r\n:");
+}
+
+#[test]
 fn the_clock_counts_976_microseconds() {
     let mut bench = ready();
     let start = bench.number("TIME");

@@ -49,8 +49,10 @@ pub enum Motion {
 /// What `BG` will start.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Prepared {
-    /// `PA`, `PR`.
+    /// `PA`.
     Target(f64),
+    /// `PR`: again with every `BG`.
+    Relative(f64),
     /// `JG`.
     Jog(f64),
     /// `FE`, `HM`.
@@ -182,7 +184,10 @@ impl Axis {
         let shift = self.filtered - counts;
         self.profile.place = counts;
         self.filtered = counts;
-        self.prepared = Prepared::Target(counts);
+        // `PA?` tells the place; other motions are as they were prepared.
+        if let Prepared::Target(target) = &mut self.prepared {
+            *target = counts;
+        }
         Ok(shift)
     }
 
@@ -235,6 +240,13 @@ impl Axis {
         };
         let (motion, side) = match self.prepared {
             Prepared::Target(target) => (Motion::Target(target), target - self.profile.place),
+            Prepared::Relative(way) => {
+                let target = self.profile.place.round() + way;
+                if target.abs() > COUNTS_MAX {
+                    return Err(ErrorCode::OUT_OF_RANGE);
+                }
+                (Motion::Target(target), way)
+            }
             Prepared::Jog(speed) => (Motion::Jog(speed), speed),
             Prepared::Edge { is_homing } => {
                 let motion = Motion::Edge {

@@ -4,7 +4,7 @@ use super::errors::ErrorCode;
 use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
 use super::scope::axis_of;
-use super::settings::Setting;
+use super::settings::{STEPPER_SPEED_MAX, Setting};
 use super::{Answer, GalilEmulator, Origin};
 
 /// Words whose arguments are numbers of axes, beside the [`Setting`]s.
@@ -199,6 +199,12 @@ impl GalilEmulator {
                 }
                 Argument::Number(value) => {
                     let value = setting.taken(value, self.settings.model, self.clock.tm())?;
+                    if setting == Setting::Speed
+                        && self.axes[axis].is_stepper()
+                        && value > STEPPER_SPEED_MAX
+                    {
+                        return Err(ErrorCode::OUT_OF_RANGE);
+                    }
                     if setting == Setting::MotorType && self.axes[axis].is_running() {
                         return Err(ErrorCode::RUNNING);
                     }

@@ -5,11 +5,8 @@ use super::commands::{Argument, listed};
 use super::errors::ErrorCode;
 use super::format::Format;
 use super::program::Thread;
-use super::settings::Setting;
+use super::settings::{STEPPER_SPEED_MAX, Setting};
 use super::{Answer, GalilEmulator, Origin};
-
-/// Fastest jog of a stepper axis in counts/s (DMC-40x0 command reference, `SP`, `JG`).
-const JOG_MAX: f64 = 6_000_000.0;
 
 impl GalilEmulator {
     /// A command about axes; `None` when it is another one.
@@ -51,20 +48,14 @@ impl GalilEmulator {
             let tm = self.clock.tm();
             let state = &mut self.axes[axis];
             match word {
-                "JG" if value.abs() > JOG_MAX => return Err(ErrorCode::OUT_OF_RANGE),
+                "JG" if value.abs() > STEPPER_SPEED_MAX => return Err(ErrorCode::OUT_OF_RANGE),
                 "JG" => state.jog(value, tm),
                 "DE" if !state.is_stepper() => {}
                 "DE" => state.encoder = value,
                 // A new target needs a new begin.
                 "PA" | "PR" if state.is_running() => return Err(ErrorCode::RUNNING),
                 "PA" => state.prepared = Prepared::Target(value),
-                "PR" => {
-                    let target = state.profile.place.round() + value;
-                    if target.abs() > COUNTS_MAX {
-                        return Err(ErrorCode::OUT_OF_RANGE);
-                    }
-                    state.prepared = Prepared::Target(target);
-                }
+                "PR" => state.prepared = Prepared::Relative(value),
                 _ => {
                     let shift = state.define(value)?;
                     self.shift(axis, shift);

@@ -45,7 +45,10 @@ impl GalilEmulator {
             b"LR" => truth(axis.inputs.reverse),
             b"HM" => truth(axis.inputs.home),
             b"PA" => self.target(index),
-            b"PR" => self.target(index) - axis.profile.place,
+            b"PR" => match axis.prepared {
+                Prepared::Relative(way) => way,
+                _ => 0.0,
+            },
             b"JG" => match axis.prepared {
                 Prepared::Jog(speed) => speed,
                 _ => 0.0,

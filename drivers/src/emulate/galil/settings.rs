@@ -23,6 +23,9 @@ macro_rules! settings {
 /// Switches a software limit off, forwards and backwards (DMC-40x0 command reference, `FL`, `BL`).
 pub const NO_LIMIT: f64 = 2_147_483_647.0;
 
+/// Fastest pulses in counts/s (DMC-40x0 command reference, `SP`).
+pub const STEPPER_SPEED_MAX: f64 = 6_000_000.0;
+
 // First values of a controller after its reset; ranges of the DMC-40x0 and DMC-30010 command references. Those of
 // settings that nothing here depends on are only wide enough to hold what clients send.
 settings! {
