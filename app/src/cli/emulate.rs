@@ -50,7 +50,7 @@ struct WireArgs {
     /// Latency timer of a USB converter in ms: it keeps a packet that is not full for so long
     #[arg(long, value_name = "MS", default_value_t = 0, value_parser = clap::value_parser!(u32).range(0..=255))]
     latency_ms: u32,
-    /// A fault, KIND@SECONDS[:DURATION]: garbage, drop, duplicate, partial, late, deaf, mute, reset, disconnect, stuck, saturated or wrong-device; may be repeated. Lines KIND[:DURATION] on standard input begin at once
+    /// A fault, KIND@SECONDS[:DURATION]: garbage, drop, duplicate, partial, late, deaf, mute, reset, disconnect, stuck, saturated or wrong-device; may be repeated. Lines KIND[:DURATION] on standard input begin at once; so do load GRAMS, mount NUMBER and unmount
     #[arg(long, value_name = "FAULT")]
     fault: Vec<ScheduledFault>,
     /// Print one JSON object when it is ready
@@ -167,6 +167,11 @@ fn emulate(
         Told::Fault(turn) => {
             let verb = if turn.is_on { "begins" } else { "ends" };
             output.note(&format!("{} {verb}", turn.kind));
+        }
+        Told::Done(order) => {
+            if let Some(told) = order.told() {
+                output.note(&told);
+            }
         }
         Told::Refused(sentence) => output.note(&sentence),
     };

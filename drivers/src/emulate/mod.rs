@@ -6,6 +6,7 @@
 
 pub mod faults;
 pub mod galil;
+pub mod orders;
 mod plant;
 mod pty;
 pub mod serve;
@@ -15,6 +16,7 @@ pub use faults::{DeviceFault, FaultError, ScheduledFault};
 pub use plant::Plant;
 
 use palpate_model::Nanos;
+use palpate_model::rig::HandAction;
 
 /// A device as seen from its wires.
 ///
@@ -48,4 +50,7 @@ pub trait Device: Send {
 
     /// A fault of the device itself begins or ends; [`DeviceFault::Reset`] only begins.
     fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
+
+    /// A person does something at the bench.
+    fn by_hand(&mut self, now: Nanos, action: HandAction);
 }

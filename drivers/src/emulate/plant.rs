@@ -1,6 +1,7 @@
 //! What every emulated device moves and feels: the slide of the simulated rig, its bench and its load cell.
 
 use crate::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
+use palpate_model::rig::HandAction;
 use palpate_model::{Newtons, Position, Seconds, Volts};
 
 /// The slide with the probe, what stands before it, and the signal of the cell.
@@ -68,6 +69,11 @@ impl Plant {
         self.counter_zero = self.counter_zero.moved_by(by_mm);
     }
 
+    /// A person puts weights on the cell, mounts a specimen or takes it out.
+    pub fn by_hand(&mut self, action: HandAction) {
+        self.bench.by_hand(action);
+    }
+
     /// The cell's amplified signal at the newest step.
     #[must_use]
     pub fn volts(&self) -> Volts {
@@ -129,6 +135,13 @@ mod tests {
         }
         assert!(plant.force().0 > 0.5, "{:?}", plant.force());
         assert!(plant.volts().0 > free.0 + 0.05);
+
+        plant.by_hand(HandAction::Unmount);
+        plant.advance(at, dt);
+        assert_eq!(plant.force().0, 0.0);
+        plant.by_hand(HandAction::LoadCell { mass_g: 400.0 });
+        plant.advance(at, dt);
+        assert!(plant.volts().0 > free.0 + 0.05 && plant.force().0 == 0.0);
         plant.spoil(Some(CellFault::Stuck));
         let stuck = plant.volts();
         plant.advance(at - 5.0, dt);

@@ -5,6 +5,7 @@
 
 use super::Device;
 use super::faults::{FaultKind, FaultPlan, ScheduledFault, Turn};
+use super::orders::Order;
 use super::pty::Pty;
 use super::wire::Way;
 use palpate_model::Nanos;
@@ -51,12 +52,14 @@ pub struct ServeOptions {
 }
 
 /// What happens to an emulated device.
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum Told {
     /// Clients can connect here: a path or an address.
     Ready(String),
     /// A fault has begun or ended.
     Fault(Turn),
+    /// An order was carried out.
+    Done(Order),
     /// An order was not understood; the sentence says what would be.
     Refused(String),
 }
@@ -112,8 +115,8 @@ enum Plug {
     Pulled,
 }
 
-/// Lets clients talk to a device until `stop` is set. `orders` are lines `KIND[:DURATION]`, each a fault that begins
-/// at once.
+/// Lets clients talk to a device until `stop` is set. `orders` are lines that [`Order::parse`] reads, each
+/// carried out at once.
 pub fn serve(
     device: &mut dyn Device,
     options: &ServeOptions,
@@ -125,8 +128,13 @@ pub fn serve(
     tell(Told::Ready(server.address.clone()));
     while !stop.load(Ordering::Relaxed) {
         for order in orders.try_iter() {
-            match ScheduledFault::parse(&order, Some(server.now())) {
-                Ok(fault) => server.faults.add(fault),
+            let now = server.now();
+            match Order::parse(&order, now) {
+                Ok(Order::Fault(fault)) => server.faults.add(fault),
+                Ok(order @ Order::Hand(action)) => {
+                    server.device.by_hand(now, action);
+                    tell(Told::Done(order));
+                }
                 Err(err) => tell(Told::Refused(err.to_string())),
             }
         }

@@ -45,6 +45,7 @@ use contour::Contour;
 use errors::ErrorCode;
 use format::Format;
 use memory::Memory;
+use palpate_model::rig::HandAction;
 use palpate_model::{Nanos, Seconds};
 use program::{Program, Thread};
 use record::Recorder;
@@ -324,5 +325,10 @@ impl Device for GalilEmulator {
             DeviceFault::Saturated => self.plant.spoil(is_on.then_some(CellFault::Saturated)),
             DeviceFault::WrongDevice => self.is_wrong = is_on,
         }
+    }
+
+    fn by_hand(&mut self, now: Nanos, action: HandAction) {
+        self.advance(now);
+        self.plant.by_hand(action);
     }
 }
