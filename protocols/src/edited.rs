@@ -78,20 +78,23 @@ pub fn outline(path: &Path) -> Result<Passing, SourceError> {
 }
 
 impl Passing {
-    /// Hands out every sample that was there when the session was first read, edits made, in order.
-    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&Row)) -> Result<(), ReadError> {
+    /// Hands out every sample that was there when the session was first read, edits made, in order, some at a time.
+    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
         let mut index = 0;
+        let mut rows = Vec::new();
         let mut each = |block: &Block| {
-            for mut row in block.rows() {
-                // One that is being recorded may have grown.
-                if index < self.outline.samples {
-                    for shift in &self.shifts {
-                        shift.apply(index, &mut row);
-                    }
-                    visit(&row);
+            rows.clear();
+            rows.extend(block.rows());
+            // One that is being recorded may have grown.
+            let left = self.outline.samples.saturating_sub(index);
+            rows.truncate(usize::try_from(left).unwrap_or(usize::MAX));
+            for (number, row) in (index..).zip(&mut rows) {
+                for shift in &self.shifts {
+                    shift.apply(number, row);
                 }
-                index += 1;
             }
+            index += rows.len() as u64;
+            visit(&rows);
         };
         Session::scan(path, &mut each).map(|_outline| ())
     }

@@ -4,8 +4,8 @@
 //! prints one JSON object, times in s; the tables stay in FOLDER.
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
-use palpate_sessions::Session;
 use palpate_sessions::export::{Beside, Feed, Format, Selection, Table};
+use palpate_sessions::{Block, Session};
 use std::path::Path;
 use std::time::Instant;
 
@@ -30,13 +30,16 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
         selection: &Selection::default(),
     };
     let from_log = timed(&table, &folder.join("from_log.parquet"), &mut |take| {
-        Session::scan(session, &mut |block| {
-            block.rows().for_each(|row| take(&row))
-        })
-        .map(|_| ())
+        let mut rows = Vec::new();
+        let mut each = |block: &Block| {
+            rows.clear();
+            rows.extend(block.rows());
+            take(&rows);
+        };
+        Session::scan(session, &mut each).map(|_| ())
     })?;
     let from_memory = timed(&table, &folder.join("from_memory.parquet"), &mut |take| {
-        whole.rows.iter().for_each(&mut *take);
+        take(&whole.rows);
         Ok(())
     })?;
     let rows = whole.rows.len();

@@ -149,7 +149,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         };
         let all = read.rows.len() as u64;
         told.write(args, &table, all, output, &mut |visit| {
-            read.rows.iter().for_each(visit);
+            visit(&read.rows);
             Ok(())
         })?;
     } else {
@@ -211,13 +211,11 @@ impl Told {
         self.path = args.to.join(name);
         let bar = output.share_bar(samples);
         let mut done = 0u64;
-        let mut feed = |visit: &mut dyn FnMut(&_)| {
-            feed(&mut |row| {
-                done += 1;
-                if done.is_multiple_of(1 << 16) {
-                    bar.set_position(done);
-                }
-                visit(row);
+        let mut feed = |visit: &mut dyn FnMut(&[_])| {
+            feed(&mut |rows| {
+                done += rows.len() as u64;
+                bar.set_position(done);
+                visit(rows);
             })
         };
         let written = table.write(args.format(), &self.path, &mut feed);

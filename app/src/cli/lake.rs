@@ -50,6 +50,6 @@ fn one(lake: &Path, session: &Path) -> Result<Added, Failure> {
     let told = Told {
         verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())),
     };
-    let mut feed = |visit: &mut dyn FnMut(&_)| passing.rows(session, visit);
+    let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
     add(lake, &passing.outline, told, &mut feed).map_err(failure)
 }

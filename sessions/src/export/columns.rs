@@ -201,8 +201,19 @@ pub(super) struct Layout<'a> {
     manifest: &'a Manifest,
 }
 
-/// A sample of the table: its number in the session, its time in s and itself.
-pub(super) type Numbered = (u64, f64, Row);
+/// Samples of the table, which are as many numbers in the session as rows.
+#[derive(Clone, Copy)]
+pub(super) struct Samples<'a> {
+    pub numbers: &'a [u64],
+    pub rows: &'a [Row],
+    /// Tick of the session's first sample.
+    pub first_tick: u64,
+}
+
+/// Time in s of a sample. A controller that restarted counts from zero again: its time is negative, not a failure.
+pub(super) fn time_of(manifest: &Manifest, row: &Row, first_tick: u64) -> f64 {
+    manifest.time_of(row.tick.wrapping_sub(first_tick) as i64).0
+}
 
 impl<'a> Layout<'a> {
     /// The usual columns and those beside, or those that are named, in that order; or the name there is no
@@ -275,9 +286,9 @@ impl<'a> Layout<'a> {
     }
 
     /// Adds samples to a frame.
-    pub fn fill(&self, frame: &mut [Cells], rows: &[Numbered]) {
+    pub fn fill(&self, frame: &mut [Cells], samples: Samples) {
         for (cells, column) in frame.iter_mut().zip(&self.columns) {
-            cells.extend(rows, column.field, self.beside);
+            cells.extend(samples, column.field, self);
         }
     }
 
@@ -322,34 +333,35 @@ impl Cells {
         }
     }
 
-    fn extend(&mut self, rows: &[Numbered], field: Field, beside: &Beside) {
+    fn extend(&mut self, samples: Samples, field: Field, layout: &Layout) {
+        let rows = samples.rows.iter();
         match self {
             Self::Same(_, count) => *count += rows.len(),
-            Self::Numbers(cells) => cells.extend(rows.iter().map(|(_, t, _)| *t)),
-            Self::Wide(cells) => cells.extend(rows.iter().map(|(number, _, row)| match field {
-                Field::Tick => row.tick,
-                Field::Host => row.host.0,
-                _ => *number,
-            })),
-            Self::Whole(cells) => cells.extend(rows.iter().map(|(_, _, row)| match field {
-                Field::Cycle => row.cycle,
-                _ => row.status,
-            })),
-            Self::Words(cells) => {
-                cells.extend_values(rows.iter().map(|(_, _, row)| row.phase.name()));
+            Self::Numbers(cells) => {
+                cells.extend(rows.map(|row| time_of(layout.manifest, row, samples.first_tick)));
             }
-            Self::MaybeNumbers(cells) => match field {
-                Field::Depth => cells.extend(rows.iter().map(|(_, _, row)| row.depth)),
-                Field::Force => cells.extend(rows.iter().map(|(_, _, row)| row.force)),
-                Field::Beside(one) => {
-                    let values = &beside.columns[one].2;
-                    let of = |(number, _, _): &Numbered| *values.get(*number as usize)?;
-                    cells.extend(rows.iter().map(of));
-                }
-                _ => cells.extend(rows.iter().map(|(_, _, row)| row.volts)),
+            Self::Wide(cells) => match field {
+                Field::Tick => cells.extend(rows.map(|row| row.tick)),
+                Field::Host => cells.extend(rows.map(|row| row.host.0)),
+                _ => cells.extend(samples.numbers),
             },
-            Self::MaybeWide(cells) => cells.extend(rows.iter().map(|(_, _, row)| row.pulses)),
-            Self::MaybeWhole(cells) => cells.extend(rows.iter().map(|(_, _, row)| row.counts)),
+            Self::Whole(cells) => match field {
+                Field::Cycle => cells.extend(rows.map(|row| row.cycle)),
+                _ => cells.extend(rows.map(|row| row.status)),
+            },
+            Self::Words(cells) => cells.extend_values(rows.map(|row| row.phase.name())),
+            Self::MaybeNumbers(cells) => match field {
+                Field::Depth => cells.extend(rows.map(|row| row.depth)),
+                Field::Force => cells.extend(rows.map(|row| row.force)),
+                Field::Beside(one) => {
+                    let values = &layout.beside.columns[one].2;
+                    let of = |number: &u64| *values.get(*number as usize)?;
+                    cells.extend(samples.numbers.iter().map(of));
+                }
+                _ => cells.extend(rows.map(|row| row.volts)),
+            },
+            Self::MaybeWide(cells) => cells.extend(rows.map(|row| row.pulses)),
+            Self::MaybeWhole(cells) => cells.extend(rows.map(|row| row.counts)),
         }
     }
 

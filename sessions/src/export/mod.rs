@@ -21,7 +21,7 @@ use crate::log::ReadError;
 use crate::manifest::Manifest;
 use crate::record::Row;
 use crate::text::sha256;
-use columns::{Cells, Layout, Numbered};
+use columns::{Cells, Layout, Samples, time_of};
 use encode::Metadata;
 use polars::prelude::{PolarsError, PolarsResult};
 use std::io::{self, Write};
@@ -98,8 +98,8 @@ pub struct Table<'a> {
     pub selection: &'a Selection,
 }
 
-/// Gives every sample of a session in order to what it is handed.
-pub type Feed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&Row)) -> Result<(), ReadError>;
+/// Gives every sample of a session in order, some at a time, to what it is handed.
+pub type Feed<'f> = &'f mut dyn FnMut(&mut dyn FnMut(&[Row])) -> Result<(), ReadError>;
 
 impl Table<'_> {
     /// Writes the table and, beside it, its data dictionary ([`dictionary_path`]), and tells how many rows
@@ -157,7 +157,7 @@ impl Table<'_> {
             source,
         };
         let mut filling = Filling::new(self, layout, format, file).map_err(failed)?;
-        feed(&mut |row| filling.take(row))?;
+        feed(&mut |rows| filling.take(rows))?;
         filling.finish().map_err(failed)
     }
 
@@ -195,8 +195,9 @@ struct Filling<'a, W: Write> {
     table: &'a Table<'a>,
     layout: &'a Layout<'a>,
     encoder: Encoder<W>,
-    /// Samples that are not in the frame yet.
-    hand: Vec<Numbered>,
+    /// Those selected of the samples at hand.
+    numbers: Vec<u64>,
+    rows: Vec<Row>,
     frame: Vec<Cells>,
     frame_rows: usize,
     /// Samples seen so far, those selected of them, and those written.
@@ -220,7 +221,8 @@ impl<'a, W: Write> Filling<'a, W> {
             table,
             layout,
             encoder: Encoder::new(format, file, &empty, table.metadata(layout))?,
-            hand: Vec::with_capacity(HAND_ROWS),
+            numbers: Vec::new(),
+            rows: Vec::new(),
             // Grows to its size once: most sessions are no longer than a frame.
             frame: layout.filling(0),
             frame_rows: 0,
@@ -232,32 +234,53 @@ impl<'a, W: Write> Filling<'a, W> {
         })
     }
 
-    fn take(&mut self, row: &Row) {
-        let first_tick = *self.first_tick.get_or_insert(row.tick);
-        // A controller that restarted counts from zero again: its time is negative, not a failure.
-        let ticks = row.tick.wrapping_sub(first_tick) as i64;
-        let one = (self.seen, self.table.manifest.time_of(ticks).0, *row);
-        self.seen += 1;
-        if self.failure.is_some() || !self.table.selection.takes(&one) {
+    fn take(&mut self, mut rows: &[Row]) {
+        let Some(first) = rows.first() else {
             return;
-        }
-        if self.selected.is_multiple_of(self.table.selection.step()) {
-            self.hand.push(one);
-        }
-        self.selected += 1;
-        if self.hand.len() == HAND_ROWS {
-            self.put_down();
+        };
+        let first_tick = *self.first_tick.get_or_insert(first.tick);
+        while !rows.is_empty() && self.failure.is_none() {
+            let count = rows.len().min(HAND_ROWS).min(FRAME_ROWS - self.frame_rows);
+            let (now, rest) = rows.split_at(count);
+            self.select(now, first_tick);
+            let samples = Samples {
+                numbers: &self.numbers,
+                rows: if self.numbers.len() == count {
+                    now
+                } else {
+                    &self.rows
+                },
+                first_tick,
+            };
+            self.layout.fill(&mut self.frame, samples);
+            self.frame_rows += self.numbers.len();
             if self.frame_rows == FRAME_ROWS {
                 self.failure = self.flush().err();
             }
+            rows = rest;
         }
     }
 
-    /// From the hand into the frame.
-    fn put_down(&mut self) {
-        self.layout.fill(&mut self.frame, &self.hand);
-        self.frame_rows += self.hand.len();
-        self.hand.clear();
+    /// Picks what is wanted of some rows.
+    fn select(&mut self, rows: &[Row], first_tick: u64) {
+        let first = self.seen;
+        self.seen += rows.len() as u64;
+        self.numbers.clear();
+        self.rows.clear();
+        let selection = self.table.selection;
+        if !selection.is_part() {
+            self.numbers.extend(first..self.seen);
+            return;
+        }
+        for (number, row) in (first..).zip(rows) {
+            if selection.takes(time_of(self.table.manifest, row, first_tick), row) {
+                if self.selected.is_multiple_of(selection.step()) {
+                    self.numbers.push(number);
+                    self.rows.push(*row);
+                }
+                self.selected += 1;
+            }
+        }
     }
 
     fn flush(&mut self) -> PolarsResult<()> {
@@ -272,7 +295,6 @@ impl<'a, W: Write> Filling<'a, W> {
         if let Some(failure) = self.failure.take() {
             return Err(failure);
         }
-        self.put_down();
         // A table without rows has its columns all the same.
         if self.frame_rows > 0 || self.written == 0 {
             self.flush()?;

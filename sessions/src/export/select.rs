@@ -1,6 +1,6 @@
 //! Which samples a table holds.
 
-use super::columns::Numbered;
+use crate::record::Row;
 use palpate_model::rig::Phase;
 use serde::Serialize;
 
@@ -31,12 +31,12 @@ struct Told<'a> {
 }
 
 impl Selection {
-    /// Whether a sample is wanted, apart from [`Self::every`].
-    pub(super) fn takes(&self, (_, t, row): &Numbered) -> bool {
+    /// Whether a sample of this time in s is wanted, apart from [`Self::every`].
+    pub(super) fn takes(&self, t: f64, row: &Row) -> bool {
         (self.phases.is_empty() || self.phases.contains(&row.phase))
             && (self.cycles.is_empty() || self.cycles.contains(&row.cycle))
-            && self.from_s.is_none_or(|from| *t >= from)
-            && self.to_s.is_none_or(|to| *t <= to)
+            && self.from_s.is_none_or(|from| t >= from)
+            && self.to_s.is_none_or(|to| t <= to)
     }
 
     /// Whether some samples are left out.

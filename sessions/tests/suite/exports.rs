@@ -22,7 +22,7 @@ fn export(
         selection,
     };
     table.write(format, path, &mut |visit| {
-        session.rows.iter().for_each(visit);
+        visit(&session.rows);
         Ok(())
     })
 }

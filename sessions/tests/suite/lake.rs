@@ -46,7 +46,7 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
         notes: session.notes.clone(),
     };
     add(lake, &outline, told, &mut |visit| {
-        session.rows.iter().for_each(visit);
+        visit(&session.rows);
         Ok(())
     })
 }

@@ -400,7 +400,7 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         notes: session.notes.clone(),
     };
     lake::add(folder, &outline, lake::Told::default(), &mut |visit| {
-        session.rows.iter().for_each(visit);
+        visit(&session.rows);
         Ok(())
     })
     .expect("a folder to write in");
