@@ -3,9 +3,10 @@
 //! This crate turns commands into bytes and bytes into readings. It never decides: what to do
 //! with a reading is the engine's business, and nothing here starts a move by itself.
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
-//! no hardware. [`doubles`] is for tests only.
+//! no hardware. [`doubles`] is for tests only, [`emulate`] answers like a device on a wire.
 
 pub mod doubles;
+pub mod emulate;
 pub mod open;
 pub mod rig;
 pub mod serial;

@@ -7,6 +7,7 @@ mod catalog;
 mod compliance;
 mod daily_check;
 mod doctor;
+mod emulate;
 mod export;
 mod extremes;
 mod find;
@@ -112,6 +113,9 @@ enum Command {
     Mask(analysis::MaskArgs),
     /// Let an analysis count no more; its record stays
     Withdraw(analysis::WithdrawArgs),
+    /// Answer like a controller on a wire, with the simulated bench behind it
+    #[command(subcommand)]
+    Emulate(emulate::EmulateCommand),
     /// Print what completes palpate's commands in a shell
     Completions(shell::CompletionsArgs),
     /// Print the manual page, or write one for every command
@@ -224,6 +228,9 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
         Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
+        Some(Command::Emulate(command)) => {
+            with(command.is_json(), |out| emulate::run(&command, out))
+        }
         Some(Command::Completions(args)) => with(args.json, |out| {
             shell::completions(&args, out);
             Ok(())

@@ -17,24 +17,15 @@ use palpate_protocols::plans::RampHold;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::folder::{HolderLock, library_folder};
 
-/// The rig to use.
+/// The bench of a simulated rig or behind an emulated device.
 #[derive(Clone, Debug, Args)]
-pub struct RigArgs {
-    /// Rig: sim, or sim:NAME for a simulated rig that only one program may hold
-    #[arg(long, default_value = "sim")]
-    pub rig: String,
+pub struct BenchArgs {
     /// Simulated rig: lab (real cell, converter, drift) or ideal (linear cell, white noise)
     #[arg(long, default_value = "lab")]
     pub profile: SimProfile,
     /// Simulated rig: its randomness; the same seed gives the same run
     #[arg(long, default_value_t = 1)]
     pub seed: u64,
-    /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
-    #[arg(long, default_value = "nominal")]
-    pub clock: SimClock,
-    /// Simulated rig: samples a second, 1000 to 20000
-    #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
-    pub rate: SimRate,
     /// Simulated rig: largest share of its elastic force that tissue loses by having been deeper, in percent
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub softening: SimSoftening,
@@ -53,6 +44,55 @@ pub struct RigArgs {
     /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
+}
+
+impl Default for BenchArgs {
+    fn default() -> Self {
+        Self {
+            profile: SimProfile::Lab,
+            seed: 1,
+            softening: SimSoftening::default(),
+            noise: SimNoise::default(),
+            stiffness: SimStiffness::default(),
+            thickness: SimThickness::default(),
+            compliance: SimCompliance::default(),
+            preconditioning: SimPreconditioning::default(),
+        }
+    }
+}
+
+impl BenchArgs {
+    /// The settings, with the usual clock.
+    #[must_use]
+    pub fn settings(&self) -> SimSettings {
+        SimSettings {
+            profile: self.profile,
+            seed: self.seed,
+            softening: self.softening,
+            noise: self.noise,
+            stiffness: self.stiffness,
+            thickness: self.thickness,
+            compliance: self.compliance,
+            preconditioning: self.preconditioning,
+            ..SimSettings::default()
+        }
+    }
+}
+
+/// The rig to use.
+#[derive(Clone, Debug, Args)]
+pub struct RigArgs {
+    /// Rig: sim, or sim:NAME for a simulated rig that only one program may hold
+    #[arg(long, default_value = "sim")]
+    pub rig: String,
+    #[command(flatten)]
+    pub bench: BenchArgs,
+    /// Simulated rig: controller clock, nominal (1000 us) or galil (976 us)
+    #[arg(long, default_value = "nominal")]
+    pub clock: SimClock,
+    /// Simulated rig: samples a second, 1000 to 20000
+    #[arg(long, default_value = "1000", value_name = "PER_SECOND")]
+    pub rate: SimRate,
     /// Furthest position from home, in mm: a little before the base, so that no search meets it
     #[arg(long, value_name = "MM")]
     pub travel_max: Option<f64>,
@@ -68,16 +108,9 @@ impl Default for RigArgs {
     fn default() -> Self {
         Self {
             rig: "sim".into(),
-            profile: SimProfile::Lab,
-            seed: 1,
+            bench: BenchArgs::default(),
             clock: SimClock::Nominal,
             rate: SimRate::default(),
-            softening: SimSoftening::default(),
-            noise: SimNoise::default(),
-            stiffness: SimStiffness::default(),
-            thickness: SimThickness::default(),
-            compliance: SimCompliance::default(),
-            preconditioning: SimPreconditioning::default(),
             travel_max: None,
             calibration: None,
             time_scale: TimeScale::Factor(1.0),
@@ -90,16 +123,9 @@ impl RigArgs {
     #[must_use]
     pub fn settings(&self) -> SimSettings {
         SimSettings {
-            profile: self.profile,
-            seed: self.seed,
             clock: self.clock,
             rate: self.rate,
-            softening: self.softening,
-            noise: self.noise,
-            stiffness: self.stiffness,
-            thickness: self.thickness,
-            compliance: self.compliance,
-            preconditioning: self.preconditioning,
+            ..self.bench.settings()
         }
     }
 }

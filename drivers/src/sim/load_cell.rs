@@ -111,11 +111,23 @@ impl LoadCell {
 
     /// The signal under a force at the next tick, as counts where there is a converter.
     pub fn read(&mut self, force: Newtons) -> (Option<i32>, Volts) {
+        let signal = self.signal(force);
+        match self.error {
+            CellError::Ideal { .. } => (None, signal),
+            CellError::Lab { .. } => {
+                let counts = counts_from_volts(signal, LAB_ADC);
+                (Some(counts), volts_from_counts(counts, LAB_ADC))
+            }
+        }
+    }
+
+    /// The amplified signal under a force at the next tick, before any converter.
+    pub fn signal(&mut self, force: Newtons) -> Volts {
         let noise = self.noise.normal();
         match &mut self.error {
             CellError::Ideal { noise: rms } => {
                 let felt = Newtons(force.0 + rms.0 * noise);
-                (None, self.curve.volts_from_newtons(felt))
+                self.curve.volts_from_newtons(felt)
             }
             CellError::Lab {
                 drift,
@@ -130,9 +142,7 @@ impl LoadCell {
                 }
                 let zero_shift = *drift_per_tick * *ticks as f64 + *wander;
                 let volts = self.curve.volts_from_newtons(force).0;
-                let counts =
-                    counts_from_volts(Volts(volts + zero_shift + LAB_NOISE.0 * noise), LAB_ADC);
-                (Some(counts), volts_from_counts(counts, LAB_ADC))
+                Volts(volts + zero_shift + LAB_NOISE.0 * noise)
             }
         }
     }

@@ -17,16 +17,16 @@ mod slider;
 mod tissue;
 
 pub use amounts::{SimCompliance, SimNoise, SimRate, SimStiffness, SimThickness};
+pub(crate) use bench::Bench;
 pub use load_cell::calibration;
-pub(crate) use load_cell::{counts_from_volts, volts_from_counts};
+pub(crate) use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
 pub use preconditioning::SimPreconditioning;
 pub(crate) use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
+pub(crate) use slider::SWITCH_MARGIN_MM;
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
-use bench::Bench;
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
-use load_cell::LoadCell;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Fault, HandAction, Reading, RigCommand, RigDescription};
 use palpate_model::viscoelastic::ModifiedKelvin;
@@ -35,9 +35,9 @@ use slider::{ACCELERATION_QUANTUM, Slider};
 use std::collections::VecDeque;
 
 /// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
-const MM_PER_PULSE: f64 = 0.015;
+pub(crate) const MM_PER_PULSE: f64 = 0.015;
 /// Stroke of the slide.
-const TRAVEL: Position = Position(150.0);
+pub(crate) const TRAVEL: Position = Position(150.0);
 /// 2 counts/s, the resolution of `SP` at a nominal millisecond in Galil's DMC command reference.
 const SPEED_QUANTUM: MmPerS = MmPerS(2.0 * MM_PER_PULSE);
 /// Faster than any published indentation of soft tissue with such a slide.

@@ -148,11 +148,11 @@ pub(super) fn with_settings(
         let wrong =
             |err: &dyn std::fmt::Display| Failure::usage(format!("[simulated] {name}: {err}"));
         match name.as_str() {
-            "preconditioning" if args.preconditioning == usual.preconditioning => {
-                args.preconditioning = value.parse().map_err(|err| wrong(&err))?;
+            "preconditioning" if args.bench.preconditioning == usual.bench.preconditioning => {
+                args.bench.preconditioning = value.parse().map_err(|err| wrong(&err))?;
             }
-            "softening" if args.softening == usual.softening => {
-                args.softening = value.parse().map_err(|err| wrong(&err))?;
+            "softening" if args.bench.softening == usual.bench.softening => {
+                args.bench.softening = value.parse().map_err(|err| wrong(&err))?;
             }
             "rate" if args.rate == usual.rate => {
                 args.rate = value.parse().map_err(|err| wrong(&err))?;

@@ -1,0 +1,405 @@
+//! One axis: motion at the sample clock, the smoothing filter of the pulses, switches and stop codes.
+
+use super::errors::ErrorCode;
+use super::profile::Profile;
+use super::settings::{NO_LIMIT, Setting, Settings, speed_taken};
+
+/// Counts of a position register: 32 bits.
+pub const COUNTS_MAX: f64 = 2_147_483_647.0;
+
+/// A pulse counts as given when the filtered place has come this near to it, in counts.
+const NEAR: f64 = 1e-6;
+/// A filter this near to a command at rest has arrived and gives its last pulse. How long the tail really lasts is not
+/// documented; so it is some ten samples.
+const SETTLED: f64 = 1e-3;
+
+/// What the axis is about to do or does.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Motion {
+    /// Nothing.
+    Rest,
+    /// A place is approached.
+    Target(f64),
+    /// A speed is kept, with its sign.
+    Jog(f64),
+    /// Coming to rest at a place, at a rate, with this stop code.
+    Stopping(f64, f64, u8),
+    /// Until the home switch changes, in a direction; then [`Motion::Stopping`], then a homing goes back.
+    Edge {
+        /// 1 or -1.
+        side: f64,
+        /// State of the input at the start.
+        was: bool,
+        /// Whether the edge is approached again slowly.
+        is_homing: bool,
+    },
+    /// Second stage of a homing: braked, then slowly back to the edge.
+    Back {
+        /// 1 or -1.
+        side: f64,
+        /// State of the input that ends it.
+        until: bool,
+        /// Whether the first stage's braking is over.
+        is_braked: bool,
+    },
+    /// Increments of the contour mode.
+    Contour,
+}
+
+/// What `BG` will start.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Prepared {
+    /// `PA`.
+    Target(f64),
+    /// `PR`: again with every `BG`.
+    Relative(f64),
+    /// `JG`.
+    Jog(f64),
+    /// `FE`, `HM`.
+    Edge {
+        /// Whether it is `HM`.
+        is_homing: bool,
+    },
+}
+
+/// Levels of the axis's inputs: true is high, which is open.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Inputs {
+    /// Forward limit switch.
+    pub forward: bool,
+    /// Reverse limit switch.
+    pub reverse: bool,
+    /// Home switch.
+    pub home: bool,
+}
+
+/// What a sample brought about.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Event {
+    /// A limit, of whichever kind, was met.
+    Limit,
+    /// A homing has ended: the place becomes zero.
+    Homed,
+}
+
+/// What `CN` says of inputs.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Polarity {
+    /// 1 when a high level is a closed limit switch, -1 when a low one is.
+    pub limit: f64,
+    /// -1 when homing starts forwards on a low level, 1 on a high one.
+    pub home: f64,
+}
+
+/// One axis.
+#[derive(Clone, Debug)]
+pub struct Axis {
+    /// Its numbers.
+    pub settings: Settings,
+    /// Whether it is enabled.
+    pub is_on: bool,
+    /// What it does.
+    pub motion: Motion,
+    /// What `BG` starts.
+    pub prepared: Prepared,
+    /// Commanded place and velocity.
+    pub profile: Profile,
+    /// Behind the smoothing filter, in counts.
+    pub filtered: f64,
+    /// Encoder input, in counts: nothing is connected to it on a stepper axis.
+    pub encoder: f64,
+    /// Of `SC`.
+    pub stop_code: u8,
+    /// Inputs at the newest sample.
+    pub inputs: Inputs,
+}
+
+impl Axis {
+    /// As after a reset: motor off, everything at zero.
+    pub fn new(is_stepper: bool) -> Self {
+        let mut settings = Settings::new();
+        if is_stepper {
+            // Active-low pulses (Galil application note 2446).
+            settings.set(Setting::MotorType, 2.0);
+        }
+        Self {
+            settings,
+            is_on: false,
+            motion: Motion::Rest,
+            prepared: Prepared::Target(0.0),
+            profile: Profile::default(),
+            filtered: 0.0,
+            encoder: 0.0,
+            stop_code: 1,
+            inputs: Inputs {
+                forward: true,
+                reverse: true,
+                home: true,
+            },
+        }
+    }
+
+    fn get(&self, setting: Setting) -> f64 {
+        self.settings.get(setting)
+    }
+
+    /// Whether pulses drive it.
+    pub fn is_stepper(&self) -> bool {
+        self.get(Setting::MotorType).abs() >= 2.0
+    }
+
+    /// `RP`: whole counts at or below the commanded place.
+    pub fn reference(&self) -> f64 {
+        (self.profile.place + NEAR).floor()
+    }
+
+    /// `TD`: pulses given, or on a servo the auxiliary encoder, which nothing is connected to.
+    pub fn pulses(&self) -> f64 {
+        if self.is_stepper() {
+            (self.filtered + NEAR).floor()
+        } else {
+            0.0
+        }
+    }
+
+    /// `TP`: the encoder. A servo here follows its command without error.
+    pub fn told_position(&self) -> f64 {
+        if self.is_stepper() {
+            self.encoder
+        } else {
+            self.reference()
+        }
+    }
+
+    /// `_BG`: whether the profile is under way. It ends before the filter has given its last pulses.
+    pub fn is_running(&self) -> bool {
+        self.motion != Motion::Rest
+    }
+
+    /// `DP`: sets step count and reference alike. Returns by how much the count has become smaller.
+    pub fn define(&mut self, counts: f64) -> Result<f64, ErrorCode> {
+        if self.is_running() {
+            return Err(ErrorCode::RUNNING);
+        }
+        let shift = self.filtered - counts;
+        self.profile.place = counts;
+        self.filtered = counts;
+        // `PA?` tells the place; other motions are as they were prepared.
+        if let Prepared::Target(target) = &mut self.prepared {
+            *target = counts;
+        }
+        Ok(shift)
+    }
+
+    /// The place becomes zero while pulses may still be on their way; returns by how much the count shrank.
+    pub fn zero(&mut self) -> f64 {
+        let shift = self.profile.place;
+        self.profile.place = 0.0;
+        self.filtered -= shift;
+        self.prepared = Prepared::Target(0.0);
+        shift
+    }
+
+    fn is_limit_active(&self, side: f64, polarity: Polarity) -> bool {
+        let disabled = self.get(Setting::LimitDisable) as u8;
+        let is_high_active = polarity.limit > 0.0;
+        if side > 0.0 {
+            disabled & 1 == 0 && self.inputs.forward == is_high_active
+        } else {
+            disabled & 2 == 0 && self.inputs.reverse == is_high_active
+        }
+    }
+
+    /// Whether a place is beyond the software limit in a direction: "activated at n + 1" (`FL`).
+    fn is_beyond(&self, side: f64) -> bool {
+        let (forward, reverse) = (
+            self.get(Setting::ForwardLimit),
+            self.get(Setting::ReverseLimit),
+        );
+        if side > 0.0 {
+            forward < NO_LIMIT && self.profile.place > forward
+        } else {
+            reverse > -COUNTS_MAX - 1.0 && self.profile.place < reverse
+        }
+    }
+
+    /// `BG`.
+    pub fn begin(&mut self, polarity: Polarity) -> Result<(), ErrorCode> {
+        if !self.is_on {
+            return Err(ErrorCode::MOTOR_OFF);
+        }
+        if self.is_running() {
+            return Err(ErrorCode::BEGIN_RUNNING);
+        }
+        let home = self.inputs.home;
+        // "-1 configures HM to drive the motor in the forward direction when the input is low" (`CN`).
+        let edge_side = if home == (polarity.home > 0.0) {
+            1.0
+        } else {
+            -1.0
+        };
+        let (motion, side) = match self.prepared {
+            Prepared::Target(target) => (Motion::Target(target), target - self.profile.place),
+            Prepared::Relative(way) => {
+                let target = self.profile.place.round() + way;
+                if target.abs() > COUNTS_MAX {
+                    return Err(ErrorCode::OUT_OF_RANGE);
+                }
+                (Motion::Target(target), way)
+            }
+            Prepared::Jog(speed) => (Motion::Jog(speed), speed),
+            Prepared::Edge { is_homing } => {
+                let motion = Motion::Edge {
+                    side: edge_side,
+                    was: home,
+                    is_homing,
+                };
+                (motion, edge_side)
+            }
+        };
+        if side != 0.0 && (self.is_limit_active(side, polarity) || self.is_beyond(side)) {
+            return Err(ErrorCode::LIMIT_SWITCH);
+        }
+        self.motion = motion;
+        self.stop_code = 0;
+        Ok(())
+    }
+
+    /// Comes to rest at a rate and then has a stop code.
+    pub fn stop(&mut self, rate: Setting, code: u8) {
+        if !matches!(self.motion, Motion::Rest | Motion::Stopping(..)) {
+            let rate = self.get(rate);
+            self.motion = Motion::Stopping(self.profile.rest(rate), rate, code);
+            self.stop_code = code;
+        }
+    }
+
+    /// `AB`: at rest at once.
+    pub fn abort(&mut self, code: u8) {
+        if self.is_running() {
+            self.motion = Motion::Rest;
+            self.profile = Profile {
+                place: self.reference(),
+                velocity: 0.0,
+            };
+            self.stop_code = code;
+        }
+    }
+
+    /// `JG`: takes effect at once where the axis already jogs.
+    pub fn jog(&mut self, speed: f64, tm: f64) {
+        let speed = speed_taken(speed, tm);
+        self.prepared = Prepared::Jog(speed);
+        if matches!(self.motion, Motion::Jog(_)) {
+            self.motion = Motion::Jog(speed);
+        }
+    }
+
+    /// One sample of `dt` seconds; limits are left at `limit_rate`.
+    pub fn sample(&mut self, dt: f64, polarity: Polarity, limit_rate: Setting) -> Option<Event> {
+        let ac = self.get(Setting::Acceleration);
+        let dc = self.get(Setting::Deceleration);
+        let speed = self.get(Setting::Speed);
+        match self.motion {
+            Motion::Rest | Motion::Contour => {}
+            Motion::Target(target) => {
+                if self.profile.towards(target, speed, ac, dc, dt) {
+                    self.end(1);
+                }
+            }
+            Motion::Jog(speed) => self.profile.jog(speed, ac, dc, dt),
+            Motion::Stopping(place, rate, code) => {
+                let fast = self.profile.velocity.abs();
+                if self.profile.towards(place, fast, rate, rate, dt) {
+                    self.end(code);
+                }
+            }
+            Motion::Edge {
+                side,
+                was,
+                is_homing,
+            } => {
+                self.profile.jog(side * speed, ac, dc, dt);
+                if self.inputs.home != was {
+                    if is_homing {
+                        self.motion = Motion::Back {
+                            side: -side,
+                            until: was,
+                            is_braked: false,
+                        };
+                    } else {
+                        self.stop(Setting::Deceleration, 9);
+                    }
+                }
+            }
+            Motion::Back {
+                side,
+                until,
+                is_braked,
+            } => {
+                // 256 counts/s (DMC-18x2 command reference, `HM`, the second stage), `HV` where it is set.
+                let slow = if is_braked {
+                    self.get(Setting::HomeSpeed)
+                } else {
+                    0.0
+                };
+                self.profile.jog(side * slow, ac, dc, dt);
+                let is_braked = is_braked || self.profile.velocity == 0.0;
+                self.motion = Motion::Back {
+                    side,
+                    until,
+                    is_braked,
+                };
+                if is_braked && self.inputs.home == until {
+                    self.abort(10);
+                    return Some(Event::Homed);
+                }
+            }
+        }
+        let side = self.profile.velocity;
+        let is_met = side != 0.0
+            && !matches!(self.motion, Motion::Stopping(..))
+            && (self.is_limit_active(side, polarity) || self.is_beyond(side));
+        if is_met {
+            self.stop(limit_rate, if side > 0.0 { 2 } else { 3 });
+        }
+        is_met.then_some(Event::Limit)
+    }
+
+    fn end(&mut self, code: u8) {
+        self.motion = Motion::Rest;
+        self.stop_code = code;
+    }
+
+    /// The smoothing filter of the pulses at a sample: a single pole whose time constant is 3 KS samples
+    /// (DMC-2x00 user manual, pages 117-118: KS 1.313 is 3.939 samples).
+    pub fn filter(&mut self) {
+        if !self.is_stepper() {
+            self.filtered = self.profile.place;
+            return;
+        }
+        let left = self.profile.place - self.filtered;
+        let keeps = (-1.0 / (3.0 * self.get(Setting::Smoothing))).exp();
+        if !self.is_running() && left.abs() < SETTLED {
+            self.filtered = self.profile.place;
+        } else {
+            self.filtered = self.profile.place - keeps * left;
+        }
+    }
+
+    /// The byte of `TS` (DMC-1400 user manual, page 211).
+    pub fn switches(&self) -> u8 {
+        let bits = [
+            (self.is_running(), 7),
+            (!self.is_on, 5),
+            (self.inputs.forward, 3),
+            (self.inputs.reverse, 2),
+            (self.inputs.home, 1),
+            // No latch is armed or has occurred.
+            (true, 0),
+        ];
+        bits.into_iter()
+            .filter(|(is_set, _)| *is_set)
+            .fold(0, |byte, (_, bit)| byte | 1 << bit)
+    }
+}

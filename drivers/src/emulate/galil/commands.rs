@@ -1,0 +1,262 @@
+//! From a statement to what it does: assignments, then two letters and their arguments.
+
+use super::errors::ErrorCode;
+use super::expression::{Cursor, evaluate};
+use super::memory::is_name;
+use super::scope::axis_of;
+use super::settings::{STEPPER_SPEED_MAX, Setting};
+use super::{Answer, GalilEmulator, Origin};
+
+/// Words whose arguments are numbers of axes, beside the [`Setting`]s.
+const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];
+
+/// One argument.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Argument {
+    /// `?`.
+    Query,
+    /// A number.
+    Number(f64),
+}
+
+impl GalilEmulator {
+    /// Does what a statement says.
+    pub(super) fn execute(&mut self, origin: Origin, text: &str) -> Result<Answer, ErrorCode> {
+        if !text.is_ascii() {
+            return Err(ErrorCode::UNRECOGNIZED);
+        }
+        match text.as_bytes() {
+            // ^R^V, ^R^S.
+            [0x12, 0x16, ..] => return Ok(Answer::Text(self.revision().to_owned())),
+            [0x12, 0x13, ..] => {
+                self.reset();
+                return Ok(Answer::Silent);
+            }
+            _ => {}
+        }
+        if let Some(answer) = self.assignment(text) {
+            return answer;
+        }
+        let Some((word, arguments)) = text.split_at_checked(2) else {
+            return Err(ErrorCode::UNRECOGNIZED);
+        };
+        let arguments = arguments.trim();
+        if let Some(setting) = Setting::named(word) {
+            return self.set(setting, arguments);
+        }
+        if let Some(answer) = self.move_word(origin, word, arguments) {
+            return answer;
+        }
+        if let Some(answer) = self.transfer_word(origin, word, arguments) {
+            return answer;
+        }
+        self.system_word(origin, word, arguments)
+    }
+
+    /// `name=expression`, `name[index]=expression`, `name=` to be told; `None` when it is a command.
+    fn assignment(&mut self, text: &str) -> Option<Result<Answer, ErrorCode>> {
+        let mut cursor = Cursor::new(text);
+        let name = cursor.take_while(|byte| byte.is_ascii_alphanumeric() || byte == b'_');
+        if !name.starts_with(|first: char| first.is_ascii_alphabetic()) {
+            return None;
+        }
+        let index = if cursor.peek() == Some(b'[') {
+            if is_word(name) {
+                return None;
+            }
+            match cursor.bracketed(self, ErrorCode::BRACKETS) {
+                Ok(index) => Some(index),
+                // `QU a[],...`: not an element.
+                Err(_) if !text.contains(']') || !text.contains('=') => return None,
+                Err(code) => return Some(Err(code)),
+            }
+        } else {
+            None
+        };
+        if !cursor.take(b'=') || cursor.peek() == Some(b'>') {
+            return None;
+        }
+        if index.is_none() && is_axis_command(name) {
+            return None;
+        }
+        Some(self.assign(name, index, cursor.rest()))
+    }
+
+    fn assign(&mut self, name: &str, index: Option<f64>, rest: &str) -> Result<Answer, ErrorCode> {
+        let model = self.settings.model;
+        if rest.is_empty() || rest == "?" {
+            let value = match index {
+                Some(index) => self.memory.element(name, index)?,
+                None => self.memory.variable(name).ok_or(ErrorCode::VARIABLE)?,
+            };
+            return Ok(Answer::Text(self.variable_format.write(value)));
+        }
+        let value = evaluate(rest, self)?;
+        match index {
+            Some(index) => self.memory.set_element(name, index, value)?,
+            None if is_name(name) && name != "TIME" => self.memory.set(name, value, model)?,
+            None => return Err(ErrorCode::VARIABLE),
+        }
+        Ok(Answer::Done)
+    }
+
+    /// Arguments for axes: `A=1`, `*=1`, or one field per axis.
+    pub(super) fn axis_arguments(
+        &self,
+        arguments: &str,
+    ) -> Result<Vec<(usize, Argument)>, ErrorCode> {
+        let axes = self.axes.len();
+        if let Some((who, value)) = arguments.split_once('=') {
+            let who = who.trim();
+            let mut letters = who.chars();
+            if let (Some(letter), None) = (letters.next(), letters.next()) {
+                let argument = self.argument(value.trim())?;
+                if letter == '*' {
+                    return Ok((0..axes).map(|axis| (axis, argument)).collect());
+                }
+                if let Some(axis) = axis_of(letter) {
+                    return if axis < axes {
+                        Ok(vec![(axis, argument)])
+                    } else {
+                        Err(ErrorCode::OPERAND)
+                    };
+                }
+            }
+        }
+        let mut all = Vec::new();
+        for (axis, field) in fields(arguments).into_iter().enumerate() {
+            if field.is_empty() {
+                continue;
+            }
+            if axis >= axes {
+                // ESRF BLISS asks eight axes of whatever board it has.
+                if field == "?" {
+                    continue;
+                }
+                return Err(ErrorCode::OPERAND);
+            }
+            all.push((axis, self.argument(field)?));
+        }
+        if all.is_empty() {
+            return Err(ErrorCode::FEW_FIELDS);
+        }
+        Ok(all)
+    }
+
+    fn argument(&self, field: &str) -> Result<Argument, ErrorCode> {
+        if field == "?" {
+            return Ok(Argument::Query);
+        }
+        if field.contains('?') {
+            return Err(ErrorCode::QUESTION_MARK);
+        }
+        evaluate(field, self).map(Argument::Number)
+    }
+
+    /// Numbers in fields; an empty field is `None`.
+    pub(super) fn numbers(&self, arguments: &str) -> Result<Vec<Option<f64>>, ErrorCode> {
+        if arguments.is_empty() {
+            return Ok(Vec::new());
+        }
+        fields(arguments)
+            .into_iter()
+            .map(|field| match field {
+                "" => Ok(None),
+                _ => evaluate(field, self).map(Some),
+            })
+            .collect()
+    }
+
+    /// A list of axes such as `AC`; no list is all of them.
+    pub(super) fn axis_list(&self, arguments: &str) -> Result<Vec<usize>, ErrorCode> {
+        let letters: Vec<char> = arguments
+            .chars()
+            .filter(|letter| !matches!(letter, ' ' | ','))
+            .collect();
+        if letters.is_empty() || letters == ['*'] {
+            return Ok((0..self.axes.len()).collect());
+        }
+        letters
+            .into_iter()
+            .map(|letter| {
+                axis_of(letter)
+                    .filter(|axis| *axis < self.axes.len())
+                    .ok_or(ErrorCode::OPERAND)
+            })
+            .collect()
+    }
+
+    fn set(&mut self, setting: Setting, arguments: &str) -> Result<Answer, ErrorCode> {
+        let mut told = Vec::new();
+        for (axis, argument) in self.axis_arguments(arguments)? {
+            match argument {
+                Argument::Query => {
+                    let format = super::Format {
+                        decimals: setting.decimals(),
+                        ..self.position_format
+                    };
+                    told.push(format.write(self.axes[axis].settings.get(setting)));
+                }
+                Argument::Number(value) => {
+                    let value = setting.taken(value, self.settings.model, self.clock.tm())?;
+                    if setting == Setting::Speed
+                        && self.axes[axis].is_stepper()
+                        && value > STEPPER_SPEED_MAX
+                    {
+                        return Err(ErrorCode::OUT_OF_RANGE);
+                    }
+                    if setting == Setting::MotorType && self.axes[axis].is_running() {
+                        return Err(ErrorCode::RUNNING);
+                    }
+                    self.axes[axis].settings.set(setting, value);
+                }
+            }
+        }
+        Ok(listed(told))
+    }
+}
+
+/// Answers of several axes in one line, parted by commas; each begins with its sign's place.
+pub fn listed(told: Vec<String>) -> Answer {
+    if told.is_empty() {
+        Answer::Done
+    } else {
+        Answer::Text(told.join(","))
+    }
+}
+
+/// Fields parted by commas that stand in no brackets or parentheses.
+pub fn fields(text: &str) -> Vec<&str> {
+    let mut depth = 0_i32;
+    text.split(|c: char| {
+        match c {
+            '(' | '[' => depth += 1,
+            ')' | ']' => depth -= 1,
+            _ => {}
+        }
+        c == ',' && depth == 0
+    })
+    .map(str::trim)
+    .collect()
+}
+
+/// Whether a name before `=` is two letters of a command and an axis, as in `SPA=1000`.
+fn is_axis_command(name: &str) -> bool {
+    let Some((word, axis)) = name.split_at_checked(2) else {
+        return false;
+    };
+    let mut letters = axis.chars();
+    let is_axis = match (letters.next(), letters.next()) {
+        (None, _) => true,
+        (Some(letter), None) => axis_of(letter).is_some(),
+        _ => false,
+    };
+    is_axis && (Setting::named(word).is_some() || AXIS_WORDS.contains(&word))
+}
+
+/// Whether a name before `[` begins with the letters of a command that takes arrays.
+fn is_word(name: &str) -> bool {
+    ["QU", "QD", "DM", "DA", "RA"]
+        .iter()
+        .any(|word| name.starts_with(word))
+}

@@ -1,0 +1,334 @@
+//! A Galil DMC controller with the simulated bench behind it: axis A is the slide with the probe, pulse-driven,
+//! analog input 1 is the load cell.
+//!
+//! Bytes go through [`input`] into statements, those through `commands.rs` into motion, settings and answers. The
+//! sample clock drives profiles, filter, tissue, recording and programs. Where a source says what the controller
+//! does, the place that does it names the source; where none was found it says so.
+
+mod analog;
+mod axis;
+mod client;
+mod clock;
+mod commands;
+mod contour;
+mod data_record;
+mod errors;
+mod expression;
+mod format;
+mod input;
+mod listen;
+mod memory;
+mod message;
+mod model;
+mod motion;
+mod profile;
+mod program;
+mod record;
+mod run;
+mod sample;
+mod scope;
+mod settings;
+mod system;
+mod transfer;
+
+pub use model::{GalilModel, GalilModelError};
+
+use super::Device;
+use super::faults::DeviceFault;
+use super::plant::{CellFault, Plant};
+use crate::sim::SimSettings;
+use analog::Analog;
+use axis::{Axis, Polarity};
+use client::Client;
+use clock::SampleClock;
+use contour::Contour;
+use errors::ErrorCode;
+use format::Format;
+use memory::Memory;
+use palpate_model::rig::HandAction;
+use palpate_model::{Nanos, Seconds};
+use program::{Program, Thread};
+use record::Recorder;
+
+/// Connections of a controller on a network: handles A to H.
+const HANDLES: usize = 8;
+/// From a reset to the first answer. Not confirmed: long enough to be noticed, short for a test.
+const BOOT: Nanos = Nanos(300_000_000);
+
+/// What makes one emulated controller differ from another.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GalilSettings {
+    /// Bench, tissue, cell and seed.
+    pub sim: SimSettings,
+    /// Which controller.
+    pub model: GalilModel,
+    /// Bits of the analog inputs' converter, 12 or 16; `None` without analog inputs.
+    pub converter: Option<u32>,
+    /// One serial line instead of network handles.
+    pub is_serial: bool,
+    /// Whether a serial line echoes after a reset (`EO 1`).
+    pub has_echo: bool,
+    /// By how many parts in a million the crystal is fast.
+    pub clock_ppm: f64,
+    /// Serial number.
+    pub serial_number: u32,
+}
+
+impl Default for GalilSettings {
+    fn default() -> Self {
+        Self {
+            sim: SimSettings::default(),
+            model: GalilModel::default(),
+            converter: Some(16),
+            is_serial: true,
+            has_echo: false,
+            clock_ppm: 0.0,
+            serial_number: 1820,
+        }
+    }
+}
+
+/// Who gave a statement.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Origin {
+    Client(usize),
+    Thread(usize),
+}
+
+/// What a statement is answered with.
+#[derive(Clone, Debug, PartialEq, Eq)]
+enum Answer {
+    /// `:`.
+    Done,
+    /// A text, its line end, `:`.
+    Text(String),
+    /// Text without a line end, then `:` (`MG` with `{N}`).
+    Open(String),
+    /// Bytes, then `:`.
+    Bytes(Vec<u8>),
+    /// Nothing yet.
+    Silent,
+}
+
+/// The emulated controller.
+#[derive(Clone, Debug)]
+pub struct GalilEmulator {
+    settings: GalilSettings,
+    plant: Plant,
+    clock: SampleClock,
+    axes: Vec<Axis>,
+    polarity: Polarity,
+    /// The rest of `CN`.
+    other_inputs: [f64; 3],
+    memory: Memory,
+    recorder: Recorder,
+    contour: Contour,
+    analog: Option<Analog>,
+    program: Program,
+    /// The program that `BP` keeps over a reset.
+    burned: Option<Program>,
+    threads: Vec<Thread>,
+    clients: Vec<Client>,
+    /// `TC`, and thread and line of the last error of a program.
+    error: ErrorCode,
+    error_at: (usize, usize),
+    position_format: Format,
+    variable_format: Format,
+    /// `PF`, `VF`, `LZ` as they were set.
+    format_numbers: (f64, f64, f64),
+    /// `CW 1`: unsolicited characters have their top bit set.
+    is_marked: bool,
+    /// `CF`: where unsolicited text goes.
+    unsolicited_to: Option<usize>,
+    outputs: u16,
+    /// `DR`: samples between records, and to whom.
+    pushed: Option<(u64, usize)>,
+    /// Nothing is answered before.
+    boots_until: Option<Nanos>,
+    now: Nanos,
+    /// Somebody put another controller on the wire.
+    is_wrong: bool,
+}
+
+impl GalilEmulator {
+    /// A controller just switched on at time zero.
+    #[must_use]
+    pub fn new(settings: GalilSettings) -> Self {
+        let clock = SampleClock::new(Nanos::ZERO, settings.clock_ppm);
+        let plant = Plant::new(&settings.sim, clock.period());
+        let channels = if settings.is_serial { 1 } else { HANDLES };
+        let mut emulator = Self {
+            settings,
+            plant,
+            clock,
+            axes: Vec::new(),
+            polarity: Polarity {
+                limit: -1.0,
+                home: -1.0,
+            },
+            other_inputs: [-1.0, 0.0, 0.0],
+            memory: Memory::default(),
+            recorder: Recorder::default(),
+            contour: Contour::default(),
+            analog: None,
+            program: Program::default(),
+            burned: None,
+            threads: Vec::new(),
+            clients: vec![Client::default(); channels],
+            error: ErrorCode(0),
+            error_at: (0, 0),
+            position_format: Format::decimal(10, 0),
+            variable_format: Format::decimal(10, 4),
+            format_numbers: (10.0, 10.4, 1.0),
+            is_marked: false,
+            unsolicited_to: None,
+            outputs: 0,
+            pushed: None,
+            boots_until: None,
+            now: Nanos::ZERO,
+            is_wrong: false,
+        };
+        emulator.initialise();
+        if settings.is_serial {
+            emulator.clients[0] = Client::opened(settings.has_echo);
+        }
+        emulator
+    }
+
+    /// All that a reset forgets. The slide stays where it stands, at zero counts.
+    fn initialise(&mut self) {
+        if let Some(slide) = self.axes.first() {
+            self.plant.shift(slide.filtered * crate::sim::MM_PER_PULSE);
+        }
+        let axes = self.settings.model.axes();
+        self.clock = SampleClock::new(self.now, self.settings.clock_ppm);
+        self.axes = (0..axes).map(|axis| Axis::new(axis == 0)).collect();
+        self.polarity = Polarity {
+            limit: -1.0,
+            home: -1.0,
+        };
+        self.other_inputs = [-1.0, 0.0, 0.0];
+        self.memory = Memory::default();
+        self.recorder = Recorder::default();
+        self.contour = Contour::default();
+        self.analog = self.settings.converter.map(Analog::new);
+        self.program = self.burned.clone().unwrap_or_default();
+        self.threads = vec![Thread::idle(); self.settings.model.threads()];
+        self.error = ErrorCode(0);
+        self.position_format = Format::decimal(10, 0);
+        self.variable_format = Format::decimal(10, 4);
+        self.format_numbers = (10.0, 10.4, 1.0);
+        self.is_marked = false;
+        self.unsolicited_to = self.settings.is_serial.then_some(0);
+        self.outputs = 0;
+        self.pushed = None;
+        if let Some(line) = self.program.find("AUTO") {
+            self.threads[0].start(line, 0);
+        }
+    }
+
+    /// `RS`, and a reset by fault: connections on a network are dropped.
+    fn reset(&mut self) {
+        self.initialise();
+        for client in &mut self.clients {
+            if self.settings.is_serial {
+                *client = Client::opened(self.settings.has_echo);
+            } else if client.is_open {
+                *client = Client::hung_up();
+            }
+        }
+        self.boots_until = Some(self.now + BOOT);
+    }
+
+    /// True length of a sample.
+    #[must_use]
+    pub fn period(&self) -> Seconds {
+        self.clock.period()
+    }
+
+    /// The bench behind the controller, for tests and demonstrations.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Whether an axis, counted from 0, is moving, for tests and demonstrations.
+    #[must_use]
+    pub fn is_running(&self, axis: usize) -> bool {
+        self.axes.get(axis).is_some_and(Axis::is_running)
+    }
+}
+
+impl Device for GalilEmulator {
+    fn channels(&self) -> usize {
+        self.clients.len()
+    }
+
+    fn connect(&mut self, now: Nanos, channel: usize) {
+        self.advance(now);
+        if !self.settings.is_serial
+            && let Some(client) = self.clients.get_mut(channel)
+        {
+            // Echo is for terminals on a serial line.
+            *client = Client::opened(false);
+        }
+    }
+
+    fn disconnect(&mut self, now: Nanos, channel: usize) {
+        self.advance(now);
+        if !self.settings.is_serial
+            && let Some(client) = self.clients.get_mut(channel)
+        {
+            *client = Client::default();
+            self.pushed = self.pushed.filter(|(_, to)| *to != channel);
+            if self.unsolicited_to == Some(channel) {
+                self.unsolicited_to = None;
+            }
+            if let Some(line) = self.program.find("TCPERR") {
+                self.threads[0].call_automatic(line);
+            }
+        }
+    }
+
+    fn receive(&mut self, now: Nanos, channel: usize, bytes: &[u8]) {
+        self.advance(now);
+        if channel < self.clients.len() {
+            for byte in bytes {
+                self.feed(channel, *byte);
+            }
+        }
+    }
+
+    fn advance(&mut self, now: Nanos) {
+        self.advance_to(now);
+    }
+
+    fn transmit(&mut self, channel: usize) -> Vec<u8> {
+        self.clients
+            .get_mut(channel)
+            .map(Client::take_out)
+            .unwrap_or_default()
+    }
+
+    fn take_hang_up(&mut self, channel: usize) -> bool {
+        self.clients
+            .get_mut(channel)
+            .is_some_and(|client| std::mem::take(&mut client.is_hung_up))
+    }
+
+    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.advance(now);
+        match fault {
+            DeviceFault::Reset if is_on => self.reset(),
+            DeviceFault::Reset => {}
+            DeviceFault::Stuck => self.plant.spoil(is_on.then_some(CellFault::Stuck)),
+            DeviceFault::Saturated => self.plant.spoil(is_on.then_some(CellFault::Saturated)),
+            DeviceFault::WrongDevice => self.is_wrong = is_on,
+        }
+    }
+
+    fn by_hand(&mut self, now: Nanos, action: HandAction) {
+        self.advance(now);
+        self.plant.by_hand(action);
+    }
+}

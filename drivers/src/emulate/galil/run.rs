@@ -1,0 +1,197 @@
+//! Threads of the application program at a sample.
+
+use super::errors::ErrorCode;
+use super::expression::evaluate;
+use super::program::{Thread, Wait};
+use super::{GalilEmulator, Origin};
+
+/// `WT n` is in ms of which 1024 are a second, as samples at TM 1000 are; `WT n,1` in samples
+/// (DMC-40x0 command reference, `WT`).
+fn samples_of(ms: f64, tm: f64) -> f64 {
+    ms * 1000.0 / tm
+}
+
+impl GalilEmulator {
+    /// Lets every thread go on, as far as a sample lasts.
+    pub(super) fn run_threads(&mut self) {
+        for index in 0..self.threads.len() {
+            for _ in 0..self.settings.model.statements_per_sample() {
+                if !self.threads[index].is_running || !self.is_over(index) {
+                    break;
+                }
+                self.step(index);
+            }
+        }
+    }
+
+    /// Whether what a thread waits for has come.
+    fn is_over(&mut self, index: usize) -> bool {
+        let is_over = match &self.threads[index].wait {
+            Wait::None => true,
+            Wait::Until(sample) => self.clock.count() >= *sample,
+            Wait::Rest(axes) => axes.iter().all(|axis| !self.axes[*axis].is_running()),
+            Wait::Pulses(axes) => axes.iter().all(|axis| {
+                let axis = &self.axes[*axis];
+                !axis.is_running() && axis.filtered == axis.profile.place
+            }),
+            Wait::Contour => !self.contour.is_behind(),
+            // Inputs are open, which is high.
+            Wait::Input(_, is_high) => *is_high,
+        };
+        if is_over {
+            self.threads[index].wait = Wait::None;
+        }
+        is_over
+    }
+
+    fn step(&mut self, index: usize) {
+        let from = self.threads[index].at;
+        let Some((text, next)) = self.program.fetch(from) else {
+            self.threads[index].is_running = false;
+            return;
+        };
+        let (text, line) = (text.to_owned(), next.0);
+        self.threads[index].at = next;
+        if let Err(code) = self.perform(index, &text) {
+            self.fail(index, line, &text, code);
+        }
+    }
+
+    /// An error ends its thread; `#CMDERR` runs in thread 0 if the program has one, else the line is told
+    /// (gclib.h: `?55 i=var`).
+    fn fail(&mut self, index: usize, line: usize, text: &str, code: ErrorCode) {
+        self.error = code;
+        self.error_at = (line, index);
+        let was_automatic = self.threads[index].automatic.is_some();
+        self.threads[index] = Thread::idle();
+        match self.program.find("CMDERR") {
+            Some(routine) if !was_automatic => {
+                if self.threads[0].is_running {
+                    self.threads[0].call_automatic(routine);
+                } else {
+                    let now = self.clock.count();
+                    self.threads[0].start(routine, now);
+                    self.threads[0].automatic = Some(0);
+                }
+            }
+            _ => self.say(&format!("?{line} {text}\r\n")),
+        }
+    }
+
+    fn perform(&mut self, index: usize, text: &str) -> Result<(), ErrorCode> {
+        if text.starts_with('#') {
+            return Ok(());
+        }
+        let (word, arguments) = text.split_at_checked(2).unwrap_or((text, ""));
+        let arguments = arguments.trim();
+        match word {
+            "IF" => {
+                if !self.is_true(arguments)? {
+                    let at = self.threads[index].at;
+                    self.threads[index].at = self.program.skip(at, true)?;
+                }
+            }
+            // Reached after the branch that was taken.
+            "EL" if text.starts_with("ELSE") => {
+                let at = self.threads[index].at;
+                self.threads[index].at = self.program.skip(at, false)?;
+            }
+            "EN" if text.starts_with("ENDIF") => {}
+            "EN" | "RE" => self.threads[index].back(),
+            "JP" | "JS" => self.jump(index, word == "JS", arguments)?,
+            "ZS" => self.threads[index].clear_stack(),
+            "WT" => {
+                let numbers = self.numbers(arguments)?;
+                let (length, unit) = (numbers.first(), numbers.get(1));
+                let length = length.copied().flatten().ok_or(ErrorCode::FEW_FIELDS)?;
+                let is_samples = unit.copied().flatten() == Some(1.0);
+                self.wait_samples(index, length, is_samples, self.clock.count())?;
+            }
+            "AT" => {
+                let number = self.numbers(arguments)?.first().copied().flatten();
+                let number = number.ok_or(ErrorCode::FEW_FIELDS)?;
+                if number == 0.0 {
+                    self.threads[index].since = self.clock.count();
+                } else {
+                    let since = self.threads[index].since;
+                    self.wait_samples(index, number.abs(), false, since)?;
+                    if number < 0.0
+                        && let Wait::Until(until) = self.threads[index].wait
+                    {
+                        self.threads[index].since = until;
+                    }
+                }
+            }
+            "AM" => self.threads[index].wait = Wait::Rest(self.axis_list(arguments)?),
+            "MC" => self.threads[index].wait = Wait::Pulses(self.axis_list(arguments)?),
+            "WC" => self.threads[index].wait = Wait::Contour,
+            "AI" => {
+                let number = evaluate(arguments, self)?;
+                if !(1.0..=16.0).contains(&number.abs()) {
+                    return Err(ErrorCode::OUT_OF_RANGE);
+                }
+                let input = number.abs() as usize;
+                self.threads[index].wait = Wait::Input(input, number > 0.0);
+            }
+            "DL" | "QD" | "QR" | "BN" | "BP" | "BV" => return Err(ErrorCode::NOT_IN_PROGRAM),
+            _ => {
+                let answer = self.execute(Origin::Thread(index), text)?;
+                self.say_answer(answer);
+            }
+        }
+        Ok(())
+    }
+
+    fn wait_samples(
+        &mut self,
+        index: usize,
+        length: f64,
+        is_samples: bool,
+        since: u64,
+    ) -> Result<(), ErrorCode> {
+        if length < 0.0 {
+            return Err(ErrorCode::OUT_OF_RANGE);
+        }
+        let samples = if is_samples {
+            length
+        } else {
+            samples_of(length, self.clock.tm())
+        };
+        // A cast saturates; 2^31 samples are 24 days.
+        self.threads[index].wait = Wait::Until(since + samples.ceil() as u64);
+        Ok(())
+    }
+
+    fn is_true(&self, condition: &str) -> Result<bool, ErrorCode> {
+        evaluate(condition, self).map(|value| value != 0.0)
+    }
+
+    /// `JP #LABEL,condition`.
+    fn jump(&mut self, index: usize, is_call: bool, arguments: &str) -> Result<(), ErrorCode> {
+        let (place, condition) = match arguments.split_once(',') {
+            Some((place, condition)) => (place.trim(), Some(condition.trim())),
+            None => (arguments, None),
+        };
+        let line = match place.strip_prefix('#') {
+            Some(label) => self.program.find(label).ok_or(ErrorCode::NO_LABEL)?,
+            None => {
+                let line = evaluate(place, self)?.max(0.0) as usize;
+                if line >= self.program.lines.len() {
+                    return Err(ErrorCode::BAD_LABEL);
+                }
+                line
+            }
+        };
+        if let Some(condition) = condition
+            && !self.is_true(condition)?
+        {
+            return Ok(());
+        }
+        if is_call {
+            self.threads[index].call(line)
+        } else {
+            self.threads[index].at = (line, 0);
+            Ok(())
+        }
+    }
+}

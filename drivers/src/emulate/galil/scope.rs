@@ -1,0 +1,230 @@
+//! What operands and functions give.
+
+use super::GalilEmulator;
+use super::analog::INPUTS;
+use super::axis::Prepared;
+use super::errors::ErrorCode;
+use super::expression::Scope;
+use super::settings::Setting;
+
+/// The axis that a letter stands for.
+pub fn axis_of(letter: char) -> Option<usize> {
+    match letter {
+        'A'..='H' => Some(letter as usize - 'A' as usize),
+        'X' => Some(0),
+        'Y' => Some(1),
+        'Z' => Some(2),
+        'W' => Some(3),
+        _ => None,
+    }
+}
+
+fn truth(is_so: bool) -> f64 {
+    if is_so { 1.0 } else { 0.0 }
+}
+
+impl GalilEmulator {
+    /// An axis's number by its two letters; `None` where there is no such operand.
+    pub(super) fn told(&self, word: [u8; 2], index: usize) -> Option<f64> {
+        let axis = self.axes.get(index)?;
+        Some(match &word {
+            b"BG" => truth(axis.is_running()),
+            b"MO" => truth(!axis.is_on),
+            b"SH" => axis.reference(),
+            b"RP" => axis.reference(),
+            b"TD" => axis.pulses(),
+            // "On a stepper axis the step-count register" (DMC-2x00 user manual, page 117).
+            b"DE" if axis.is_stepper() => axis.pulses(),
+            b"TP" | b"DE" => axis.told_position(),
+            b"DP" => axis.reference(),
+            b"TE" | b"TT" | b"RL" | b"QS" | b"YR" => 0.0,
+            b"TV" => axis.profile.velocity,
+            b"TS" => f64::from(axis.switches()),
+            b"SC" => f64::from(axis.stop_code),
+            b"LF" => truth(axis.inputs.forward),
+            b"LR" => truth(axis.inputs.reverse),
+            b"HM" => truth(axis.inputs.home),
+            b"PA" => self.target(index),
+            b"PR" => match axis.prepared {
+                Prepared::Relative(way) => way,
+                _ => 0.0,
+            },
+            b"JG" => match axis.prepared {
+                Prepared::Jog(speed) => speed,
+                _ => 0.0,
+            },
+            _ => {
+                let word = std::str::from_utf8(&word).ok()?;
+                axis.settings.get(Setting::named(word)?)
+            }
+        })
+    }
+
+    /// Where the axis goes or would go.
+    pub(super) fn target(&self, axis: usize) -> f64 {
+        match self.axes[axis].prepared {
+            Prepared::Target(target) => target,
+            _ => self.axes[axis].reference(),
+        }
+    }
+
+    /// A number of the controller as a whole.
+    pub(super) fn told_plain(&self, word: [u8; 2]) -> Option<f64> {
+        Some(match &word {
+            b"TM" => self.clock.tm(),
+            b"TC" => f64::from(self.error.0),
+            b"TB" => f64::from(self.status_byte()),
+            // Inputs are pulled up and open.
+            b"TI" => 255.0,
+            b"OP" => f64::from(self.outputs),
+            b"RC" => truth(self.recorder.is_running()),
+            b"RD" => self.recorder.next as f64,
+            b"NO" => f64::from(self.running_threads()),
+            b"BN" => f64::from(self.serial_number()),
+            b"AB" => 1.0,
+            b"CM" => self.contour.free() as f64,
+            b"CS" => f64::from(self.contour.done),
+            b"DM" => self.memory.free(self.settings.model) as f64,
+            b"ED" => self.error_at.0 as f64,
+            b"PF" => self.format_numbers.0,
+            b"VF" => self.format_numbers.1,
+            b"LZ" => self.format_numbers.2,
+            b"CW" => 2.0 - truth(self.is_marked),
+            b"CA" => 0.0,
+            b"CO" if self.settings.model.is_40x0() => 0.0,
+            b"EO" => truth(self.clients[0].has_echo),
+            _ => return None,
+        })
+    }
+
+    /// An operand with a number behind its letters.
+    fn told_numbered(&self, word: [u8; 2], number: usize) -> Result<f64, ErrorCode> {
+        let thread = || self.threads.get(number).ok_or(ErrorCode::OUT_OF_RANGE);
+        match &word {
+            b"XQ" => thread().map(|thread| {
+                if thread.is_running {
+                    thread.at.0 as f64
+                } else {
+                    -1.0
+                }
+            }),
+            b"HX" => thread().map(|thread| truth(thread.is_running)),
+            b"ED" if number == 1 => Ok(self.error_at.1 as f64),
+            b"AQ" => {
+                let analog = self.analog.as_ref().ok_or(ErrorCode::NO_ANALOG)?;
+                number
+                    .checked_sub(1)
+                    .and_then(|input| analog.range(input))
+                    .ok_or(ErrorCode::OUT_OF_RANGE)
+            }
+            b"DQ" => Ok(2.0),
+            b"CN" => {
+                let all = [self.polarity.limit, self.polarity.home];
+                all.iter()
+                    .chain(&self.other_inputs)
+                    .nth(number)
+                    .copied()
+                    .ok_or(ErrorCode::OUT_OF_RANGE)
+            }
+            _ => self.told_plain(word).ok_or(ErrorCode::BAD_RESPONSE),
+        }
+    }
+
+    /// Threads that run, one bit each.
+    pub(super) fn running_threads(&self) -> u8 {
+        let mut bits = 0;
+        for (at, thread) in self.threads.iter().enumerate() {
+            bits |= u8::from(thread.is_running) << at;
+        }
+        bits
+    }
+
+    /// The byte of `TB`.
+    pub(super) fn status_byte(&self) -> u8 {
+        u8::from(self.running_threads() != 0) << 7
+            | u8::from(self.contour.is_on()) << 5
+            | u8::from(self.threads.iter().any(|thread| thread.automatic.is_some())) << 4
+            | u8::from(self.clients[0].has_echo)
+    }
+
+    /// Another controller has another number.
+    pub(super) fn serial_number(&self) -> u32 {
+        self.settings
+            .serial_number
+            .wrapping_add(u32::from(self.is_wrong))
+    }
+
+    /// Volts of an analog input, counted from 1.
+    fn analog_volts(&self, number: f64) -> Result<f64, ErrorCode> {
+        let analog = self.analog.as_ref().ok_or(ErrorCode::NO_ANALOG)?;
+        if !(1.0..=INPUTS as f64).contains(&number) {
+            return Err(ErrorCode::OUT_OF_RANGE);
+        }
+        let input = number as usize - 1;
+        Ok(analog.volts(input, self.input_volts(input)))
+    }
+}
+
+impl Scope for GalilEmulator {
+    fn variable(&self, name: &str) -> Option<f64> {
+        if name == "TIME" {
+            // Numbers have 31 bits before the point.
+            return Some((self.clock.count() % (1 << 31)) as f64);
+        }
+        self.memory.variable(name)
+    }
+
+    fn element(&self, name: &str, index: f64) -> Result<f64, ErrorCode> {
+        self.memory.element(name, index)
+    }
+
+    fn operand(&self, name: &str) -> Result<f64, ErrorCode> {
+        let (Some([first, second]), rest) = (name.as_bytes().first_chunk::<2>(), name.get(2..))
+        else {
+            return Err(ErrorCode::BAD_RESPONSE);
+        };
+        let (word, rest) = ([*first, *second], rest.unwrap_or(""));
+        if let Ok(number) = rest.parse() {
+            return self.told_numbered(word, number);
+        }
+        let mut letters = rest.chars();
+        match (letters.next(), letters.next()) {
+            (None, _) => self
+                .told_plain(word)
+                .or_else(|| self.told(word, 0))
+                .ok_or(ErrorCode::BAD_RESPONSE),
+            // The coordinate systems never run.
+            (Some('S' | 'T'), None) if &word == b"BG" => Ok(0.0),
+            (Some(letter), None) => axis_of(letter)
+                .and_then(|axis| self.told(word, axis))
+                .ok_or(ErrorCode::BAD_RESPONSE),
+            _ => Err(ErrorCode::BAD_RESPONSE),
+        }
+    }
+
+    fn function(&self, name: &str, argument: f64) -> Result<f64, ErrorCode> {
+        let degrees = argument.to_radians();
+        Ok(match name {
+            "AN" => return self.analog_volts(argument),
+            "IN" if (1.0..=16.0).contains(&argument) => 1.0,
+            "OUT" if (1.0..=16.0).contains(&argument) => {
+                truth(self.outputs >> (argument as u32 - 1) & 1 == 1)
+            }
+            "IN" | "OUT" => return Err(ErrorCode::OUT_OF_RANGE),
+            "ABS" => argument.abs(),
+            "INT" => argument.trunc(),
+            "FRAC" => argument.fract(),
+            "RND" => argument.round(),
+            "SQR" if argument >= 0.0 => argument.sqrt(),
+            "SQR" => return Err(ErrorCode::OUT_OF_RANGE),
+            "SIN" => degrees.sin(),
+            "COS" => degrees.cos(),
+            "TAN" => degrees.tan(),
+            "ATAN" => argument.atan().to_degrees(),
+            "ASIN" => argument.clamp(-1.0, 1.0).asin().to_degrees(),
+            "ACOS" => argument.clamp(-1.0, 1.0).acos().to_degrees(),
+            "COM" => !(argument as i32) as f64,
+            _ => return Err(ErrorCode::BAD_FUNCTION),
+        })
+    }
+}

@@ -1,0 +1,105 @@
+//! What is asked of an emulator while it runs: a fault, or something that a person would do at the bench.
+
+use super::faults::{FaultError, ScheduledFault};
+use palpate_model::Nanos;
+use palpate_model::rig::HandAction;
+use thiserror::Error;
+
+/// One thing asked.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Order {
+    /// A fault that begins now.
+    Fault(ScheduledFault),
+    /// Weights, specimens.
+    Hand(HandAction),
+}
+
+/// An order cannot be read.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+pub enum OrderError {
+    /// It is no fault, nor anything done by hand.
+    #[error("{0}; or load GRAMS, mount NUMBER, unmount")]
+    Unknown(FaultError),
+    /// A number is missing or wrong.
+    #[error("'{order}' cannot be done; give {right}")]
+    Number {
+        /// What was asked.
+        order: String,
+        /// What would be understood.
+        right: &'static str,
+    },
+}
+
+impl Order {
+    /// Reads `load GRAMS`, `mount NUMBER`, `unmount`, or `KIND[:DURATION]` of a fault.
+    pub fn parse(text: &str, now: Nanos) -> Result<Self, OrderError> {
+        let wrong = |right| OrderError::Number {
+            order: text.to_owned(),
+            right,
+        };
+        let (word, rest) = text.split_once(' ').unwrap_or((text, ""));
+        let rest = rest.trim();
+        match word {
+            "load" => {
+                let mass_g: f64 = rest.parse().unwrap_or(f64::NAN);
+                // A tonne is beyond every load cell.
+                if !(0.0..=1e6).contains(&mass_g) {
+                    return Err(wrong("load and a mass in g, 0 for a free cell"));
+                }
+                Ok(Self::Hand(HandAction::LoadCell { mass_g }))
+            }
+            "mount" => {
+                let specimen = rest
+                    .parse()
+                    .map_err(|_| wrong("mount and the number of a specimen"))?;
+                Ok(Self::Hand(HandAction::Mount { specimen }))
+            }
+            "unmount" if rest.is_empty() => Ok(Self::Hand(HandAction::Unmount)),
+            _ => ScheduledFault::parse(text, Some(now))
+                .map(Self::Fault)
+                .map_err(OrderError::Unknown),
+        }
+    }
+
+    /// What is told when it is done; nothing of a fault, which tells itself when it begins.
+    #[must_use]
+    pub fn told(&self) -> Option<String> {
+        match self {
+            Self::Fault(_) => None,
+            Self::Hand(HandAction::LoadCell { mass_g }) => {
+                Some(format!("{mass_g} g are on the load cell"))
+            }
+            Self::Hand(HandAction::Mount { specimen }) => {
+                Some(format!("specimen {specimen} is mounted"))
+            }
+            Self::Hand(HandAction::Unmount) => Some("the specimen is taken out".to_owned()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn orders_are_read_or_refused_with_what_would_do() {
+        let parse = |text| Order::parse(text, Nanos(5));
+        let load = HandAction::LoadCell { mass_g: 140.5 };
+        assert_eq!(parse("load 140.5"), Ok(Order::Hand(load)));
+        let mount = HandAction::Mount { specimen: 3 };
+        assert_eq!(parse("mount 3"), Ok(Order::Hand(mount)));
+        assert_eq!(parse("unmount"), Ok(Order::Hand(HandAction::Unmount)));
+        assert!(matches!(parse("mute:2"), Ok(Order::Fault(_))));
+        for (text, part) in [
+            ("load", "a mass in g"),
+            ("load -1", "a mass in g"),
+            ("load nan", "a mass in g"),
+            ("mount x", "number of a specimen"),
+            ("unmount 3", "or load GRAMS"),
+            ("melt", "garbage, drop"),
+        ] {
+            let err = parse(text).unwrap_err().to_string();
+            assert!(err.contains(part) && err.contains(text), "{err}");
+        }
+    }
+}

@@ -1,0 +1,414 @@
+//! Puts an emulated device on a pseudo-terminal or a TCP port, in real time.
+//!
+//! One thread does everything. It alone of this crate reads a clock: it is a program of its own, the other end of
+//! the wire, and nothing of palpate decides by it.
+
+use super::Device;
+use super::faults::{FaultKind, FaultPlan, ScheduledFault, Turn};
+use super::orders::Order;
+use super::pty::Pty;
+use super::wire::Way;
+use palpate_model::Nanos;
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use rustix::net::sockopt::set_socket_linger;
+use std::io::{self, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream};
+use std::os::fd::AsFd;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::Receiver;
+use std::time::{Duration, Instant};
+use thiserror::Error;
+
+/// Longest sleep: the device's time passes at least this often, about once a sample.
+const SLEEP_MAX: Nanos = Nanos(1_000_000);
+/// So long a client gets to read the last bytes before a pseudo-terminal is closed, with which the system throws away
+/// what was not read.
+const FAREWELL: Nanos = Nanos(500_000_000);
+
+/// Where clients find the device.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A pseudo-terminal, with a link to it by this name.
+    Pty(Option<PathBuf>),
+    /// A TCP port; port 0 is any free one.
+    Tcp(SocketAddr),
+}
+
+/// How a device is put on a wire.
+#[derive(Clone, Debug)]
+pub struct ServeOptions {
+    /// Where.
+    pub place: Place,
+    /// Bits a second of the line, 10 a byte; as fast as bytes come without.
+    pub baud: Option<u32>,
+    /// Latency timer of the USB converter on the host's side.
+    pub latency: Nanos,
+    /// What goes wrong when.
+    pub faults: Vec<ScheduledFault>,
+    /// Of the bytes that faults spoil.
+    pub seed: u64,
+}
+
+/// What happens to an emulated device.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Told {
+    /// Clients can connect here: a path or an address.
+    Ready(String),
+    /// A fault has begun or ended.
+    Fault(Turn),
+    /// An order was carried out.
+    Done(Order),
+    /// An order was not understood; the sentence says what would be.
+    Refused(String),
+}
+
+/// A device cannot be put on a wire.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ServeError {
+    /// The place cannot be had.
+    #[error("the emulator cannot be reached at {place} ({detail}); choose another --pty or --tcp")]
+    Open {
+        /// Path or address.
+        place: String,
+        /// What the operating system said.
+        detail: String,
+    },
+    /// The wires cannot be watched.
+    #[error("the emulator cannot watch its connections ({0}); start it again")]
+    Watch(String),
+}
+
+/// One connection.
+struct Line {
+    stream: Option<TcpStream>,
+    to_device: Way,
+    from_device: Way,
+    unsent: Vec<u8>,
+}
+
+impl Line {
+    fn new(options: &ServeOptions) -> Self {
+        Self {
+            stream: None,
+            // The converter's timer is on the way to the host alone.
+            to_device: Way::new(options.baud, Nanos::ZERO),
+            from_device: Way::new(options.baud, options.latency),
+            unsent: Vec::new(),
+        }
+    }
+
+    fn clear(&mut self) {
+        self.stream = None;
+        self.to_device.clear();
+        self.from_device.clear();
+        self.unsent.clear();
+    }
+}
+
+enum Plug {
+    Pty(Pty),
+    Tcp(TcpListener),
+    /// A fault has pulled it.
+    Pulled,
+}
+
+/// Lets clients talk to a device until `stop` is set. `orders` are lines that [`Order::parse`] reads, each
+/// carried out at once.
+pub fn serve(
+    device: &mut dyn Device,
+    options: &ServeOptions,
+    orders: &Receiver<String>,
+    stop: &AtomicBool,
+    tell: &mut dyn FnMut(Told),
+) -> Result<(), ServeError> {
+    let mut server = Server::open(device, options)?;
+    tell(Told::Ready(server.address.clone()));
+    while !stop.load(Ordering::Relaxed) {
+        for order in orders.try_iter() {
+            let now = server.now();
+            match Order::parse(&order, now) {
+                Ok(Order::Fault(fault)) => server.faults.add(fault),
+                Ok(order @ Order::Hand(action)) => {
+                    server.device.by_hand(now, action);
+                    tell(Told::Done(order));
+                }
+                Err(err) => tell(Told::Refused(err.to_string())),
+            }
+        }
+        for turn in server.faults.advance(server.now()) {
+            tell(Told::Fault(turn));
+            server.turn(turn)?;
+        }
+        server.wait()?;
+        server.accept();
+        server.exchange();
+    }
+    server.farewell();
+    Ok(())
+}
+
+struct Server<'a> {
+    device: &'a mut dyn Device,
+    options: &'a ServeOptions,
+    start: Instant,
+    plug: Plug,
+    /// Where it is reached; a port that was chosen freely stays the same.
+    address: String,
+    bound: Option<SocketAddr>,
+    lines: Vec<Line>,
+    faults: FaultPlan,
+}
+
+impl<'a> Server<'a> {
+    #[expect(
+        clippy::disallowed_methods,
+        reason = "an emulator is the other end of the wire and has a clock of its own"
+    )]
+    fn open(device: &'a mut dyn Device, options: &'a ServeOptions) -> Result<Self, ServeError> {
+        let lines = (0..device.channels()).map(|_| Line::new(options)).collect();
+        let mut server = Self {
+            faults: FaultPlan::new(options.faults.clone(), options.seed),
+            device,
+            options,
+            start: Instant::now(),
+            plug: Plug::Pulled,
+            address: String::new(),
+            bound: None,
+            lines,
+        };
+        server.plug_in()?;
+        Ok(server)
+    }
+
+    fn now(&self) -> Nanos {
+        Nanos(self.start.elapsed().as_nanos() as u64)
+    }
+
+    fn plug_in(&mut self) -> Result<(), ServeError> {
+        match &self.options.place {
+            Place::Pty(link) => {
+                let pty = Pty::open(link.as_deref()).map_err(|err| ServeError::Open {
+                    place: link.as_deref().map_or_else(
+                        || "a pseudo-terminal".to_owned(),
+                        |link| link.display().to_string(),
+                    ),
+                    detail: err.to_string(),
+                })?;
+                let path = link.as_ref().unwrap_or(&pty.path);
+                self.address = path.display().to_string();
+                self.plug = Plug::Pty(pty);
+            }
+            Place::Tcp(address) => {
+                let address = self.bound.unwrap_or(*address);
+                let open = || -> io::Result<(TcpListener, SocketAddr)> {
+                    let listener = TcpListener::bind(address)?;
+                    listener.set_nonblocking(true)?;
+                    let bound = listener.local_addr()?;
+                    Ok((listener, bound))
+                };
+                let (listener, bound) = open().map_err(|err| ServeError::Open {
+                    place: address.to_string(),
+                    detail: err.to_string(),
+                })?;
+                self.bound = Some(bound);
+                self.address = bound.to_string();
+                self.plug = Plug::Tcp(listener);
+            }
+        }
+        Ok(())
+    }
+
+    fn turn(&mut self, turn: Turn) -> Result<(), ServeError> {
+        let now = self.now();
+        match turn.kind {
+            FaultKind::Device(fault) => self.device.suffer(now, fault, turn.is_on),
+            FaultKind::Line(_) => {}
+            FaultKind::Disconnect if turn.is_on => {
+                self.plug = Plug::Pulled;
+                for channel in 0..self.lines.len() {
+                    if self.lines[channel].stream.is_some() {
+                        self.device.disconnect(now, channel);
+                    }
+                    self.lines[channel].clear();
+                }
+            }
+            FaultKind::Disconnect => self.plug_in()?,
+        }
+        Ok(())
+    }
+
+    /// Sleeps until something arrives, something is due, or the device wants to go on.
+    fn wait(&mut self) -> Result<(), ServeError> {
+        let now = self.now();
+        let due = self.lines.iter().flat_map(|line| {
+            [line.to_device.next_at(), line.from_device.next_at()]
+                .into_iter()
+                .flatten()
+        });
+        let until = due.min().unwrap_or(now + SLEEP_MAX).min(now + SLEEP_MAX);
+        let timeout = Timespec {
+            tv_sec: 0,
+            tv_nsec: until.since(now).0 as i64,
+        };
+        let mut watched: Vec<PollFd<'_>> = Vec::new();
+        match &self.plug {
+            Plug::Tcp(listener) => {
+                watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN))
+            }
+            // Without a client a pseudo-terminal reports a hang-up again and again.
+            Plug::Pty(pty) if pty.has_client => {
+                let flags = flags(&self.lines[0]);
+                watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags));
+            }
+            Plug::Pty(_) | Plug::Pulled => {}
+        }
+        for line in &self.lines {
+            if let Some(stream) = &line.stream {
+                watched.push(PollFd::from_borrowed_fd(stream.as_fd(), flags(line)));
+            }
+        }
+        match poll(&mut watched, Some(&timeout)) {
+            Ok(_) | Err(Errno::INTR) => Ok(()),
+            Err(err) => Err(ServeError::Watch(err.to_string())),
+        }
+    }
+
+    /// New clients get the first free channel; one too many is reset (DMC-1400 command reference, `IH`).
+    fn accept(&mut self) {
+        let Plug::Tcp(listener) = &self.plug else {
+            return;
+        };
+        while let Ok((stream, _)) = listener.accept() {
+            let now = Nanos(self.start.elapsed().as_nanos() as u64);
+            let is_ready = stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok();
+            let free = self.lines.iter().position(|line| line.stream.is_none());
+            match free.filter(|_| is_ready) {
+                Some(channel) => {
+                    self.lines[channel].clear();
+                    self.lines[channel].stream = Some(stream);
+                    self.device.connect(now, channel);
+                }
+                // Closing with this set sends a reset; without it the client would see an orderly end.
+                None => drop(set_socket_linger(&stream, Some(Duration::ZERO))),
+            }
+        }
+    }
+
+    /// Bytes in, time on, bytes out.
+    fn exchange(&mut self) {
+        for channel in 0..self.lines.len() {
+            let (bytes, is_gone) = self.read(channel);
+            let now = self.now();
+            let bytes = self.faults.spoil(bytes, true);
+            let line = &mut self.lines[channel];
+            line.to_device.push(now, &bytes, Nanos::ZERO);
+            let arrived = if is_gone {
+                // Whoever hangs up has sent all of it before.
+                line.to_device.take(Nanos(u64::MAX))
+            } else {
+                line.to_device.take(now)
+            };
+            if !arrived.is_empty() {
+                self.device.receive(now, channel, &arrived);
+            }
+            if is_gone {
+                self.lines[channel].clear();
+                self.device.disconnect(now, channel);
+            }
+        }
+        let now = self.now();
+        self.device.advance(now);
+        for channel in 0..self.lines.len() {
+            let bytes = self.device.transmit(channel);
+            if !bytes.is_empty() {
+                let bytes = self.faults.spoil(bytes, false);
+                let lateness = self.faults.lateness();
+                self.lines[channel].from_device.push(now, &bytes, lateness);
+            }
+            self.write(channel);
+            if self.device.take_hang_up(channel) {
+                self.lines[channel].clear();
+            }
+        }
+    }
+
+    /// What a client has sent, and whether it has gone.
+    fn read(&mut self, channel: usize) -> (Vec<u8>, bool) {
+        if let Plug::Pty(pty) = &mut self.plug {
+            return (pty.read(), false);
+        }
+        let mut all = Vec::new();
+        let Some(stream) = &mut self.lines[channel].stream else {
+            return (all, false);
+        };
+        let mut part = [0_u8; 4096];
+        loop {
+            match stream.read(&mut part) {
+                Ok(0) => return (all, true),
+                Ok(count) => {
+                    all.extend_from_slice(&part[..count]);
+                    if count < part.len() {
+                        return (all, false);
+                    }
+                }
+                Err(err) if err.kind() == io::ErrorKind::Interrupted => {}
+                Err(err) => return (all, err.kind() != io::ErrorKind::WouldBlock),
+            }
+        }
+    }
+
+    /// Sends what is due; what the client has no room for waits.
+    fn write(&mut self, channel: usize) {
+        let now = self.now();
+        let line = &mut self.lines[channel];
+        if line.unsent.is_empty() {
+            line.unsent = line.from_device.take(now);
+        }
+        if line.unsent.is_empty() {
+            return;
+        }
+        let sent = match (&mut self.plug, &mut line.stream) {
+            (Plug::Pty(pty), _) => pty.write(&line.unsent),
+            (_, Some(stream)) => stream.write(&line.unsent).unwrap_or(0),
+            // Nobody is there.
+            (_, None) => line.unsent.len(),
+        };
+        line.unsent.drain(..sent);
+    }
+
+    /// Sends what is left and lets the client read it.
+    fn farewell(&mut self) {
+        let until = self.now() + FAREWELL;
+        while self.now() < until {
+            for channel in 0..self.lines.len() {
+                self.write(channel);
+            }
+            let is_sent = self
+                .lines
+                .iter()
+                .all(|line| line.unsent.is_empty() && line.from_device.next_at().is_none());
+            let is_read = match &mut self.plug {
+                Plug::Pty(pty) => {
+                    pty.read();
+                    !pty.has_client
+                }
+                _ => true,
+            };
+            if is_sent && is_read {
+                return;
+            }
+            std::thread::sleep(Duration::from_millis(1));
+        }
+    }
+}
+
+fn flags(line: &Line) -> PollFlags {
+    if line.unsent.is_empty() {
+        PollFlags::IN
+    } else {
+        PollFlags::IN | PollFlags::OUT
+    }
+}

@@ -1,0 +1,170 @@
+//! The controller on a pseudo-terminal and on a TCP port, in real time.
+
+use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings};
+use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
+use palpate_model::Nanos;
+use std::io::{ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+struct Served {
+    address: String,
+    orders: SyncSender<String>,
+    told: Receiver<Told>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+fn start(place: Place, is_serial: bool) -> Served {
+    let (orders, received) = sync_channel(16);
+    let (sender, told) = sync_channel(64);
+    let stop = Arc::new(AtomicBool::new(false));
+    let is_over = Arc::clone(&stop);
+    let thread = std::thread::Builder::new()
+        .name("emulator".into())
+        .spawn(move || {
+            let mut device = GalilEmulator::new(GalilSettings {
+                is_serial,
+                ..GalilSettings::default()
+            });
+            let options = ServeOptions {
+                place,
+                baud: None,
+                latency: Nanos::ZERO,
+                faults: Vec::new(),
+                seed: 1,
+            };
+            let mut tell = |told| sender.try_send(told).expect("room for what is told");
+            serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
+        })
+        .expect("a thread");
+    let Ok(Told::Ready(address)) = told.recv_timeout(Duration::from_secs(10)) else {
+        panic!("it did not start");
+    };
+    Served {
+        address,
+        orders,
+        told,
+        stop,
+        thread: Some(thread),
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let result = thread.join();
+            assert!(result.is_ok() || std::thread::panicking());
+        }
+    }
+}
+
+/// Reads until so many prompts have come.
+fn read_prompts(port: &mut impl Read, prompts: usize) -> String {
+    let mut all = Vec::new();
+    let mut part = [0_u8; 256];
+    while all
+        .iter()
+        .filter(|byte| matches!(byte, b':' | b'?'))
+        .count()
+        < prompts
+    {
+        match port.read(&mut part) {
+            Ok(0) => break,
+            Ok(count) => all.extend_from_slice(&part[..count]),
+            Err(err) if err.kind() == ErrorKind::Interrupted => {}
+            Err(err) => panic!("{err} after {:?}", String::from_utf8_lossy(&all)),
+        }
+    }
+    String::from_utf8_lossy(&all).into_owned()
+}
+
+#[test]
+fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
+    if !std::path::Path::new("/dev/ptmx").exists() {
+        println!("skipped: there are no pseudo-terminals here");
+        return;
+    }
+    let folder = std::env::temp_dir().join(format!("palpate-galil-{}", std::process::id()));
+    std::fs::create_dir_all(&folder).unwrap();
+    let link = folder.join("galil");
+    let served = start(Place::Pty(Some(link.clone())), true);
+    assert_eq!(served.address, link.display().to_string());
+    let open = || {
+        serialport::new(link.display().to_string(), 115_200)
+            .timeout(Duration::from_secs(10))
+            .open()
+            .unwrap()
+    };
+    let mut port = open();
+    port.write_all(b"EO 0\r").unwrap();
+    assert_eq!(read_prompts(&mut port, 1), ":");
+    port.write_all(b"SHA;JGA=500;BGA;MG _BGA\r").unwrap();
+    assert_eq!(read_prompts(&mut port, 4), "::: 1.0000\r\n:");
+    // The last words of a client that goes away are heard.
+    port.write_all(b"STA\r").unwrap();
+    drop(port);
+    std::thread::sleep(Duration::from_millis(300));
+    let mut port = open();
+    port.write_all(b"MG _SCA\r").unwrap();
+    let answer = read_prompts(&mut port, 2);
+    // The prompt of ST may have been lost with the client.
+    assert!(answer.ends_with(" 4.0000\r\n:"), "{answer:?}");
+    // Pulled out and put back: the old port is dead, a new one answers.
+    served.orders.send("disconnect:0.3".into()).unwrap();
+    std::thread::sleep(Duration::from_millis(100));
+    let mut byte = [0_u8; 1];
+    assert!(port.read_exact(&mut byte).is_err());
+    std::thread::sleep(Duration::from_millis(600));
+    drop(port);
+    let mut port = open();
+    port.write_all(b"MG 2\r").unwrap();
+    assert_eq!(read_prompts(&mut port, 1), " 2.0000\r\n:");
+    drop(port);
+    assert_eq!(served.told.try_iter().count(), 2);
+    drop(served);
+    assert!(!link.exists());
+    std::fs::remove_dir_all(&folder).unwrap();
+}
+
+#[test]
+fn eight_clients_connect_and_the_ninth_is_reset() {
+    let served = start(Place::Tcp(([127, 0, 0, 1], 0).into()), false);
+    let connect = || {
+        let stream = TcpStream::connect(&served.address).unwrap();
+        stream.set_nodelay(true).unwrap();
+        stream
+            .set_read_timeout(Some(Duration::from_secs(10)))
+            .unwrap();
+        stream
+    };
+    let mut clients: Vec<TcpStream> = (0..8)
+        .map(|at| {
+            let mut stream = connect();
+            stream.write_all(b"WH\r").unwrap();
+            let letter = char::from(b'A' + at);
+            assert_eq!(read_prompts(&mut stream, 1), format!("IH{letter}\r\n:"));
+            stream
+        })
+        .collect();
+    let mut ninth = connect();
+    let refused = ninth.read(&mut [0_u8; 8]).unwrap_err();
+    assert_eq!(refused.kind(), ErrorKind::ConnectionReset);
+    // A simple client reads text and prompt at once.
+    clients[3].write_all(b"MG TIME\r").unwrap();
+    let mut once = [0_u8; 64];
+    let count = clients[3].read(&mut once).unwrap();
+    assert!(once[..count].ends_with(b"\r\n:"));
+    drop(clients.pop());
+    std::thread::sleep(Duration::from_millis(100));
+    let mut again = connect();
+    again.write_all(b"WH\r").unwrap();
+    assert_eq!(read_prompts(&mut again, 1), "IHH\r\n:");
+    again.write_all(b"RS\r").unwrap();
+    assert_eq!(again.read(&mut once).unwrap(), 0);
+}
