@@ -11,6 +11,7 @@ pub mod open;
 pub mod rig;
 pub mod serial;
 pub mod sim;
+pub mod wire;
 
 pub use open::open;
 pub use rig::{Rig, RigError, RigEvent, RigEventBody};

@@ -1,0 +1,88 @@
+//! What a protocol is to the thread that owns the link.
+
+use crate::rig::RigEventBody;
+use palpate_model::Nanos;
+use palpate_model::rig::RigCommand;
+
+/// How a link has behaved, for the operator and the log.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct LinkStats {
+    /// Questions asked and answered since the link was opened.
+    pub answers: u64,
+    /// Shortest time from writing a question to the end of its answer.
+    pub round_trip_min: Nanos,
+    /// Mean of it.
+    pub round_trip_mean: Nanos,
+    /// Longest.
+    pub round_trip_max: Nanos,
+    /// Questions that may wait for their answers at once.
+    pub in_flight: usize,
+    /// How often the order of questions and answers was lost and found again.
+    pub resynchronised: u64,
+}
+
+impl LinkStats {
+    /// Takes one measured round trip.
+    pub fn push(&mut self, round_trip: Nanos) {
+        let sum = self.round_trip_mean.0 as f64 * self.answers as f64 + round_trip.0 as f64;
+        self.round_trip_min = if self.answers == 0 {
+            round_trip
+        } else {
+            self.round_trip_min.min(round_trip)
+        };
+        self.round_trip_max = self.round_trip_max.max(round_trip);
+        self.answers += 1;
+        self.round_trip_mean = Nanos((sum / self.answers as f64).round() as u64);
+    }
+
+    /// Half the difference of the longest and the shortest round trip: how far a sample's time at the host is
+    /// uncertain against its controller's.
+    #[must_use]
+    pub fn jitter(&self) -> Nanos {
+        Nanos(self.round_trip_max.since(self.round_trip_min).0 / 2)
+    }
+}
+
+/// A protocol in progress. Times never go backwards. It must neither wait nor read a clock.
+pub trait Dialogue: Send {
+    /// A command from the host. Commands that stop come before all that wait, and those that wait are not begun.
+    fn command(&mut self, now: Nanos, command: RigCommand);
+
+    /// A command that a stop has overtaken before it got here: it is not begun.
+    fn overtaken(&mut self, now: Nanos, command: RigCommand);
+
+    /// Bytes have arrived.
+    fn received(&mut self, now: Nanos, bytes: &[u8]);
+
+    /// Whole lines to be written now, if there are any.
+    fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>>;
+
+    /// When it wants to be asked again at the latest.
+    fn next_at(&self, now: Nanos) -> Nanos;
+
+    /// The next thing it has to report, with its arrival.
+    fn take_event(&mut self) -> Option<(Nanos, RigEventBody)>;
+
+    /// Why the link counts as dead although it is open, such as silence.
+    fn is_dead(&self, now: Nanos) -> Option<String>;
+
+    /// How the link behaves.
+    fn stats(&self) -> LinkStats;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn round_trips_are_summed_up() {
+        let mut stats = LinkStats::default();
+        for trip in [3_000, 1_000, 2_000] {
+            stats.push(Nanos(trip));
+        }
+        assert_eq!(stats.round_trip_min, Nanos(1_000));
+        assert_eq!(stats.round_trip_mean, Nanos(2_000));
+        assert_eq!(stats.round_trip_max, Nanos(3_000));
+        assert_eq!(stats.jitter(), Nanos(1_000));
+    }
+}

@@ -1,0 +1,301 @@
+//! The thread that owns a link, and the handle by which a rig talks to it.
+
+use super::HostClock;
+use super::dialogue::{Dialogue, LinkStats};
+use super::link::Link;
+use crate::rig::{RigEvent, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{Fault, RawBytes, RigCommand};
+use std::collections::VecDeque;
+use std::io;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
+use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// Longest wait for bytes: so late can a stop be that comes just after the wait began.
+const READ_MAX: Nanos = Nanos(500_000);
+/// Commands that may wait for the thread; as many as a controller's input buffer holds.
+const COMMANDS_MAX: usize = 64;
+/// Reports that may wait for the rig's owner: some seconds of samples. The oldest samples go first.
+const REPORTS_MAX: usize = 16_384;
+/// Bytes of the raw tap that may wait, in pieces.
+const PIECES_MAX: usize = 65_536;
+/// So much of what a device sends is read at once.
+const CHUNK: usize = 4096;
+
+/// What a line is called and when it is closed.
+#[derive(Clone, Debug)]
+pub struct LineSettings {
+    /// The device's name in the log of raw bytes, such as `controller`; the thread is called so too.
+    pub device: Arc<str>,
+    /// Bytes written when the line is closed, such as a stop.
+    pub farewell: Vec<u8>,
+}
+
+/// A command with the number of stops that were sent before it.
+type Numbered = (u64, RigCommand);
+
+#[derive(Default)]
+struct Reports {
+    events: VecDeque<RigEvent>,
+    raw: Vec<RawBytes>,
+    stats: LinkStats,
+    is_over: bool,
+}
+
+type Shared = Arc<(Mutex<Reports>, Condvar)>;
+
+/// A dialogue on a link, in a thread of its own. Dropped it says farewell and closes the link.
+pub struct Line {
+    /// Stops: looked at before anything that waits.
+    stops: SyncSender<Numbered>,
+    commands: SyncSender<Numbered>,
+    stop_count: u64,
+    reports: Shared,
+    is_closing: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+impl Line {
+    /// Starts the thread.
+    pub fn start(
+        link: Box<dyn Link>,
+        dialogue: impl Dialogue + 'static,
+        clock: HostClock,
+        settings: LineSettings,
+    ) -> io::Result<Self> {
+        let (stops, urgent) = sync_channel(COMMANDS_MAX);
+        let (commands, queued) = sync_channel(COMMANDS_MAX);
+        let reports = Shared::default();
+        let is_closing = Arc::new(AtomicBool::new(false));
+        let name = settings.device.to_string();
+        let mut owner = Owner {
+            link,
+            dialogue,
+            clock,
+            settings,
+            urgent,
+            queued,
+            stops_seen: 0,
+            reports: Arc::clone(&reports),
+        };
+        let closing = Arc::clone(&is_closing);
+        let thread = std::thread::Builder::new().name(name).spawn(move || {
+            owner.run(&closing);
+        })?;
+        Ok(Self {
+            stops,
+            commands,
+            stop_count: 0,
+            reports,
+            is_closing,
+            thread: Some(thread),
+        })
+    }
+
+    /// Hands over a command without waiting. One that finds no room is given back.
+    pub fn send(&mut self, command: RigCommand) -> Result<(), RigCommand> {
+        let way = if command.is_stopping() {
+            self.stop_count += 1;
+            &self.stops
+        } else {
+            &self.commands
+        };
+        way.try_send((self.stop_count, command)).map_err(|err| {
+            let (TrySendError::Full((_, command)) | TrySendError::Disconnected((_, command))) = err;
+            command
+        })
+    }
+
+    /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
+    #[must_use]
+    pub fn next_event(&self, until: Nanos, wait: Duration) -> Option<RigEvent> {
+        let (reports, came) = &*self.reports;
+        let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        let (mut reports, _) = came
+            .wait_timeout_while(reports, wait, |reports| {
+                reports.events.is_empty() && !reports.is_over
+            })
+            .unwrap_or_else(PoisonError::into_inner);
+        if reports.events.front()?.at > until {
+            return None;
+        }
+        reports.events.pop_front()
+    }
+
+    /// The bytes exchanged since this was last asked.
+    #[must_use]
+    pub fn take_raw(&self) -> Vec<RawBytes> {
+        let (reports, _) = &*self.reports;
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        std::mem::take(&mut reports.raw)
+    }
+
+    /// How the link behaves.
+    #[must_use]
+    pub fn stats(&self) -> LinkStats {
+        let (reports, _) = &*self.reports;
+        let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.stats
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.is_closing.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            // It ends within a read and a write; a panic in it was reported as a lost link.
+            let _ = thread.join();
+        }
+    }
+}
+
+/// The thread's side.
+struct Owner<D> {
+    link: Box<dyn Link>,
+    dialogue: D,
+    clock: HostClock,
+    settings: LineSettings,
+    urgent: Receiver<Numbered>,
+    queued: Receiver<Numbered>,
+    stops_seen: u64,
+    reports: Shared,
+}
+
+impl<D> Drop for Owner<D> {
+    /// However the thread ends, nobody waits for it.
+    fn drop(&mut self) {
+        let (reports, came) = &*self.reports;
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.is_over = true;
+        if std::thread::panicking() {
+            reports.events.push_back(RigEvent {
+                at: (self.clock)(),
+                body: lost("the driver has failed; open the rig again"),
+            });
+        }
+        came.notify_all();
+    }
+}
+
+fn lost(detail: impl Into<String>) -> RigEventBody {
+    RigEventBody::Fault(Fault::LinkLost {
+        detail: detail.into(),
+    })
+}
+
+impl<D: Dialogue> Owner<D> {
+    fn run(&mut self, is_closing: &AtomicBool) {
+        let ending = loop {
+            if is_closing.load(Ordering::Relaxed) {
+                let farewell = self.settings.farewell.clone();
+                // Nobody is left who could be told.
+                let _ = self.write(farewell);
+                return;
+            }
+            if let Err(err) = self.turn() {
+                break err.to_string();
+            }
+            if let Some(why) = self.dialogue.is_dead((self.clock)()) {
+                break why;
+            }
+        };
+        let at = (self.clock)();
+        self.report(vec![RigEvent {
+            at,
+            body: lost(ending),
+        }]);
+    }
+
+    /// Commands, lines, bytes: once.
+    fn turn(&mut self) -> io::Result<()> {
+        self.take_stops();
+        for (stops, command) in self.queued.try_iter().collect::<Vec<_>>() {
+            // A stop may have come while this was looked at.
+            self.take_stops();
+            let now = (self.clock)();
+            if stops < self.stops_seen {
+                self.dialogue.overtaken(now, command);
+            } else {
+                self.dialogue.command(now, command);
+            }
+        }
+        loop {
+            self.take_stops();
+            let Some(line) = self.dialogue.take_line((self.clock)()) else {
+                break;
+            };
+            self.write(line)?;
+        }
+        let now = (self.clock)();
+        let wait = self.dialogue.next_at(now).since(now).min(READ_MAX);
+        let mut buffer = [0_u8; CHUNK];
+        let count = self
+            .link
+            .read(&mut buffer, Duration::from_nanos(wait.0.max(1)))?;
+        let now = (self.clock)();
+        if count > 0 {
+            self.tap(now, false, buffer[..count].to_vec());
+            self.dialogue.received(now, &buffer[..count]);
+        }
+        let mut events = Vec::new();
+        while let Some((at, body)) = self.dialogue.take_event() {
+            events.push(RigEvent { at, body });
+        }
+        self.report(events);
+        Ok(())
+    }
+
+    fn take_stops(&mut self) {
+        while let Ok((stops, command)) = self.urgent.try_recv() {
+            self.stops_seen = stops;
+            self.dialogue.command((self.clock)(), command);
+        }
+    }
+
+    fn write(&mut self, bytes: Vec<u8>) -> io::Result<()> {
+        if bytes.is_empty() {
+            return Ok(());
+        }
+        self.link.write(&bytes)?;
+        self.tap((self.clock)(), true, bytes);
+        Ok(())
+    }
+
+    fn tap(&mut self, at: Nanos, is_sent: bool, bytes: Vec<u8>) {
+        let (reports, _) = &*self.reports;
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        if reports.raw.len() >= PIECES_MAX {
+            reports.raw.clear();
+        }
+        reports.raw.push(RawBytes {
+            at,
+            device: Arc::clone(&self.settings.device),
+            is_sent,
+            bytes,
+        });
+    }
+
+    fn report(&mut self, events: Vec<RigEvent>) {
+        let (reports, came) = &*self.reports;
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.stats = self.dialogue.stats();
+        if events.is_empty() {
+            return;
+        }
+        for event in events {
+            if reports.events.len() >= REPORTS_MAX {
+                let oldest = reports
+                    .events
+                    .iter()
+                    .position(|event| matches!(event.body, RigEventBody::Reading(_)))
+                    .unwrap_or(0);
+                reports.events.remove(oldest);
+            }
+            reports.events.push_back(event);
+        }
+        came.notify_all();
+    }
+}

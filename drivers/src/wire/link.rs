@@ -1,0 +1,117 @@
+//! Ways for bytes: a serial port, a TCP connection.
+
+use rustix::event::{PollFd, PollFlags, Timespec, poll};
+use rustix::io::Errno;
+use serialport::SerialPort;
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::TcpStream;
+use std::os::fd::AsFd;
+use std::time::Duration;
+
+/// A connection to a device. An error means that it is gone.
+pub trait Link: Send {
+    /// Waits so long for bytes, and gives how many there are; 0 when none came in time.
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize>;
+
+    /// Writes all bytes. A device that takes none for [`WRITE_MAX`] is gone.
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()>;
+}
+
+/// Nothing that palpate writes is as long as what operating systems keep for a device (4 kB), so a write that waits
+/// this long is stuck.
+pub const WRITE_MAX: Duration = Duration::from_millis(250);
+
+fn gone() -> io::Error {
+    io::Error::new(ErrorKind::UnexpectedEof, "the device has hung up")
+}
+
+/// A serial port.
+pub struct SerialLink(Box<dyn SerialPort>);
+
+impl SerialLink {
+    /// A port that was opened.
+    #[must_use]
+    pub fn new(port: Box<dyn SerialPort>) -> Self {
+        Self(port)
+    }
+}
+
+impl Link for SerialLink {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.0.set_timeout(wait)?;
+        match self.0.read(buffer) {
+            Ok(0) => Err(gone()),
+            Ok(count) => Ok(count),
+            Err(err) if matches!(err.kind(), ErrorKind::TimedOut | ErrorKind::Interrupted) => Ok(0),
+            Err(err) => Err(err),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.0.set_timeout(WRITE_MAX)?;
+        self.0.write_all(bytes)
+    }
+}
+
+/// A TCP connection, each write sent at once.
+pub struct TcpLink(TcpStream);
+
+impl TcpLink {
+    /// A connection that was opened.
+    pub fn new(stream: TcpStream) -> io::Result<Self> {
+        stream.set_nodelay(true)?;
+        stream.set_nonblocking(true)?;
+        Ok(Self(stream))
+    }
+
+    /// Waits for one of `flags`. `poll` counts nanoseconds where a socket's own timeout counts the kernel's ticks.
+    fn wait(&self, flags: PollFlags, wait: Duration) -> io::Result<()> {
+        let timeout = Timespec {
+            tv_sec: i64::try_from(wait.as_secs()).unwrap_or(i64::MAX),
+            tv_nsec: i64::from(wait.subsec_nanos()),
+        };
+        let mut watched = [PollFd::from_borrowed_fd(self.0.as_fd(), flags)];
+        match poll(&mut watched, Some(&timeout)) {
+            Ok(_) | Err(Errno::INTR) => Ok(()),
+            Err(err) => Err(err.into()),
+        }
+    }
+}
+
+impl Link for TcpLink {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        self.wait(PollFlags::IN, wait)?;
+        match self.0.read(buffer) {
+            Ok(0) => Err(gone()),
+            Ok(count) => Ok(count),
+            Err(err) if matches!(err.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => {
+                Ok(0)
+            }
+            Err(err) => Err(err),
+        }
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        let mut left = bytes;
+        let mut is_second_try = false;
+        while !left.is_empty() {
+            match self.0.write(left) {
+                Ok(0) => return Err(gone()),
+                Ok(count) => {
+                    left = &left[count..];
+                    is_second_try = false;
+                }
+                Err(err) if err.kind() == ErrorKind::Interrupted => {}
+                Err(err) if err.kind() == ErrorKind::WouldBlock && !is_second_try => {
+                    is_second_try = true;
+                    self.wait(PollFlags::OUT, WRITE_MAX)?;
+                }
+                Err(err) if err.kind() == ErrorKind::WouldBlock => {
+                    return Err(ErrorKind::TimedOut.into());
+                }
+                Err(err) => return Err(err),
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,22 @@
+//! Bytes to a device and back: links, and the thread that owns one.
+//!
+//! Nothing here knows what the bytes mean: that is a [`Dialogue`], a state machine with the time handed in, so that
+//! every protocol can be tested without a port, a thread or a clock. [`Line`] runs one on a link.
+
+mod dialogue;
+mod line;
+mod link;
+mod memory;
+mod place;
+
+pub use dialogue::{Dialogue, LinkStats};
+pub use line::{Line, LineSettings};
+pub use link::{Link, SerialLink, TcpLink};
+pub use memory::{MemoryLink, pair};
+pub use place::{Place, WireError};
+
+use palpate_model::Nanos;
+use std::sync::Arc;
+
+/// Reads the computer's monotonic clock. Drivers are handed one and never read a clock by themselves.
+pub type HostClock = Arc<dyn Fn() -> Nanos + Send + Sync>;

@@ -1,0 +1,224 @@
+//! Where a device is, and what can be wrong with opening it.
+
+use super::link::{Link, SerialLink, TcpLink};
+use crate::serial::list_ports;
+use serialport::{FlowControl, SerialPort};
+use std::fmt;
+use std::io::ErrorKind;
+use std::net::{TcpStream, ToSocketAddrs};
+use std::time::Duration;
+use thiserror::Error;
+
+/// A controller in the same laboratory answers within milliseconds.
+const CONNECT_MAX: Duration = Duration::from_secs(3);
+
+/// Where a device is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Place {
+    /// A serial port, 8 data bits, no parity, one stop bit.
+    Serial {
+        /// Path or name of the port.
+        port: String,
+        /// Bits per second.
+        baud: u32,
+        /// Whether RTS and CTS hold bytes back.
+        has_handshake: bool,
+    },
+    /// `HOST:PORT`.
+    Tcp(String),
+}
+
+impl fmt::Display for Place {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Serial { port, baud, .. } => write!(f, "{port} at {baud} baud"),
+            Self::Tcp(address) => f.write_str(address),
+        }
+    }
+}
+
+/// A device cannot be reached.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum WireError {
+    /// No such port.
+    #[error("there is no serial port {port}; this computer has {present}")]
+    Missing {
+        /// The port asked for.
+        port: String,
+        /// Those there are, in words.
+        present: String,
+    },
+    /// Somebody has it.
+    #[error("the serial port {port} is in use by another program; close that program first")]
+    Busy {
+        /// The port.
+        port: String,
+    },
+    /// This account may not.
+    #[error(
+        "this account may not open {port}; add it to the group that owns the port (on Linux mostly `sudo usermod -aG dialout $USER`) and log in again"
+    )]
+    Forbidden {
+        /// The port.
+        port: String,
+    },
+    /// Anything else about a port.
+    #[error("the serial port {port} cannot be opened ({detail}); check cable and settings")]
+    Port {
+        /// The port.
+        port: String,
+        /// What the operating system said.
+        detail: String,
+    },
+    /// Not an address.
+    #[error("'{address}' is not an address ({detail}); give HOST:PORT, such as 192.168.1.10:23")]
+    Address {
+        /// What was given.
+        address: String,
+        /// What the operating system said.
+        detail: String,
+    },
+    /// Nobody answers.
+    #[error(
+        "nothing answers at {address} ({detail}); check that the device is on and its address, and that not all its connections are taken"
+    )]
+    Unreachable {
+        /// The address.
+        address: String,
+        /// What the operating system said.
+        detail: String,
+    },
+}
+
+impl Place {
+    /// Opens it. Two programs cannot have one serial port.
+    pub fn open(&self) -> Result<Box<dyn Link>, WireError> {
+        match self {
+            Self::Serial {
+                port,
+                baud,
+                has_handshake,
+            } => {
+                let flow = if *has_handshake {
+                    FlowControl::Hardware
+                } else {
+                    FlowControl::None
+                };
+                let opened: Box<dyn SerialPort> = serialport::new(port, *baud)
+                    .flow_control(flow)
+                    .timeout(Duration::from_millis(1))
+                    .open()
+                    .map_err(|err| port_error(port, &err))?;
+                Ok(Box::new(SerialLink::new(opened)))
+            }
+            Self::Tcp(address) => {
+                let wrong = |detail: String| WireError::Address {
+                    address: address.clone(),
+                    detail,
+                };
+                let resolved = address
+                    .to_socket_addrs()
+                    .map_err(|err| wrong(err.to_string()))?
+                    .next()
+                    .ok_or_else(|| wrong("it stands for no computer".into()))?;
+                let opened = TcpStream::connect_timeout(&resolved, CONNECT_MAX)
+                    .and_then(TcpLink::new)
+                    .map_err(|err| WireError::Unreachable {
+                        address: address.clone(),
+                        detail: err.to_string(),
+                    })?;
+                Ok(Box::new(opened))
+            }
+        }
+    }
+}
+
+fn port_error(port: &str, err: &serialport::Error) -> WireError {
+    use serialport::ErrorKind as Kind;
+    let port = port.to_owned();
+    match err.kind() {
+        Kind::Io(ErrorKind::NotFound) => WireError::Missing {
+            port,
+            present: present(),
+        },
+        Kind::Io(ErrorKind::PermissionDenied) => WireError::Forbidden { port },
+        Kind::Io(ErrorKind::ResourceBusy) => WireError::Busy { port },
+        // A second open with serialport 4.10 fails with this kind and "Unable to acquire exclusive lock on serial
+        // port"; on Windows a missing port has it too, with other words.
+        Kind::NoDevice if err.description.contains("lock") => WireError::Busy { port },
+        Kind::NoDevice if !std::path::Path::new(&port).exists() => WireError::Missing {
+            port,
+            present: present(),
+        },
+        _ => WireError::Port {
+            port,
+            detail: err.to_string(),
+        },
+    }
+}
+
+fn present() -> String {
+    match list_ports() {
+        Ok(ports) if ports.is_empty() => "none".to_owned(),
+        Ok(ports) => ports
+            .into_iter()
+            .map(|port| format!("{} ({})", port.name, port.description))
+            .collect::<Vec<_>>()
+            .join(", "),
+        Err(err) => err.to_string(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn serial(port: &str) -> WireError {
+        let place = Place::Serial {
+            port: port.into(),
+            baud: 115_200,
+            has_handshake: false,
+        };
+        let Err(err) = place.open() else {
+            panic!("{port} was opened");
+        };
+        err
+    }
+
+    #[test]
+    fn a_missing_port_tells_which_there_are() {
+        let err = serial("/dev/there-is-no-such-port");
+        assert!(matches!(err, WireError::Missing { .. }), "{err:?}");
+        assert!(err.to_string().contains("this computer has"), "{err}");
+    }
+
+    #[test]
+    fn a_file_is_no_port() {
+        let file = tempfile::NamedTempFile::new().unwrap();
+        let err = serial(&file.path().display().to_string());
+        assert!(matches!(err, WireError::Port { .. }), "{err:?}");
+    }
+
+    #[test]
+    fn addresses_are_checked_before_anybody_is_called() {
+        for wrong in ["", "localhost", "localhost:x", "127.0.0.1:99999"] {
+            let Err(err) = Place::Tcp(wrong.into()).open() else {
+                panic!("'{wrong}' was opened");
+            };
+            assert!(matches!(err, WireError::Address { .. }), "{err}");
+            assert!(err.to_string().contains("HOST:PORT"));
+        }
+    }
+
+    #[test]
+    fn nobody_at_an_address_is_told() {
+        let free = std::net::TcpListener::bind("127.0.0.1:0").unwrap();
+        let address = free.local_addr().unwrap().to_string();
+        drop(free);
+        let Err(err) = Place::Tcp(address.clone()).open() else {
+            panic!("somebody answered");
+        };
+        assert!(err.to_string().contains(&address), "{err}");
+    }
+}
