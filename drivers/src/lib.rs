@@ -7,6 +7,7 @@
 
 pub mod doubles;
 pub mod emulate;
+pub mod galil;
 pub mod open;
 pub mod rig;
 pub mod serial;

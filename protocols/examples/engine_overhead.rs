@@ -32,6 +32,7 @@ fn rig() -> RigDescription {
         acceleration: MmPerS2(61.44),
         adc: None,
         noise_expected: Volts(0.001),
+        pulse_lag: palpate_model::units::Seconds(0.0),
     }
 }
 

@@ -73,6 +73,7 @@ fn manifest() -> Manifest {
             acceleration: MmPerS2(15.36),
             adc: None,
             noise_expected: Volts(1e-3),
+            pulse_lag: palpate_model::units::Seconds(0.0),
         }),
         limits: Some(Limits::for_travel(travel)),
         calibration: serde_json::Value::Null,

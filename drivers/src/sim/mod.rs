@@ -271,5 +271,6 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         acceleration: ACCELERATION,
         adc: load_cell::adc(settings.profile),
         noise_expected: load_cell::noise_expected(settings),
+        pulse_lag: palpate_model::units::Seconds(0.0),
     }
 }

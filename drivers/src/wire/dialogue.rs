@@ -45,6 +45,9 @@ impl LinkStats {
 
 /// A protocol in progress. Times never go backwards. It must neither wait nor read a clock.
 pub trait Dialogue: Send {
+    /// When the rig's owner last asked for reports. Who is not asked should let the device stop by itself.
+    fn attended(&mut self, at: Nanos);
+
     /// A command from the host. Commands that stop come before all that wait, and those that wait are not begun.
     fn command(&mut self, now: Nanos, command: RigCommand);
 

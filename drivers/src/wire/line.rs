@@ -42,6 +42,8 @@ struct Reports {
     events: VecDeque<RigEvent>,
     raw: Vec<RawBytes>,
     stats: LinkStats,
+    /// Somebody has asked for reports since the thread looked.
+    is_attended: bool,
     is_over: bool,
 }
 
@@ -113,7 +115,8 @@ impl Line {
     #[must_use]
     pub fn next_event(&self, until: Nanos, wait: Duration) -> Option<RigEvent> {
         let (reports, came) = &*self.reports;
-        let reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.is_attended = true;
         let (mut reports, _) = came
             .wait_timeout_while(reports, wait, |reports| {
                 reports.events.is_empty() && !reports.is_over
@@ -282,6 +285,9 @@ impl<D: Dialogue> Owner<D> {
         let (reports, came) = &*self.reports;
         let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
         reports.stats = self.dialogue.stats();
+        if std::mem::take(&mut reports.is_attended) {
+            self.dialogue.attended((self.clock)());
+        }
         if events.is_empty() {
             return;
         }

@@ -41,6 +41,14 @@ pub struct RigDescription {
     pub adc: Option<AdcDescription>,
     /// White noise of the signal expected at rest (standard deviation).
     pub noise_expected: Volts,
+    /// By how long reported pulses may be behind or before the commanded path: filters of the drive, and the time from
+    /// a command to the sample behind it. Zero on a simulated rig.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub pulse_lag: Seconds,
+}
+
+fn is_zero(span: &Seconds) -> bool {
+    span.0 == 0.0
 }
 
 impl RigDescription {

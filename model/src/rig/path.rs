@@ -47,6 +47,7 @@ enum Pending {
 pub struct PathTracker {
     mm_per_pulse: f64,
     tick: Seconds,
+    pulse_lag: Seconds,
     position: Option<Position>,
     velocity: MmPerS,
     pending: Option<Pending>,
@@ -60,6 +61,7 @@ impl PathTracker {
         Self {
             mm_per_pulse: rig.mm_per_pulse,
             tick: rig.tick(),
+            pulse_lag: rig.pulse_lag,
             position: None,
             velocity: MmPerS(0.0),
             pending: None,
@@ -140,8 +142,9 @@ impl PathTracker {
         }
         self.position = Some(position);
         let expected_pulses = position.0 / self.mm_per_pulse;
+        let lag_pulses = (self.velocity.0 * self.pulse_lag.0 / self.mm_per_pulse).abs();
         // One pulse, plus rounding of a position of up to 1e5 pulses in double precision.
-        if (expected_pulses - reading.pulses as f64).abs() > 1.0 + 1e-6 {
+        if (expected_pulses - reading.pulses as f64).abs() > 1.0 + lag_pulses + 1e-6 {
             return Err(PathError {
                 expected_pulses,
                 reported_pulses: reading.pulses,

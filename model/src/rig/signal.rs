@@ -93,6 +93,7 @@ mod tests {
                 volts_per_count: 0.001,
             }),
             noise_expected: Volts(0.001),
+            pulse_lag: crate::units::Seconds(0.0),
         }
     }
 

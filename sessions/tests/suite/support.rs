@@ -78,6 +78,7 @@ pub fn manifest() -> Manifest {
                 volts_per_count: 10.0 / 32768.0,
             }),
             noise_expected: Volts(0.1 + 0.2),
+            pulse_lag: palpate_model::units::Seconds(0.0),
         }),
         limits: Some(Limits::for_travel(Position(149.999_999_999_999_97))),
         calibration: serde_json::json!({"slope_n_per_v": 3.591_234_567_890_123_4}),

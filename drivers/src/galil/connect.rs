@@ -1,0 +1,346 @@
+//! What happens once when a controller is opened: who it is, whether it is the right one, its settings, a limit to
+//! everything before anything can move, and how fast the link is.
+
+use super::console::{ANSWER_MAX, Console};
+use super::model::{GalilBoard, GalilOpenError};
+use super::order::{limit_commands, software_limits};
+use super::sampling::{Sampler, signed};
+use super::session::Pace;
+use super::settings::GalilSettings;
+use super::watchdog;
+use crate::wire::{HostClock, Link, LinkStats};
+use palpate_model::Nanos;
+use palpate_model::rig::{AdcDescription, RawBytes, RigDescription};
+use palpate_model::units::{MmPerS, MmPerS2, Seconds};
+use std::collections::BTreeMap;
+use std::sync::Arc;
+
+/// True length in ns of what `TM` calls a microsecond: `TM 1000` sets 976 microseconds, 1024 samples a second
+/// (DMC-40x0 user manual, page 246; DMC-18x2 command reference, `TIME`).
+const NANOS_PER_TM: f64 = 1e9 / 1024.0 / 1000.0;
+/// The weakest smoothing of pulses (`KS`; Galil application note 2446): its time constant of three samples a unit keeps
+/// pulses within 1.5 samples of the command.
+const SMOOTHING: f64 = 0.5;
+/// A line without a byte for so long has nothing more to say, at any baud rate and latency of a USB converter.
+const QUIET: Nanos = Nanos::from_millis(120);
+/// A download is answered when it has been stored.
+const DOWNLOAD_MAX: Nanos = Nanos::from_millis(10_000);
+/// Single questions by which the link is measured, and questions in a row that show what it carries.
+const SINGLE: usize = 10;
+const ROW: usize = 12;
+/// More questions would only wait in the controller's input buffer, before a stop.
+const IN_FLIGHT_MAX: usize = 8;
+/// By how many samples reported pulses may differ from the command: 1.5 of the smoothing filter, and two between
+/// `BG` or `ST` and the sample behind it.
+const LAG_SAMPLES: f64 = 4.0;
+
+/// A controller that was set up.
+#[derive(Clone, Debug)]
+pub struct Connected {
+    /// Who it is.
+    pub board: GalilBoard,
+    /// What it makes of the rig.
+    pub description: RigDescription,
+    /// How to ask for samples.
+    pub pace: Pace,
+    /// The link as it was measured.
+    pub stats: LinkStats,
+    /// Whether the watchdog's program runs.
+    pub has_watchdog: bool,
+    /// How far the axis goes at most when palpate falls silent, in mm; the whole travel without a watchdog.
+    pub worst_case_mm: f64,
+    /// What was exchanged.
+    pub raw: Vec<RawBytes>,
+}
+
+/// Sets a controller up. The axis is stopped first; nothing moves.
+pub fn connect(
+    link: &mut dyn Link,
+    clock: &HostClock,
+    settings: &GalilSettings,
+    device: &Arc<str>,
+) -> Result<Connected, GalilOpenError> {
+    let mut console = Console::new(link, clock, device);
+    let board = identify(&mut console, settings)?;
+    quieten(&mut console, settings)?;
+    let acceleration = set_up_axis(&mut console, settings)?;
+    set_up_input(&mut console, settings)?;
+    let has_watchdog = settings.has_watchdog && start_watchdog(&mut console, settings)?;
+    let tm = console.number("_TM")?;
+    if !(tm > 0.0 && tm <= 1e6) {
+        return Err(GalilOpenError::SetOtherwise {
+            command: "TM".into(),
+            found: tm.to_string(),
+        });
+    }
+    let tick = Nanos((tm * NANOS_PER_TM).round() as u64);
+    let (stats, pace) = measure(&mut console, settings, tick)?;
+    let worst_case_mm = if has_watchdog {
+        watchdog::worst_case_mm(settings.speed_max, acceleration)
+    } else {
+        settings.travel.0 + 2.0 * super::order::LIMIT_MARGIN_MM
+    };
+    let description = describe(
+        settings,
+        &board,
+        tm,
+        acceleration,
+        has_watchdog,
+        worst_case_mm,
+    );
+    Ok(Connected {
+        board,
+        description,
+        pace,
+        stats,
+        has_watchdog,
+        worst_case_mm,
+        raw: console.raw,
+    })
+}
+
+fn identify(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+) -> Result<GalilBoard, GalilOpenError> {
+    // Half a line, or half a download, of whoever was here before is ended; echo is off from here on.
+    console.write("\rEO 0\r")?;
+    if console.drain(QUIET)? == 0 {
+        console.write("\\\rEO 0\r")?;
+        if console.drain(Nanos(4 * QUIET.0))? == 0 {
+            return Err(GalilOpenError::Silent);
+        }
+    }
+    let reply = console.try_ask("\x12\x16")?;
+    let mut board = GalilBoard::parse(&reply.text())?;
+    // Not every firmware has the operand.
+    let serial = console.try_ask("MG _BN")?;
+    let number = serial.numbers().filter(|_| serial.is_accepted);
+    board.serial_number = number
+        .and_then(|numbers| numbers.first().copied())
+        .filter(|number| *number >= 0.0 && number.fract() == 0.0)
+        .map(|number| number as u64);
+    if let Some(expected) = settings.serial_number
+        && board.serial_number != Some(expected)
+    {
+        let found = board
+            .serial_number
+            .map_or_else(|| "none that it tells".to_owned(), |n| n.to_string());
+        return Err(GalilOpenError::OtherSerial { found, expected });
+    }
+    let index = (settings.axis as usize).wrapping_sub('A' as usize);
+    if index >= board.axes {
+        return Err(GalilOpenError::NoAxis {
+            revision: board.revision,
+            axes: board.axes,
+            axis: settings.axis,
+        });
+    }
+    Ok(board)
+}
+
+/// Programs halted, the axis stopped, unsolicited text marked, numbers in a form that has all their digits.
+fn quieten(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
+    let a = settings.axis;
+    console.ask("HX")?;
+    console.ask(&format!("ST{a}"))?;
+    console.ask("CW 1")?;
+    // Not every firmware has these: numbers are read in any form.
+    for form in ["LZ 1", "PF 10.0", "VF 10.4"] {
+        console.try_ask(form)?;
+    }
+    // The slowest stop that a controller allows itself takes longer than anybody waits for a rig to open.
+    let start = console.now();
+    while console.number(&format!("_BG{a}"))? != 0.0 {
+        if console.now().since(start) > Nanos::from_millis(5_000) {
+            console.ask("AB 1")?;
+        }
+        if console.now().since(start) > Nanos::from_millis(6_000) {
+            return Err(GalilOpenError::SetOtherwise {
+                command: "AB 1".into(),
+                found: format!("axis {a} still moving"),
+            });
+        }
+    }
+    Ok(())
+}
+
+/// Pulses, rates, switches and software limits. Gives the acceleration that was set.
+fn set_up_axis(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+) -> Result<MmPerS2, GalilOpenError> {
+    let a = settings.axis;
+    let motor_type = settings.motor_type.code();
+    if console.number(&format!("_MT{a}"))? != motor_type {
+        console.ask(&format!("MO{a}"))?;
+        console.set(
+            &format!("MT{a}={motor_type}"),
+            &format!("_MT{a}"),
+            motor_type,
+        )?;
+    }
+    console.ask(&format!("KS{a}={SMOOTHING}"))?;
+    console.ask(&format!(
+        "CN {},{}",
+        settings.limits.code(),
+        settings.home.code()
+    ))?;
+    let rate = settings.counts2(settings.acceleration);
+    console.ask(&format!("AC{a}={rate}"))?;
+    console.ask(&format!("DC{a}={rate}"))?;
+    // Limits are left at this rate; the older series have no such command and use that of `DC`.
+    console.try_ask(&format!("SD{a}={rate}"))?;
+    let rates = console.numbers(&format!("_AC{a},_DC{a}"))?;
+    if rates[0] != rates[1] || rates[0] <= 0.0 {
+        return Err(GalilOpenError::SetOtherwise {
+            command: format!("AC{a}={rate}"),
+            found: format!("{} and {}", rates[0], rates[1]),
+        });
+    }
+    console.ask(&format!("SP{a}={}", settings.counts(settings.speed_max)))?;
+    // Before homing the axis can be anywhere on its travel, and homing may need all of it.
+    let here = console.number(&format!("_TD{a}"))?;
+    let here = settings.sign() * signed(here).unwrap_or(0);
+    let travel = (settings.travel.0 / settings.mm_per_pulse).round() as i64;
+    // Homing searches ten millimetres further than the travel.
+    let margin = (10.0 / settings.mm_per_pulse).round() as i64;
+    let (forward, reverse) = software_limits(
+        settings,
+        here - travel - margin,
+        2.0 * (settings.travel.0 + 10.0),
+    );
+    debug_assert!(margin > 0);
+    for command in limit_commands(a, forward, reverse) {
+        if let Some(list) = command.strip_prefix("MG ") {
+            let found = console.numbers(list)?;
+            if found != [forward as f64, reverse as f64] {
+                return Err(GalilOpenError::SetOtherwise {
+                    command: format!("FL{a}={forward};BL{a}={reverse}"),
+                    found: format!("{} and {}", found[0], found[1]),
+                });
+            }
+        } else {
+            console.ask(&command)?;
+        }
+    }
+    Ok(MmPerS2(rates[0] * settings.mm_per_pulse))
+}
+
+fn set_up_input(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {
+    let (input, range) = (settings.input, settings.range.code());
+    // A controller that has one range only does not know the command; then it must be the usual +-10 V.
+    let reply = console.try_ask(&format!("AQ {input},{range}"))?;
+    if reply.is_accepted {
+        let found = console.number(&format!("_AQ{input}"))?;
+        if found != f64::from(range) {
+            return Err(GalilOpenError::SetOtherwise {
+                command: format!("AQ {input},{range}"),
+                found: found.to_string(),
+            });
+        }
+    } else if settings.range != super::AnalogRange::Bipolar10 {
+        console.ask(&format!("AQ {input},{range}"))?;
+    }
+    console.number(&format!("@AN[{input}]")).map(|_| ())
+}
+
+/// Downloads and starts the watchdog's program; `false` when the controller runs none.
+fn start_watchdog(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+) -> Result<bool, GalilOpenError> {
+    console.ask(&format!("{}=1", watchdog::VARIABLE))?;
+    let mut text = String::from("DL\r");
+    for line in watchdog::program(settings.axis) {
+        text.push_str(&line);
+        text.push('\r');
+    }
+    text.push('\\');
+    console.write(&text)?;
+    // One prompt for `\` and one for `DL`; a line that is refused gives `?` before them.
+    let replies = console.replies(2, DOWNLOAD_MAX)?;
+    let is_stored = replies.len() == 2 && replies.iter().all(|reply| reply.is_accepted);
+    console.drain(QUIET)?;
+    if !is_stored {
+        return Ok(false);
+    }
+    let started = console.try_ask(&format!("XQ {},{}", watchdog::LABEL, watchdog::THREAD))?;
+    if !started.is_accepted {
+        return Ok(false);
+    }
+    Ok(console.number(&format!("_XQ{}", watchdog::THREAD))? >= 0.0)
+}
+
+/// How long an answer takes alone, and how fast answers come in a row.
+fn measure(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+    tick: Nanos,
+) -> Result<(LinkStats, Pace), GalilOpenError> {
+    let question = Sampler::question(settings);
+    let mut stats = LinkStats::default();
+    for _ in 0..SINGLE {
+        let asked = console.now();
+        console.ask(&question)?;
+        stats.push(console.now().since(asked));
+    }
+    let start = console.now();
+    console.write(&format!("{question}\r").repeat(ROW))?;
+    let replies = console.replies(ROW, Nanos(ROW as u64 * ANSWER_MAX.0))?;
+    if replies.len() < ROW {
+        return Err(GalilOpenError::Silent);
+    }
+    let row = console.now().since(start);
+    let alone = stats.round_trip_mean;
+    let apart = Nanos(row.since(alone).0 / (ROW as u64 - 1));
+    // A little sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
+    let every = apart.max(Nanos(tick.0 * 9 / 10));
+    let in_flight = (alone.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
+    stats.in_flight = in_flight;
+    let pace = Pace {
+        every,
+        in_flight,
+        tick,
+    };
+    Ok((stats, pace))
+}
+
+fn describe(
+    settings: &GalilSettings,
+    board: &GalilBoard,
+    tm: f64,
+    acceleration: MmPerS2,
+    has_watchdog: bool,
+    worst_case_mm: f64,
+) -> RigDescription {
+    let counts = 1_i32 << settings.bits.min(24);
+    let (counts_min, counts_max) = if settings.range.is_bipolar() {
+        (-counts / 2, counts / 2 - 1)
+    } else {
+        (0, counts - 1)
+    };
+    let watch = if has_watchdog { "with" } else { "without" };
+    RigDescription {
+        name: settings.name.clone(),
+        identity: format!(
+            "{board}, axis {}, input {}, {watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost",
+            settings.axis, settings.input
+        ),
+        settings: BTreeMap::new(),
+        mm_per_pulse: settings.mm_per_pulse,
+        travel: settings.travel,
+        tick_nanos: (tm * NANOS_PER_TM).round() as u64,
+        // Resolution of `SP`: 2 * (1000 / TM) counts/s (DMC-40x0 command reference).
+        speed_quantum: MmPerS(2.0 * 1000.0 / tm * settings.mm_per_pulse),
+        speed_max: settings.speed_max,
+        acceleration,
+        adc: Some(AdcDescription {
+            counts_min,
+            counts_max,
+            volts_per_count: settings.volts_per_count(),
+        }),
+        noise_expected: settings.noise,
+        pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
+    }
+}

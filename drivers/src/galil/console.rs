@@ -1,0 +1,165 @@
+//! Question and answer, one at a time, while a controller is set up.
+
+use super::model::GalilOpenError;
+use super::protocol::{Incoming, Parser, Reply, error_of};
+use crate::wire::{HostClock, Link};
+use palpate_model::Nanos;
+use palpate_model::rig::RawBytes;
+use std::io;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// An answer takes longer only after a download.
+pub const ANSWER_MAX: Nanos = Nanos::from_millis(1_000);
+/// Longest single wait for bytes.
+const READ_MAX: Duration = Duration::from_millis(5);
+
+/// A link to a controller with nothing else going on.
+pub struct Console<'a> {
+    link: &'a mut dyn Link,
+    clock: &'a HostClock,
+    parser: Parser,
+    device: Arc<str>,
+    /// What was exchanged so far.
+    pub raw: Vec<RawBytes>,
+}
+
+impl<'a> Console<'a> {
+    /// On a link.
+    pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
+        Self {
+            link,
+            clock,
+            parser: Parser::default(),
+            device: Arc::clone(device),
+            raw: Vec::new(),
+        }
+    }
+
+    /// The host's clock.
+    pub fn now(&self) -> Nanos {
+        (self.clock)()
+    }
+
+    /// Writes bytes as they are.
+    pub fn write(&mut self, text: &str) -> Result<(), GalilOpenError> {
+        self.link.write(text.as_bytes()).map_err(lost)?;
+        self.tap(true, text.as_bytes());
+        Ok(())
+    }
+
+    /// Throws away what comes until nothing has come for `quiet`; tells how many prompts were in it. A device that never
+    /// falls silent is left after ten times as long.
+    pub fn drain(&mut self, quiet: Nanos) -> Result<usize, GalilOpenError> {
+        let (start, mut newest, mut prompts) = (self.now(), self.now(), 0);
+        while self.now().since(newest) < quiet && self.now().since(start) < Nanos(10 * quiet.0) {
+            let bytes = self.read()?;
+            if !bytes.is_empty() {
+                newest = self.now();
+                prompts += bytes.iter().filter(|b| matches!(b, b':' | b'?')).count();
+            }
+        }
+        self.parser.clear();
+        Ok(prompts)
+    }
+
+    /// Reads so many replies, as many as come until `within` is over.
+    pub fn replies(&mut self, count: usize, within: Nanos) -> Result<Vec<Reply>, GalilOpenError> {
+        let start = self.now();
+        let mut all = Vec::new();
+        while all.len() < count && self.now().since(start) < within {
+            for byte in self.read()? {
+                if let Some(Incoming::Reply(reply)) = self.parser.take(byte) {
+                    all.push(reply);
+                }
+            }
+        }
+        Ok(all)
+    }
+
+    /// Asks one command and gives its answer, whether accepted or not.
+    pub fn try_ask(&mut self, command: &str) -> Result<Reply, GalilOpenError> {
+        self.write(&format!("{command}\r"))?;
+        self.replies(1, ANSWER_MAX)?
+            .pop()
+            .ok_or(GalilOpenError::Silent)
+    }
+
+    /// Asks one command that must be accepted.
+    pub fn ask(&mut self, command: &str) -> Result<Reply, GalilOpenError> {
+        let reply = self.try_ask(command)?;
+        if reply.is_accepted {
+            return Ok(reply);
+        }
+        let why = self.try_ask("TC1")?;
+        Err(GalilOpenError::Refused {
+            command: command.to_owned(),
+            error: error_of(&why).unwrap_or(super::GalilError {
+                code: 0,
+                words: String::new(),
+            }),
+        })
+    }
+
+    /// The numbers that `MG` gives for a list of expressions, as many as there are.
+    pub fn numbers(&mut self, list: &str) -> Result<Vec<f64>, GalilOpenError> {
+        let command = format!("MG {list}");
+        let reply = self.ask(&command)?;
+        let count = list.split(',').count();
+        reply
+            .numbers()
+            .filter(|numbers| numbers.len() == count)
+            .ok_or_else(|| GalilOpenError::SetOtherwise {
+                command,
+                found: format!("'{}'", reply.text()),
+            })
+    }
+
+    /// The one number that an expression has.
+    pub fn number(&mut self, expression: &str) -> Result<f64, GalilOpenError> {
+        Ok(self.numbers(expression)?[0])
+    }
+
+    /// Sets a number and checks what an expression reads back.
+    pub fn set(
+        &mut self,
+        command: &str,
+        expression: &str,
+        wanted: f64,
+    ) -> Result<(), GalilOpenError> {
+        self.ask(command)?;
+        let found = self.number(expression)?;
+        if found == wanted {
+            return Ok(());
+        }
+        Err(GalilOpenError::SetOtherwise {
+            command: command.to_owned(),
+            found: found.to_string(),
+        })
+    }
+
+    fn read(&mut self) -> Result<Vec<u8>, GalilOpenError> {
+        let mut buffer = [0_u8; 1024];
+        let count = self.link.read(&mut buffer, READ_MAX).map_err(lost)?;
+        let bytes = buffer[..count].to_vec();
+        self.tap(false, &bytes);
+        Ok(bytes)
+    }
+
+    fn tap(&mut self, is_sent: bool, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.raw.push(RawBytes {
+                at: self.now(),
+                device: Arc::clone(&self.device),
+                is_sent,
+                bytes: bytes.to_vec(),
+            });
+        }
+    }
+}
+
+fn lost(err: io::Error) -> GalilOpenError {
+    GalilOpenError::Lost {
+        detail: err.to_string(),
+    }
+}

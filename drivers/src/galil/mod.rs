@@ -1,0 +1,24 @@
+//! A Galil DMC controller on a serial line or a network, with a pulse-driven slide on one axis and the load cell on an
+//! analog input.
+//!
+//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `connect.rs`, what happens once when the
+//! controller is opened. [`GalilRig`] puts a session on a link.
+
+mod connect;
+mod console;
+mod error;
+mod model;
+mod order;
+pub mod protocol;
+mod rig;
+mod sampling;
+mod session;
+mod settings;
+mod watchdog;
+
+pub use connect::{Connected, connect};
+pub use error::GalilError;
+pub use model::{GalilBoard, GalilOpenError};
+pub use rig::GalilRig;
+pub use session::Session;
+pub use settings::{AnalogRange, GalilSettings, Levels, MotorType};

@@ -1,0 +1,185 @@
+//! Which controllers can be driven, and why one cannot be opened.
+
+use super::error::GalilError;
+use crate::wire::WireError;
+use std::fmt;
+use thiserror::Error;
+
+/// A controller as it identifies itself (`^R^V`).
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GalilBoard {
+    /// The whole answer, such as `DMC4143 Rev 1.3a`.
+    pub revision: String,
+    /// Number of axes.
+    pub axes: usize,
+    /// Serial number (`_BN`), where it tells one.
+    pub serial_number: Option<u64>,
+}
+
+impl GalilBoard {
+    /// Reads the answer to `^R^V`.
+    pub fn parse(revision: &str) -> Result<Self, GalilOpenError> {
+        let unsupported = |why: &'static str| GalilOpenError::Unsupported {
+            revision: revision.to_owned(),
+            why,
+        };
+        let Some(model) = revision.strip_prefix("DMC") else {
+            return Err(if revision.starts_with("RIO") {
+                unsupported("it has inputs and outputs and drives no axis")
+            } else {
+                GalilOpenError::NoGalil {
+                    got: revision.to_owned(),
+                }
+            });
+        };
+        let digits: Vec<usize> = model
+            .chars()
+            .map_while(|c| c.to_digit(10))
+            .map(|digit| digit as usize)
+            .collect();
+        let axes = match digits.as_slice() {
+            [4, 1, axes, 3, ..] | [2, 1, axes, 3, ..] | [4, 0, axes, 0, ..] => *axes,
+            [3, 0, 0, 1, 0] => 1,
+            [1, 8, ..] | [1, 7, ..] => {
+                return Err(unsupported(
+                    "it speaks the same language on a computer's bus, which palpate does not drive",
+                ));
+            }
+            _ => {
+                return Err(unsupported(
+                    "palpate drives the series 21x3, 41x3, 40x0 and 30010",
+                ));
+            }
+        };
+        if !(1..=8).contains(&axes) {
+            return Err(unsupported("its name tells no number of axes"));
+        }
+        Ok(Self {
+            revision: revision.to_owned(),
+            axes,
+            serial_number: None,
+        })
+    }
+}
+
+impl fmt::Display for GalilBoard {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "Galil {}", self.revision)?;
+        match self.serial_number {
+            Some(number) => write!(f, ", no. {number}"),
+            None => Ok(()),
+        }
+    }
+}
+
+/// A controller cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum GalilOpenError {
+    /// The link cannot be had.
+    #[error(transparent)]
+    Wire(#[from] WireError),
+    /// The link was lost while the controller was set up.
+    #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
+    Lost {
+        /// What the operating system said.
+        detail: String,
+    },
+    /// Nothing came back.
+    #[error(
+        "nothing answers like a Galil controller; check that it is on, the cable, and the baud rate of its jumpers"
+    )]
+    Silent,
+    /// Something else answers.
+    #[error(
+        "what answers is no Galil controller: it says '{got}'; check which port the rig file names"
+    )]
+    NoGalil {
+        /// What it said.
+        got: String,
+    },
+    /// A Galil device that is not driven.
+    #[error("{revision} cannot be used: {why}")]
+    Unsupported {
+        /// What it says it is.
+        revision: String,
+        /// Why not.
+        why: &'static str,
+    },
+    /// Another one of the same kind.
+    #[error(
+        "the controller has serial number {found}, the rig file says {expected}; a cable was swapped, or the rig file is of another rig"
+    )]
+    OtherSerial {
+        /// Its number.
+        found: String,
+        /// The rig file's.
+        expected: u64,
+    },
+    /// It has fewer axes.
+    #[error("{revision} has {axes} axes and no axis {axis}; correct the axis of the rig file")]
+    NoAxis {
+        /// What it says it is.
+        revision: String,
+        /// How many it has.
+        axes: usize,
+        /// The rig file's.
+        axis: char,
+    },
+    /// It refused a command that sets it up.
+    #[error("the controller refuses {command} ({error})")]
+    Refused {
+        /// The command.
+        command: String,
+        /// Why.
+        error: GalilError,
+    },
+    /// It set something else.
+    #[error("the controller set {found} where {command} was asked; correct the rig file")]
+    SetOtherwise {
+        /// The command.
+        command: String,
+        /// What it reads back.
+        found: String,
+    },
+    /// The thread cannot be had.
+    #[error("the driver's thread cannot be started ({0}); close other programs")]
+    Thread(String),
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn models_tell_their_axes() {
+        for (revision, axes) in [
+            ("DMC4143 Rev 1.3a", 4),
+            ("DMC4010 Rev 1.3c-SER", 1),
+            ("DMC30010 Rev 1.2i-SER", 1),
+            ("DMC2143 Rev 1.0o", 4),
+            ("DMC4183 Rev 1.3a", 8),
+        ] {
+            assert_eq!(
+                GalilBoard::parse(revision).unwrap().axes,
+                axes,
+                "{revision}"
+            );
+        }
+    }
+
+    #[test]
+    fn what_cannot_be_driven_is_refused_by_name() {
+        for (revision, why) in [
+            ("DMC1820 Rev 1.0", "bus"),
+            ("DMC1842 Rev 1.0", "bus"),
+            ("RIO47120 Rev 1.1b", "drives no axis"),
+            ("DMC52010 Rev 1.0", "series"),
+            ("DMC4103 Rev 1", "number of axes"),
+            ("Grbl 1.1h", "no Galil"),
+        ] {
+            let err = GalilBoard::parse(revision).unwrap_err().to_string();
+            assert!(err.contains(why) && err.contains(revision), "{err}");
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! One command of palpate as commands of the controller: what is sent, what must come back.
+
+use super::protocol::Reply;
+use super::sampling::signed;
+use super::settings::GalilSettings;
+use palpate_model::rig::{MoveTo, RigCommand};
+use palpate_model::units::{MmPerS, MmPerS2};
+
+/// Software limits are this far beyond the travel and behind home, in mm: behind the limit switches of a slide, which
+/// are within 5 mm, and before its mechanical ends. They stop the axis when both palpate and a switch fail.
+pub const LIMIT_MARGIN_MM: f64 = 5.0;
+
+/// Which part of a command is under way.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Stage {
+    /// Numbers are set and read back.
+    Setting,
+    /// The part that counts was sent, for a command as it was set.
+    Doing(RigCommand),
+}
+
+/// What to do next with a command.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Next {
+    /// Answers are still to come.
+    Wait,
+    /// Send these, each answered by a prompt.
+    Send(Vec<String>),
+    /// Send these, and behind them ask for a sample.
+    SendAndSample(Vec<String>),
+    /// It is done, with what was set.
+    Done(RigCommand),
+    /// The controller refused a part of it: ask why.
+    AskWhy,
+    /// It cannot be done, in words.
+    Refused(String),
+}
+
+/// A command under way.
+#[derive(Clone, Debug)]
+pub struct Order {
+    /// As it was asked for.
+    pub command: RigCommand,
+    stage: Stage,
+    /// Prompts still to come.
+    open: usize,
+    /// Numbers read back so far.
+    numbers: Vec<f64>,
+    is_refused: bool,
+}
+
+impl Order {
+    /// A command that was not begun.
+    #[must_use]
+    pub const fn new(command: RigCommand) -> Self {
+        Self {
+            command,
+            stage: Stage::Setting,
+            open: 0,
+            numbers: Vec::new(),
+            is_refused: false,
+        }
+    }
+
+    /// Whether the axis may already be doing it.
+    #[must_use]
+    pub const fn is_doing(&self) -> bool {
+        matches!(self.stage, Stage::Doing(_))
+    }
+
+    /// How it begins.
+    pub fn begin(&mut self, settings: &GalilSettings) -> Next {
+        let a = settings.axis;
+        let commands = match self.command {
+            RigCommand::EnableMotor => {
+                self.stage = Stage::Doing(self.command);
+                vec![format!("SH{a}"), format!("MG _MO{a}")]
+            }
+            RigCommand::MoveTo(wanted) => {
+                let (speed, rate) = (
+                    settings.counts(wanted.speed),
+                    settings.counts2(wanted.acceleration),
+                );
+                if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || speed < 1 {
+                    return Next::Refused(format!(
+                        "a speed of {} is beyond the {} of the rig file",
+                        wanted.speed, settings.speed_max
+                    ));
+                }
+                vec![
+                    format!("SP{a}={speed}"),
+                    format!("AC{a}={rate}"),
+                    format!("DC{a}={rate}"),
+                    format!("PA{a}={}", settings.sign() * wanted.target_pulses),
+                    format!("MG _SP{a},_AC{a},_DC{a}"),
+                    format!("PA{a}=?"),
+                ]
+            }
+            RigCommand::DefinePosition { .. } => {
+                let (forward, reverse) = software_limits(settings, 0, settings.travel.0);
+                limit_commands(a, forward, reverse)
+            }
+            RigCommand::Oscillate(_) => {
+                return Next::Refused(
+                    "sines need the contour mode, which this driver does not use yet; choose a protocol of ramps".into(),
+                );
+            }
+            RigCommand::Stop | RigCommand::Halt => {
+                return Next::Refused("a stop does not wait in a queue".into());
+            }
+        };
+        self.open = commands.len();
+        Next::Send(commands)
+    }
+
+    /// Takes the answer to one of its commands.
+    pub fn take(&mut self, reply: &Reply, settings: &GalilSettings) -> Next {
+        self.open = self.open.saturating_sub(1);
+        if reply.is_accepted {
+            self.numbers.extend(reply.numbers().unwrap_or_default());
+        } else {
+            self.is_refused = true;
+        }
+        if self.open > 0 {
+            return Next::Wait;
+        }
+        if self.is_refused {
+            return Next::AskWhy;
+        }
+        match self.stage {
+            Stage::Setting => self.do_it(settings),
+            Stage::Doing(made) => self.done(made),
+        }
+    }
+
+    /// All is set: is it what was asked, and how does it go on?
+    fn do_it(&mut self, settings: &GalilSettings) -> Next {
+        let a = settings.axis;
+        let numbers = std::mem::take(&mut self.numbers);
+        let (made, command) = match (self.command, numbers.as_slice()) {
+            (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
+                let target = signed(target).map(|target| settings.sign() * target);
+                if target != Some(wanted.target_pulses) {
+                    return Next::Refused(format!(
+                        "it reads back another target than {} pulses",
+                        wanted.target_pulses
+                    ));
+                }
+                if ac != dc || speed <= 0.0 {
+                    return Next::Refused(format!(
+                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts"
+                    ));
+                }
+                let made = MoveTo {
+                    target_pulses: wanted.target_pulses,
+                    speed: MmPerS(speed * settings.mm_per_pulse),
+                    acceleration: MmPerS2(ac * settings.mm_per_pulse),
+                };
+                (RigCommand::MoveTo(made), format!("BG{a}"))
+            }
+            (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
+                let wanted = software_limits(settings, 0, settings.travel.0);
+                if (signed(forward), signed(reverse)) != (Some(wanted.0), Some(wanted.1)) {
+                    return Next::Refused(format!(
+                        "it reads back software limits {forward} and {reverse} where {} and {} were set",
+                        wanted.0, wanted.1
+                    ));
+                }
+                (self.command, format!("DP{a}={}", settings.sign() * pulses))
+            }
+            _ => return Next::Refused("its answer has other numbers than were asked for".into()),
+        };
+        self.stage = Stage::Doing(made);
+        self.open = 1;
+        Next::SendAndSample(vec![command])
+    }
+
+    fn done(&self, made: RigCommand) -> Next {
+        match (self.command, self.numbers.as_slice()) {
+            // The number is `_MO`: 1 while the motor is off.
+            (RigCommand::EnableMotor, &[off]) if off == 0.0 => Next::Done(made),
+            (RigCommand::EnableMotor, _) => Next::Refused(
+                "the motor stays off after SH; check the amplifier and its enable input".into(),
+            ),
+            _ => Next::Done(made),
+        }
+    }
+}
+
+/// Software limits in the controller's counts, forward and reverse, around places from `here_pulses` on over `way_mm`.
+#[must_use]
+pub fn software_limits(settings: &GalilSettings, here_pulses: i64, way_mm: f64) -> (i64, i64) {
+    let pulses = |mm: f64| (mm / settings.mm_per_pulse).round() as i64;
+    let far = here_pulses + pulses(way_mm + LIMIT_MARGIN_MM);
+    let near = here_pulses - pulses(LIMIT_MARGIN_MM);
+    let (far, near) = (settings.sign() * far, settings.sign() * near);
+    (far.max(near), far.min(near))
+}
+
+/// Sets software limits and reads them back (`FL`, `BL`).
+#[must_use]
+pub fn limit_commands(axis: char, forward: i64, reverse: i64) -> Vec<String> {
+    vec![
+        format!("FL{axis}={forward}"),
+        format!("BL{axis}={reverse}"),
+        format!("MG _FL{axis},_BL{axis}"),
+    ]
+}

@@ -1,0 +1,189 @@
+//! Bytes of a Galil DMC controller: replies counted by their prompts, text nobody asked for, numbers, lines of
+//! commands.
+//!
+//! Every command of a line is answered by a prompt of its own, `:` when it was accepted and `?` when it was not, with
+//! its text and a line end before (DMC-1700/1800 user manual, page 79; `GalilConnector.cpp` of EPICS counts them so).
+
+use super::error::GalilError;
+
+/// Characters of a line, all commands that `;` joins and the carriage return counted (gclib.h, `G_LINE_BUFFER`).
+pub const LINE_MAX: usize = 80;
+/// Longest text of one reply. A whole upload is asked for in pieces shorter than this.
+pub const REPLY_MAX: usize = 64 * 1024;
+/// Longest line nobody asked for; a program's line has 80 characters.
+const UNASKED_MAX: usize = 1024;
+/// Ends an upload (DMC-1700/1800 user manual, `QU`).
+const UPLOAD_END: u8 = 0x1a;
+
+/// What came.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Incoming {
+    /// The answer to one command.
+    Reply(Reply),
+    /// A line that a program of the controller wrote, told apart by its top bits (`CW 1`).
+    Unasked(String),
+    /// More than [`REPLY_MAX`] bytes without a prompt: this is no controller, or its baud rate is another.
+    Flood,
+}
+
+/// The answer to one command.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Reply {
+    /// Whether it ended with `:`.
+    pub is_accepted: bool,
+    /// What stood before the prompt, line ends and end marks taken off.
+    pub bytes: Vec<u8>,
+}
+
+impl Reply {
+    /// Its text; what is not ASCII stays visible as question marks in diamonds.
+    #[must_use]
+    pub fn text(&self) -> String {
+        String::from_utf8_lossy(&self.bytes).trim().to_owned()
+    }
+
+    /// The numbers of its text; `None` when anything else stands there.
+    #[must_use]
+    pub fn numbers(&self) -> Option<Vec<f64>> {
+        std::str::from_utf8(&self.bytes).ok().and_then(numbers)
+    }
+}
+
+/// Reads replies out of bytes that come in any pieces.
+#[derive(Clone, Debug, Default)]
+pub struct Parser {
+    reply: Vec<u8>,
+    unasked: Vec<u8>,
+    /// Bytes of a counted read that are still to come, after which a prompt follows.
+    counted: usize,
+    /// The reply began with a counted read, so that its last bytes are no line end.
+    is_counted: bool,
+}
+
+impl Parser {
+    /// The next reply begins with so many bytes of any value, as that of `QR` does.
+    pub fn expect_bytes(&mut self, count: usize) {
+        self.counted = count.min(REPLY_MAX);
+        self.is_counted = true;
+    }
+
+    /// Forgets what has come of a reply.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Bytes of the reply under way.
+    #[must_use]
+    pub fn pending(&self) -> usize {
+        self.reply.len()
+    }
+
+    /// Takes a byte; gives what it completed.
+    pub fn take(&mut self, byte: u8) -> Option<Incoming> {
+        if self.counted > 0 {
+            self.counted -= 1;
+            self.reply.push(byte);
+            return None;
+        }
+        if byte & 0x80 != 0 {
+            return self.take_unasked(byte & 0x7f);
+        }
+        match byte {
+            b':' | b'?' => {
+                let mut bytes = std::mem::take(&mut self.reply);
+                let is_text = !std::mem::take(&mut self.is_counted);
+                while is_text && matches!(bytes.last(), Some(b'\r' | b'\n' | &UPLOAD_END)) {
+                    bytes.pop();
+                }
+                Some(Incoming::Reply(Reply {
+                    is_accepted: byte == b':',
+                    bytes,
+                }))
+            }
+            _ if self.reply.len() >= REPLY_MAX => {
+                self.reply.clear();
+                Some(Incoming::Flood)
+            }
+            _ => {
+                self.reply.push(byte);
+                None
+            }
+        }
+    }
+
+    fn take_unasked(&mut self, byte: u8) -> Option<Incoming> {
+        match byte {
+            b'\r' => None,
+            b'\n' => {
+                let line = std::mem::take(&mut self.unasked);
+                Some(Incoming::Unasked(
+                    String::from_utf8_lossy(&line).into_owned(),
+                ))
+            }
+            _ => {
+                if self.unasked.len() < UNASKED_MAX {
+                    self.unasked.push(byte);
+                }
+                None
+            }
+        }
+    }
+}
+
+/// Numbers as any firmware writes them: blanks, commas or only a sign between them, leading zeros or not, decimals or
+/// not; `None` when anything else stands there.
+#[must_use]
+pub fn numbers(text: &str) -> Option<Vec<f64>> {
+    let mut all = Vec::new();
+    for part in text.split(|c: char| c.is_ascii_whitespace() || c == ',') {
+        let mut rest = part;
+        while !rest.is_empty() {
+            // `MG` puts nothing but the sign's place between numbers, so a sign begins the next.
+            let end = rest
+                .get(1..)?
+                .find(['-', '+'])
+                .map_or(rest.len(), |at| at + 1);
+            let number: f64 = rest.get(..end)?.parse().ok()?;
+            // "inf" and "nan" are no numbers of a controller.
+            all.push(Some(number).filter(|number| number.is_finite())?);
+            rest = &rest[end..];
+        }
+    }
+    (!all.is_empty()).then_some(all)
+}
+
+/// Joins commands with `;` to as few lines as hold them, each ended by a carriage return. A command that fills a line
+/// alone stays whole; the controller will refuse it.
+#[must_use]
+pub fn packed(commands: &[String]) -> Vec<String> {
+    let mut lines: Vec<String> = Vec::new();
+    for command in commands {
+        match lines.last_mut() {
+            Some(line) if line.len() + 1 + command.len() < LINE_MAX => {
+                line.push(';');
+                line.push_str(command);
+            }
+            _ => lines.push(command.clone()),
+        }
+    }
+    for line in &mut lines {
+        line.push('\r');
+    }
+    lines
+}
+
+/// The reply to `TC1`: number and text.
+#[must_use]
+pub fn error_of(reply: &Reply) -> Option<GalilError> {
+    let text = reply.text();
+    let digits = text.find(|c: char| !c.is_ascii_digit());
+    let (number, words) = text.split_at(digits.unwrap_or(text.len()));
+    Some(GalilError {
+        code: number.parse().ok()?,
+        words: words.trim().to_owned(),
+    })
+}
+
+#[cfg(test)]
+#[path = "protocol_tests.rs"]
+mod tests;

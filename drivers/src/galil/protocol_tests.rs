@@ -1,0 +1,207 @@
+//! Byte-exact transcripts and properties of the parser.
+
+use super::*;
+use palpate_model::random::SplitMix;
+
+fn all(bytes: &[u8]) -> Vec<Incoming> {
+    let mut parser = Parser::default();
+    bytes.iter().filter_map(|byte| parser.take(*byte)).collect()
+}
+
+fn reply(text: &str, is_accepted: bool) -> Incoming {
+    Incoming::Reply(Reply {
+        is_accepted,
+        bytes: text.into(),
+    })
+}
+
+/// What a controller sent, and what it means.
+type Transcript = (&'static str, &'static [u8], &'static [(&'static str, bool)]);
+
+const TRANSCRIPTS: [Transcript; 9] = [
+    // DMC-1700/1800 user manual, page 79: "the DMC-1700/1800 returns a : if the instruction was accepted".
+    ("accepted", b":", &[("", true)]),
+    // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 tells why.
+    (
+        "refused, then TC1",
+        b"?1 Unrecognized command\r\n:",
+        &[("", false), ("1 Unrecognized command", true)],
+    ),
+    // Page 84: `TP X` with leading zeros.
+    ("TP X", b"0000000000\r\n:", &[("0000000000", true)]),
+    // ESRF BLISS 2.4.0, controllers/motors/galil: MG _BGA of a DMC-30010.
+    ("MG _BGA", b" 0.0000\r\n:", &[(" 0.0000", true)]),
+    // The same: QZ.
+    ("QZ", b" 4, 52, 26, 36\r\n:", &[(" 4, 52, 26, 36", true)]),
+    // ^R^V as users of the EPICS driver Galil-3-6 report it.
+    (
+        "^R^V",
+        b"DMC4143 Rev 1.3a\r\n:",
+        &[("DMC4143 Rev 1.3a", true)],
+    ),
+    // galil-io of TMT, github.com/tmtsoftware/galil-prototype: one prompt per command of a line.
+    (
+        "a=1;b=2;MG a",
+        b":: 1.0000\r\n:",
+        &[("", true), ("", true), (" 1.0000", true)],
+    ),
+    // The same with a command in the middle that is refused.
+    (
+        "a=1;XX;MG a",
+        b":? 1.0000\r\n:",
+        &[("", true), ("", false), (" 1.0000", true)],
+    ),
+    // DMC-1700/1800 user manual, QU: the transfer ends with control-Z.
+    (
+        "QU a[],0,1,1",
+        b" 1.0000, 2.0000\r\n\x1a:",
+        &[(" 1.0000, 2.0000", true)],
+    ),
+];
+
+#[test]
+fn transcripts_are_understood_split_at_every_byte() {
+    for (name, bytes, meaning) in TRANSCRIPTS {
+        let expected: Vec<Incoming> = meaning.iter().map(|(t, ok)| reply(t, *ok)).collect();
+        for at in 0..=bytes.len() {
+            let mut parser = Parser::default();
+            let (first, second) = bytes.split_at(at);
+            let mut got: Vec<Incoming> = first.iter().filter_map(|b| parser.take(*b)).collect();
+            got.extend(second.iter().filter_map(|b| parser.take(*b)));
+            assert_eq!(got, expected, "{name}, split at {at}");
+        }
+    }
+}
+
+#[test]
+fn text_nobody_asked_for_is_told_apart_byte_by_byte() {
+    // DMC-41x3 user manual, page 45: with CW 1 the top bit of unsolicited characters is set.
+    let marked = |text: &str| text.bytes().map(|byte| byte | 0x80).collect::<Vec<u8>>();
+    let bytes = [
+        &b" 1.00"[..],
+        &marked("?55 i=v"),
+        &b"00\r"[..],
+        &marked("ar\r\n"),
+        &b"\n:"[..],
+    ]
+    .concat();
+    assert_eq!(
+        all(&bytes),
+        [
+            Incoming::Unasked("?55 i=var".into()),
+            reply(" 1.0000", true)
+        ]
+    );
+}
+
+#[test]
+fn a_counted_reply_may_hold_prompts() {
+    let mut parser = Parser::default();
+    parser.expect_bytes(5);
+    let got: Vec<Incoming> = b":?\xff\r\x1a:"
+        .iter()
+        .filter_map(|byte| parser.take(*byte))
+        .collect();
+    let [Incoming::Reply(reply)] = got.as_slice() else {
+        panic!("{got:?}");
+    };
+    assert!(reply.is_accepted);
+    assert_eq!(reply.bytes, b":?\xff\r\x1a");
+}
+
+#[test]
+fn numbers_are_read_as_any_firmware_writes_them() {
+    let cases: [(&str, Option<&[f64]>); 12] = [
+        (" 0.0000", Some(&[0.0])),
+        ("0000000000", Some(&[0.0])),
+        ("015", Some(&[15.0])),
+        (" 100, 200", Some(&[100.0, 200.0])),
+        (" 1.2500-340.0000 12.0000", Some(&[1.25, -340.0, 12.0])),
+        ("-1.5000", Some(&[-1.5])),
+        (" 4, 52, 26, 36", Some(&[4.0, 52.0, 26.0, 36.0])),
+        ("", None),
+        ("DMC4143 Rev 1.3a", None),
+        ("nan", None),
+        ("1e999", None),
+        ("- 5", None),
+    ];
+    for (text, expected) in cases {
+        assert_eq!(numbers(text).as_deref(), expected, "{text:?}");
+    }
+}
+
+#[test]
+fn lines_hold_eighty_characters() {
+    let commands: Vec<String> = (0..40).map(|i| format!("SPA={i}")).collect();
+    let lines = packed(&commands);
+    assert!(lines.len() > 1 && lines.iter().all(|line| line.len() <= LINE_MAX));
+    let joined: Vec<&str> = lines
+        .iter()
+        .flat_map(|line| line.trim_end().split(';'))
+        .collect();
+    assert_eq!(joined, commands);
+    let one = packed(&["BGA".into(), "MG _BGA".into()]);
+    assert_eq!(one, ["BGA;MG _BGA\r"]);
+}
+
+#[test]
+fn a_refusal_tells_what_to_do() {
+    let err = error_of(&Reply {
+        is_accepted: true,
+        bytes: b"22 Begin not possible due to Limit Switch".to_vec(),
+    })
+    .unwrap();
+    assert_eq!(err.code, 22);
+    assert!(err.to_string().contains("move the other way"), "{err}");
+    let number = error_of(&Reply {
+        is_accepted: true,
+        bytes: b" 6".to_vec(),
+    });
+    assert_eq!(number.map(|err| err.code), Some(6));
+    assert_eq!(
+        error_of(&Reply {
+            is_accepted: true,
+            bytes: b"what".to_vec()
+        }),
+        None
+    );
+}
+
+#[test]
+fn random_bytes_never_panic_and_memory_is_bounded() {
+    let mut random = SplitMix::seeded(7);
+    for round in 0..2_000 {
+        let mut parser = Parser::default();
+        let length = 1 + random.below(300);
+        let bytes: Vec<u8> = (0..length).map(|_| random.below(256) as u8).collect();
+        if round % 3 == 0 {
+            parser.expect_bytes(bytes.len() / 2);
+        }
+        let mut whole = parser.clone();
+        let got: Vec<Incoming> = bytes.iter().filter_map(|b| whole.take(*b)).collect();
+        // Any split gives the same.
+        let cut = random.below(length);
+        let mut parts: Vec<Incoming> = bytes[..cut]
+            .iter()
+            .filter_map(|b| parser.take(*b))
+            .collect();
+        parts.extend(bytes[cut..].iter().filter_map(|b| parser.take(*b)));
+        assert_eq!(got, parts);
+        for incoming in got {
+            if let Incoming::Reply(reply) = incoming {
+                let _ = (reply.numbers(), reply.text(), error_of(&reply));
+            }
+        }
+    }
+    let mut parser = Parser::default();
+    let mut floods = 0;
+    for byte in std::iter::repeat_n(b'x', 3 * REPLY_MAX) {
+        floods += usize::from(parser.take(byte) == Some(Incoming::Flood));
+        assert!(parser.pending() <= REPLY_MAX);
+    }
+    assert_eq!(floods, 2);
+    for byte in std::iter::repeat_n(b'x' | 0x80, 3 * REPLY_MAX) {
+        assert_eq!(parser.take(byte), None);
+    }
+    assert!(parser.unasked.len() <= UNASKED_MAX);
+}

@@ -1,0 +1,148 @@
+//! From the numbers of a poll to a sample.
+
+use super::settings::GalilSettings;
+use palpate_model::rig::{AxisStatus, Reading};
+use palpate_model::units::Volts;
+
+/// `TIME` counts samples in a number of the controller, which has 31 bits before the point (DMC-40x0 user manual,
+/// variables). Where it wraps is not confirmed; at a millisecond each it takes 24 days.
+const TIME_WRAPS: u64 = 1 << 31;
+
+/// Bits of `TS` (DMC-1400 user manual, page 211).
+mod ts {
+    pub const MOVING: u32 = 1 << 7;
+    pub const MOTOR_OFF: u32 = 1 << 5;
+    pub const FORWARD: u32 = 1 << 3;
+    pub const REVERSE: u32 = 1 << 2;
+    pub const HOME: u32 = 1 << 1;
+}
+
+/// Stop codes of a motion that ends or has ended before its target: limits, `ST`, abort, faults (DMC-40x0 command
+/// reference, `SC`: "decelerating or stopped by").
+const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
+
+/// What became of a poll's answer.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Sampled {
+    /// A new sample.
+    Reading(Reading),
+    /// The same sample again: two polls fell between two of them.
+    Same,
+    /// The clock went back: the controller has been reset.
+    Reset,
+}
+
+/// Reads answers to the poll, one after the other.
+#[derive(Clone, Debug)]
+pub struct Sampler {
+    settings: GalilSettings,
+    /// `TIME` of the newest sample, and what to add to it for a count that never goes back.
+    time: Option<u64>,
+    offset: u64,
+    was_moving: bool,
+}
+
+impl Sampler {
+    /// For a rig.
+    #[must_use]
+    pub fn new(settings: GalilSettings) -> Self {
+        Self {
+            settings,
+            time: None,
+            offset: 0,
+            was_moving: false,
+        }
+    }
+
+    /// The command that asks for a sample: signal, pulses given, commanded position, switches, stop code, clock. All
+    /// are told in one go, so that they belong together to a sample of the controller or two.
+    #[must_use]
+    pub fn question(settings: &GalilSettings) -> String {
+        let (input, a) = (settings.input, settings.axis);
+        format!("MG @AN[{input}],_TD{a},_RP{a},_TS{a},_SC{a},TIME")
+    }
+
+    /// Takes an answer; `None` when it is none. `is_begun` says that a motion was begun just before this was asked:
+    /// the axis moves, whatever its first sample shows.
+    pub fn take(&mut self, numbers: &[f64], is_begun: bool) -> Option<Sampled> {
+        let &[volts, given, commanded, switches, stop_code, time] = numbers else {
+            return None;
+        };
+        let (switches, stop_code) = (whole(switches)? as u32, whole(stop_code)? as u32);
+        let (given, commanded) = (signed(given)?, signed(commanded)?);
+        let time = whole(time)?;
+        if !(volts.abs() <= 100.0 && switches < 256 && stop_code < 256) {
+            return None;
+        }
+        match self.time {
+            Some(last) if time == last && !is_begun => return Some(Sampled::Same),
+            Some(last) if time < last => {
+                // Either it wrapped or it began anew; what it counted stays counted.
+                let is_wrapped = last - time > TIME_WRAPS / 2;
+                self.offset += if is_wrapped { TIME_WRAPS } else { last + 1 };
+                if !is_wrapped {
+                    self.time = Some(time);
+                    self.was_moving = false;
+                    return Some(Sampled::Reset);
+                }
+            }
+            Some(last) if time == last => return Some(Sampled::Same),
+            _ => {}
+        }
+        self.time = Some(time);
+        let status = self.status(switches, stop_code, commanded != given || is_begun);
+        self.was_moving = status.has(AxisStatus::MOVING);
+        let counts = volts / self.settings.volts_per_count();
+        Some(Sampled::Reading(Reading {
+            tick: time + self.offset,
+            // Volts are within 100 and a converter has 24 bits at most.
+            counts: Some(counts.round() as i32),
+            volts: Volts(volts),
+            pulses: self.settings.sign() * given,
+            status,
+        }))
+    }
+
+    fn status(&self, switches: u32, stop_code: u32, has_pulses_left: bool) -> AxisStatus {
+        let s = &self.settings;
+        let is_high = |bit: u32| switches & bit != 0;
+        // `_BG` falls before the smoothing filter has given its last pulses (DMC-2x00 user manual, page 117).
+        let is_moving = is_high(ts::MOVING) || has_pulses_left;
+        let is_early = EARLY.contains(&stop_code);
+        let (mut forward, mut reverse) = (
+            s.limits.is_closed(is_high(ts::FORWARD)),
+            s.limits.is_closed(is_high(ts::REVERSE)),
+        );
+        if s.is_reversed {
+            std::mem::swap(&mut forward, &mut reverse);
+        }
+        let bits = [
+            (is_moving, AxisStatus::MOVING),
+            (
+                is_early && (is_moving || self.was_moving),
+                AxisStatus::STOPPING,
+            ),
+            (s.home.is_closed(is_high(ts::HOME)), AxisStatus::HOME),
+            (forward, AxisStatus::FORWARD_LIMIT),
+            (reverse, AxisStatus::REVERSE_LIMIT),
+            (!is_high(ts::MOTOR_OFF), AxisStatus::MOTOR_ON),
+        ];
+        bits.into_iter()
+            .filter(|(is_set, _)| *is_set)
+            .fold(AxisStatus::default(), |all, (_, bit)| all | bit)
+    }
+}
+
+/// A whole number that is not negative.
+fn whole(value: f64) -> Option<u64> {
+    (value.fract() == 0.0 && (0.0..=4_294_967_295.0).contains(&value)).then_some(value as u64)
+}
+
+/// A position register: 32 bits with a sign.
+pub fn signed(value: f64) -> Option<i64> {
+    (value.fract() == 0.0 && value.abs() <= 2_147_483_648.0).then_some(value as i64)
+}
+
+#[cfg(test)]
+#[path = "sampling_tests.rs"]
+mod tests;

@@ -1,0 +1,545 @@
+//! The dialogue with a controller that has been set up: samples asked for one after the other, commands between them,
+//! stops before everything.
+
+use super::order::{Next, Order};
+use super::protocol::{Incoming, LINE_MAX, Parser, Reply, error_of, packed};
+use super::sampling::{Sampled, Sampler};
+use super::settings::GalilSettings;
+use super::watchdog;
+use crate::rig::RigEventBody;
+use crate::wire::{Dialogue, LinkStats};
+use palpate_model::Nanos;
+use palpate_model::rig::{Ack, Fault, RigCommand};
+use std::collections::VecDeque;
+
+/// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
+const ANSWER_MAX: Nanos = Nanos::from_millis(400);
+/// The line is quiet after so long without a byte.
+const QUIET: Nanos = Nanos::from_millis(25);
+/// So long a marker may take to come back; a controller needs a third of a second to start again.
+const MARKER_MAX: Nanos = Nanos::from_millis(500);
+/// Markers sent before the link counts as dead.
+const MARKERS_MAX: u32 = 4;
+/// Commands that wait; as many as may wait on the way here.
+const ORDERS_MAX: usize = 64;
+/// Lines of a program told at once, of those nobody asked for, are enough to see what it says.
+const UNASKED_MAX: usize = 64;
+
+/// What a prompt still to come belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Asked {
+    /// A sample; `true` right behind the begin of a motion.
+    Sample(bool),
+    /// The watchdog's variable.
+    Renewal,
+    /// A part of the order under way.
+    Part,
+    /// A command that stops.
+    Stop(RigCommand),
+    /// A stop that nobody waits for.
+    QuietStop,
+    /// `TC1`, after a refusal of the order under way.
+    Why,
+    /// A number that must come back.
+    Marker(u32),
+}
+
+/// A line to be written.
+#[derive(Clone, Debug, PartialEq)]
+struct Outgoing {
+    text: String,
+    asked: Vec<Asked>,
+}
+
+/// The order of questions and answers is lost and looked for.
+#[derive(Clone, Copy, Debug)]
+struct Search {
+    last_byte: Nanos,
+    marker_at: Option<Nanos>,
+    markers: u32,
+}
+
+/// How fast the link was when the controller was set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Between two questions.
+    pub every: Nanos,
+    /// Questions that may wait for answers at once.
+    pub in_flight: usize,
+    /// Length of a sample of the controller.
+    pub tick: Nanos,
+}
+
+/// The dialogue.
+#[derive(Clone, Debug)]
+pub struct Session {
+    settings: GalilSettings,
+    pace: Pace,
+    has_watchdog: bool,
+    question: String,
+    parser: Parser,
+    sampler: Sampler,
+    expected: VecDeque<(Asked, Nanos)>,
+    urgent: VecDeque<Outgoing>,
+    lines: VecDeque<Outgoing>,
+    /// The part of an order that begins something, and when it may go out.
+    beginning: Option<(Outgoing, Nanos)>,
+    orders: VecDeque<RigCommand>,
+    order: Option<Order>,
+    is_motion_begun: bool,
+    search: Option<Search>,
+    /// Stops whose answers went by while the order was being looked for.
+    unconfirmed: Vec<RigCommand>,
+    /// Why nothing but stops is done any more.
+    is_reset: bool,
+    attended: Option<Nanos>,
+    asked_at: Option<Nanos>,
+    renewed_at: Option<Nanos>,
+    answered_at: Nanos,
+    events: VecDeque<(Nanos, RigEventBody)>,
+    unasked: VecDeque<String>,
+    stats: LinkStats,
+}
+
+impl Session {
+    /// With a controller that was set up just now.
+    #[must_use]
+    pub fn new(
+        settings: GalilSettings,
+        pace: Pace,
+        has_watchdog: bool,
+        stats: LinkStats,
+        now: Nanos,
+    ) -> Self {
+        Self {
+            question: Sampler::question(&settings),
+            sampler: Sampler::new(settings.clone()),
+            settings,
+            pace,
+            has_watchdog,
+            parser: Parser::default(),
+            expected: VecDeque::new(),
+            urgent: VecDeque::new(),
+            lines: VecDeque::new(),
+            beginning: None,
+            orders: VecDeque::new(),
+            order: None,
+            is_motion_begun: false,
+            search: None,
+            unconfirmed: Vec::new(),
+            is_reset: false,
+            attended: None,
+            asked_at: None,
+            renewed_at: None,
+            answered_at: now,
+            events: VecDeque::new(),
+            unasked: VecDeque::new(),
+            stats: LinkStats {
+                in_flight: pace.in_flight,
+                ..stats
+            },
+        }
+    }
+
+    /// What programs of the controller have said since this was last asked.
+    pub fn take_unasked(&mut self) -> Vec<String> {
+        self.unasked.drain(..).collect()
+    }
+
+    fn report(&mut self, now: Nanos, body: RigEventBody) {
+        self.events.push_back((now, body));
+    }
+
+    fn refuse(&mut self, now: Nanos, detail: impl Into<String>) {
+        let detail = detail.into();
+        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+    }
+
+    fn with_sample(&self, commands: &[String], is_begun: bool, asked: Asked) -> Outgoing {
+        let mut text = commands.join(";");
+        text.push(';');
+        text.push_str(&self.question);
+        text.push('\r');
+        let mut all = vec![asked; commands.len()];
+        all.push(Asked::Sample(is_begun));
+        Outgoing { text, asked: all }
+    }
+
+    /// Puts a stop before everything. What waits is not begun any more.
+    fn stop(&mut self, now: Nanos, command: RigCommand) {
+        let waiting = self.orders.len();
+        self.orders.clear();
+        // What is not under way on the axis ends here; its answers are taken and thrown away.
+        let is_cancelled = self.order.as_ref().is_some_and(|order| !order.is_doing())
+            || self.beginning.take().is_some();
+        if is_cancelled {
+            self.order = None;
+            self.lines.clear();
+        }
+        for _ in 0..waiting + usize::from(is_cancelled) {
+            self.refuse(now, "a stop came first, so it was not begun");
+        }
+        self.urge(command, Asked::Stop(command));
+    }
+
+    fn urge(&mut self, command: RigCommand, asked: Asked) {
+        let axis = self.settings.axis;
+        let text = match command {
+            // 1: the motion alone, so that the watchdog's program goes on (DMC-40x0 command reference, `AB`).
+            RigCommand::Halt => "AB 1".to_owned(),
+            _ => format!("ST{axis}"),
+        };
+        let line = self.with_sample(&[text], false, asked);
+        self.urgent.push_back(line);
+    }
+
+    fn go_on(&mut self, now: Nanos, next: Next) {
+        match next {
+            Next::Wait => {}
+            Next::Send(commands) => {
+                for text in packed(&commands) {
+                    let parts = text.matches(';').count() + 1;
+                    let asked = vec![Asked::Part; parts];
+                    self.lines.push_back(Outgoing { text, asked });
+                }
+            }
+            Next::SendAndSample(commands) => {
+                let is_motion = !matches!(
+                    self.order.as_ref().map(|order| order.command),
+                    Some(RigCommand::DefinePosition { .. })
+                );
+                let line = self.with_sample(&commands, is_motion, Asked::Part);
+                // The sample behind the begin is to be a new one, so that the motion begins at its tick: two samples
+                // of the controller after the last one that was asked for.
+                let pause = Nanos(2 * self.pace.tick.0);
+                let from = self.answered_at.max(self.asked_at.unwrap_or(Nanos::ZERO));
+                self.beginning = Some((line, from + pause));
+            }
+            Next::Done(made) => {
+                self.order = None;
+                self.report(now, RigEventBody::Ack(Ack { command: made }));
+            }
+            Next::AskWhy => self.lines.push_back(Outgoing {
+                text: "TC1\r".into(),
+                asked: vec![Asked::Why],
+            }),
+            Next::Refused(why) => {
+                self.order = None;
+                self.refuse(now, why);
+            }
+        }
+    }
+
+    fn on_reply(&mut self, now: Nanos, reply: &Reply) {
+        if self.search.is_some() {
+            return self.on_reply_while_searching(now, reply);
+        }
+        let Some((asked, sent)) = self.expected.pop_front() else {
+            return self.lose_order(now);
+        };
+        self.answered_at = now;
+        match asked {
+            Asked::Sample(is_begun) => {
+                self.stats.push(now.since(sent));
+                self.on_sample(now, reply, is_begun);
+            }
+            Asked::Renewal => {
+                // A refusal is a program that is gone, which a reset explains; the clock will tell.
+                if !reply.bytes.is_empty() {
+                    self.lose_order(now);
+                }
+            }
+            Asked::Part => {
+                let settings = self.settings.clone();
+                // Answers of an order that a stop has ended belong to nobody.
+                if let Some(order) = &mut self.order {
+                    let next = order.take(reply, &settings);
+                    self.go_on(now, next);
+                }
+            }
+            Asked::Stop(command) if reply.is_accepted && reply.bytes.is_empty() => {
+                self.report(now, RigEventBody::Ack(Ack { command }));
+            }
+            Asked::Stop(command) if reply.is_accepted => {
+                self.unconfirmed.push(command);
+                self.lose_order(now);
+            }
+            Asked::Stop(command) => self.refuse(now, format!("it refuses {command:?}")),
+            Asked::QuietStop => {}
+            Asked::Why => {
+                if self.order.take().is_some() {
+                    let why = error_of(reply).map(|err| err.to_string());
+                    self.refuse(now, why.unwrap_or_else(|| "it does not say why".into()));
+                }
+            }
+            Asked::Marker(_) => {}
+        }
+    }
+
+    fn on_sample(&mut self, now: Nanos, reply: &Reply, is_begun: bool) {
+        let numbers = reply.numbers().filter(|_| reply.is_accepted);
+        let is_begun = is_begun || self.is_motion_begun;
+        let sampled = numbers.and_then(|numbers| self.sampler.take(&numbers, is_begun));
+        match sampled {
+            Some(Sampled::Reading(reading)) => {
+                self.is_motion_begun = false;
+                self.report(now, RigEventBody::Reading(reading));
+            }
+            Some(Sampled::Same) => self.is_motion_begun = is_begun,
+            Some(Sampled::Reset) => {
+                self.is_motion_begun = false;
+                self.on_reset(now);
+            }
+            None => self.lose_order(now),
+        }
+    }
+
+    /// The controller has forgotten its settings: nothing may move before it is opened again.
+    fn on_reset(&mut self, now: Nanos) {
+        self.is_reset = true;
+        self.has_watchdog = false;
+        self.orders.clear();
+        self.order = None;
+        self.beginning = None;
+        self.report(now, RigEventBody::Fault(Fault::ControllerReset));
+    }
+
+    /// Answers and questions do not belong together any more: bytes were lost, doubled or spoilt.
+    fn lose_order(&mut self, now: Nanos) {
+        self.stats.resynchronised += 1;
+        self.parser.clear();
+        for (asked, _) in self.expected.drain(..) {
+            if let Asked::Stop(command) = asked {
+                self.unconfirmed.push(command);
+            }
+        }
+        self.lines.clear();
+        self.beginning = None;
+        self.is_motion_begun = false;
+        if self.order.take().is_some() {
+            // It may or may not be under way: to be safe, it is not.
+            self.refuse(
+                now,
+                "its answer was garbled, so the axis was stopped; check the cable",
+            );
+            self.urge(RigCommand::Stop, Asked::QuietStop);
+        }
+        self.search = Some(Search {
+            last_byte: now,
+            marker_at: None,
+            markers: 0,
+        });
+    }
+
+    fn on_reply_while_searching(&mut self, now: Nanos, reply: &Reply) {
+        let Some((Asked::Marker(number), _)) = self.expected.front() else {
+            return;
+        };
+        if reply.numbers() == Some(vec![f64::from(*number)]) {
+            self.expected.clear();
+            self.search = None;
+            self.answered_at = now;
+            for command in std::mem::take(&mut self.unconfirmed) {
+                self.urge(command, Asked::Stop(command));
+            }
+        }
+    }
+
+    /// The next marker, once the line has become quiet.
+    fn search_line(&mut self, now: Nanos) -> Option<Outgoing> {
+        let search = self.search.as_mut()?;
+        let is_due = match search.marker_at {
+            None => now.since(search.last_byte) >= QUIET,
+            Some(at) => now.since(at) >= MARKER_MAX,
+        };
+        if !is_due || search.markers >= MARKERS_MAX {
+            return None;
+        }
+        search.markers += 1;
+        search.marker_at = Some(now);
+        self.parser.clear();
+        self.expected.clear();
+        // A number that no sample begins with, and another one each time.
+        let number = 27_180 + search.markers;
+        Some(Outgoing {
+            text: format!("MG {number}\r"),
+            asked: vec![Asked::Marker(number)],
+        })
+    }
+
+    fn samples_in_flight(&self) -> usize {
+        let is_sample = |asked: &Asked| matches!(asked, Asked::Sample(_));
+        self.expected
+            .iter()
+            .filter(|(asked, _)| is_sample(asked))
+            .count()
+    }
+
+    fn is_renewal_due(&self, now: Nanos) -> bool {
+        let is_attended = self.attended.is_some_and(|at| now.since(at) < ATTENDED_MAX);
+        self.has_watchdog
+            && is_attended
+            && self
+                .renewed_at
+                .is_none_or(|at| now.since(at) >= watchdog::RENEW)
+    }
+
+    fn next_line(&mut self, now: Nanos) -> Option<Outgoing> {
+        if let Some(line) = self.urgent.pop_front() {
+            if let Some(search) = &mut self.search {
+                // Its answers go by unseen; it will be asked for again.
+                search.marker_at = None;
+                search.last_byte = now;
+                for asked in &line.asked {
+                    if let Asked::Stop(command) = asked {
+                        self.unconfirmed.push(*command);
+                    }
+                }
+                return Some(Outgoing {
+                    asked: Vec::new(),
+                    ..line
+                });
+            }
+            return Some(line);
+        }
+        if self.search.is_some() {
+            return self.search_line(now);
+        }
+        if self.is_renewal_due(now) {
+            self.renewed_at = Some(now);
+            return Some(Outgoing {
+                text: format!("{}=1\r", watchdog::VARIABLE),
+                asked: vec![Asked::Renewal],
+            });
+        }
+        // Answers of an order that a stop has ended may still be on their way.
+        let has_answers_to_come = self
+            .expected
+            .iter()
+            .any(|(asked, _)| matches!(asked, Asked::Part | Asked::Why));
+        if self.order.is_none()
+            && !has_answers_to_come
+            && let Some(command) = self.orders.pop_front()
+        {
+            let mut order = Order::new(command);
+            let next = order.begin(&self.settings);
+            self.order = Some(order);
+            self.go_on(now, next);
+        }
+        if let Some(line) = self.lines.pop_front() {
+            return Some(line);
+        }
+        if let Some((_, due)) = &self.beginning {
+            if now < *due {
+                return None;
+            }
+            let (line, _) = self.beginning.take()?;
+            self.asked_at = Some(now);
+            return Some(line);
+        }
+        let is_due = self
+            .asked_at
+            .is_none_or(|at| now.since(at) >= self.pace.every);
+        if is_due && self.samples_in_flight() < self.pace.in_flight {
+            self.asked_at = Some(now);
+            return Some(Outgoing {
+                text: format!("{}\r", self.question),
+                asked: vec![Asked::Sample(false)],
+            });
+        }
+        None
+    }
+}
+
+/// The watchdog is renewed only while somebody takes samples: a computer whose palpate hangs is silent too.
+const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
+
+impl Dialogue for Session {
+    fn attended(&mut self, at: Nanos) {
+        self.attended = Some(at);
+    }
+
+    fn command(&mut self, now: Nanos, command: RigCommand) {
+        if command.is_stopping() {
+            self.stop(now, command);
+        } else if self.is_reset {
+            self.refuse(now, "the controller was reset; open the rig again");
+        } else if self.orders.len() >= ORDERS_MAX {
+            self.refuse(now, "too many commands at once");
+        } else {
+            self.orders.push_back(command);
+        }
+    }
+
+    fn overtaken(&mut self, now: Nanos, _command: RigCommand) {
+        self.refuse(now, "a stop came first, so it was not begun");
+    }
+
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        if let Some(search) = &mut self.search {
+            search.last_byte = now;
+        }
+        for byte in bytes {
+            match self.parser.take(*byte) {
+                Some(Incoming::Reply(reply)) => self.on_reply(now, &reply),
+                Some(Incoming::Unasked(line)) => {
+                    if self.unasked.len() >= UNASKED_MAX {
+                        self.unasked.pop_front();
+                    }
+                    self.unasked.push_back(line);
+                }
+                Some(Incoming::Flood) if self.search.is_none() => self.lose_order(now),
+                Some(Incoming::Flood) | None => {}
+            }
+        }
+    }
+
+    fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        let is_overdue = self
+            .expected
+            .front()
+            .is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
+        if is_overdue && self.search.is_none() {
+            self.lose_order(now);
+        }
+        let line = self.next_line(now)?;
+        debug_assert!(line.text.len() <= LINE_MAX, "{}", line.text);
+        for asked in line.asked {
+            self.expected.push_back((asked, now));
+        }
+        Some(line.text.into_bytes())
+    }
+
+    fn next_at(&self, now: Nanos) -> Nanos {
+        let due = match &self.beginning {
+            Some((_, due)) => *due,
+            None => self.asked_at.map_or(now, |at| at + self.pace.every),
+        };
+        if self.samples_in_flight() < self.pace.in_flight || self.beginning.is_some() {
+            due.max(now)
+        } else {
+            now + QUIET
+        }
+    }
+
+    fn take_event(&mut self) -> Option<(Nanos, RigEventBody)> {
+        self.events.pop_front()
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        let search = self.search?;
+        let is_over = search.markers >= MARKERS_MAX
+            && search
+                .marker_at
+                .is_some_and(|at| now.since(at) >= MARKER_MAX);
+        is_over.then(|| {
+            format!(
+                "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
+            )
+        })
+    }
+
+    fn stats(&self) -> LinkStats {
+        self.stats
+    }
+}

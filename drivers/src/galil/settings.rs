@@ -1,0 +1,198 @@
+//! How a Galil controller is wired to slide and load cell: what it cannot tell by itself.
+
+use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
+
+/// Pulses of the drive (`MT`, Galil application note 2446).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum MotorType {
+    /// Active-low pulses, `MT 2`.
+    ActiveLow,
+    /// Active-high pulses, `MT -2`.
+    ActiveHigh,
+}
+
+impl MotorType {
+    /// The argument of `MT`.
+    #[must_use]
+    pub const fn code(self) -> f64 {
+        match self {
+            Self::ActiveLow => 2.0,
+            Self::ActiveHigh => -2.0,
+        }
+    }
+}
+
+/// Range of an analog input (`AQ`; RIO-47xxx user manual, page 38).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AnalogRange {
+    /// -5 to 5 V.
+    Bipolar5,
+    /// -10 to 10 V.
+    Bipolar10,
+    /// 0 to 5 V.
+    Unipolar5,
+    /// 0 to 10 V.
+    Unipolar10,
+}
+
+impl AnalogRange {
+    /// The second argument of `AQ`.
+    #[must_use]
+    pub const fn code(self) -> u8 {
+        match self {
+            Self::Bipolar5 => 1,
+            Self::Bipolar10 => 2,
+            Self::Unipolar5 => 3,
+            Self::Unipolar10 => 4,
+        }
+    }
+
+    /// Width of the range.
+    #[must_use]
+    pub const fn span(self) -> Volts {
+        Volts(match self {
+            Self::Bipolar5 | Self::Unipolar10 => 10.0,
+            Self::Bipolar10 => 20.0,
+            Self::Unipolar5 => 5.0,
+        })
+    }
+
+    /// Whether it has two signs.
+    #[must_use]
+    pub const fn is_bipolar(self) -> bool {
+        matches!(self, Self::Bipolar5 | Self::Bipolar10)
+    }
+}
+
+/// The level of a switch's input while the switch is closed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Levels {
+    /// The switch pulls its input low, the usual wiring.
+    ActiveLow,
+    /// The switch lets its input rise.
+    ActiveHigh,
+}
+
+impl Levels {
+    /// The argument of `CN`.
+    #[must_use]
+    pub const fn code(self) -> i8 {
+        match self {
+            Self::ActiveLow => -1,
+            Self::ActiveHigh => 1,
+        }
+    }
+
+    /// Whether a switch with this level at its input is closed.
+    #[must_use]
+    pub const fn is_closed(self, is_high: bool) -> bool {
+        matches!(self, Self::ActiveHigh) == is_high
+    }
+}
+
+/// What palpate has to know to drive a slide with a Galil controller.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GalilSettings {
+    /// Name of the rig, for the operator.
+    pub name: String,
+    /// Axis the slide is on, `A` to `H`.
+    pub axis: char,
+    /// Analog input of the load cell, from 1.
+    pub input: u8,
+    /// Travel of one pulse in mm.
+    pub mm_per_pulse: f64,
+    /// Whether the controller's positive counts lead away from the tissue.
+    pub is_reversed: bool,
+    /// End of the travel, from home.
+    pub travel: Position,
+    /// Fastest speed.
+    pub speed_max: MmPerS,
+    /// Acceleration of every move.
+    pub acceleration: MmPerS2,
+    /// How the drive wants its pulses.
+    pub motor_type: MotorType,
+    /// Limit switches.
+    pub limits: Levels,
+    /// Home switch.
+    pub home: Levels,
+    /// Range of the load cell's input.
+    pub range: AnalogRange,
+    /// Bits of the converter: 12, or 16 as an option of the controller.
+    pub bits: u8,
+    /// White noise of the signal at rest, standard deviation.
+    pub noise: Volts,
+    /// Serial number that the controller must have; any without.
+    pub serial_number: Option<u64>,
+    /// Whether a program on the controller may stop the axis when palpate falls silent. It takes the place of a program
+    /// that is there, but for one in permanent memory.
+    pub has_watchdog: bool,
+}
+
+impl GalilSettings {
+    /// 1 where the controller counts as palpate does, towards the tissue, else -1.
+    #[must_use]
+    pub const fn sign(&self) -> i64 {
+        if self.is_reversed { -1 } else { 1 }
+    }
+
+    /// Volts of one count.
+    #[must_use]
+    pub fn volts_per_count(&self) -> f64 {
+        self.range.span().0 / f64::from(1_u32 << self.bits.min(24))
+    }
+
+    /// Counts per second of a speed.
+    #[must_use]
+    pub fn counts(&self, speed: MmPerS) -> i64 {
+        // Rounding forgives the decimals of millimetres; the controller rounds down to its quantum.
+        (speed.0 / self.mm_per_pulse).round() as i64
+    }
+
+    /// Counts per second squared of an acceleration.
+    #[must_use]
+    pub fn counts2(&self, acceleration: MmPerS2) -> i64 {
+        (acceleration.0 / self.mm_per_pulse).round() as i64
+    }
+}
+
+#[cfg(test)]
+pub mod tests {
+    use super::*;
+
+    /// The slide and cell of the source thesis on axis A and input 1.
+    pub fn thesis() -> GalilSettings {
+        GalilSettings {
+            name: "bench".into(),
+            axis: 'A',
+            input: 1,
+            mm_per_pulse: 0.015,
+            is_reversed: false,
+            travel: Position(150.0),
+            speed_max: MmPerS(20.0),
+            acceleration: MmPerS2(61.44),
+            motor_type: MotorType::ActiveLow,
+            limits: Levels::ActiveLow,
+            home: Levels::ActiveLow,
+            range: AnalogRange::Bipolar10,
+            bits: 16,
+            noise: Volts(0.001),
+            serial_number: None,
+            has_watchdog: true,
+        }
+    }
+
+    #[test]
+    fn counts_are_those_of_the_drive() {
+        let thesis = thesis();
+        assert_eq!(thesis.counts(MmPerS(0.75)), 50);
+        assert_eq!(thesis.counts(MmPerS(0.9)), 60);
+        assert_eq!(thesis.counts2(MmPerS2(61.44)), 4096);
+        assert_eq!(thesis.volts_per_count(), 20.0 / 65_536.0);
+    }
+
+    #[test]
+    fn a_switch_is_closed_at_its_level() {
+        assert!(Levels::ActiveLow.is_closed(false) && !Levels::ActiveLow.is_closed(true));
+        assert!(Levels::ActiveHigh.is_closed(true) && !Levels::ActiveHigh.is_closed(false));
+    }
+}

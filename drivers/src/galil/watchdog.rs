@@ -1,0 +1,49 @@
+//! A program on the controller that stops the axis when palpate falls silent.
+
+use palpate_model::Nanos;
+use palpate_model::units::{MmPerS, MmPerS2};
+
+/// The variable that palpate sets to 1 again and again.
+pub const VARIABLE: &str = "plpwd";
+/// The program's label.
+pub const LABEL: &str = "#PLPWD";
+/// The thread it runs in: the first one is for whoever else has programs, and automatic subroutines.
+pub const THREAD: u8 = 1;
+/// How often the program looks, in the controller's ms.
+const LOOK_MS: u32 = 250;
+/// How often palpate renews: so often that two renewals may be lost.
+pub const RENEW: Nanos = Nanos::from_millis(75);
+
+/// Its lines. `WT`, `JP`, labels: DMC-40x0 command reference. `ST` of an axis leaves programs running.
+#[must_use]
+pub fn program(axis: char) -> Vec<String> {
+    vec![
+        LABEL.to_owned(),
+        format!("WT {LOOK_MS}"),
+        format!("JP #PLPST,{VARIABLE}=0"),
+        format!("{VARIABLE}=0"),
+        format!("JP {LABEL}"),
+        "#PLPST".to_owned(),
+        format!("ST{axis}"),
+        format!("JP {LABEL}"),
+    ]
+}
+
+/// How far the axis goes at most after the last byte from palpate: two looks of the program at full speed, and the way
+/// of the brake.
+#[must_use]
+pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
+    let silent = 2.0 * f64::from(LOOK_MS) * 1e-3;
+    speed.0 * silent + speed.0 * speed.0 / (2.0 * acceleration.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_worst_case_is_two_looks_and_the_brake() {
+        let worst = worst_case_mm(MmPerS(20.0), MmPerS2(61.44));
+        assert!((worst - (10.0 + 400.0 / 122.88)).abs() < 1e-12);
+    }
+}
