@@ -1,0 +1,12 @@
+//! The Galil driver against the emulated controller: in simulated time, and over real wires.
+
+#[path = "galil_driver/bench.rs"]
+mod bench;
+#[path = "galil_driver/faults.rs"]
+mod faults;
+#[path = "galil_driver/moves.rs"]
+mod moves;
+#[path = "galil_driver/opening.rs"]
+mod opening;
+#[path = "galil_driver/wires.rs"]
+mod wires;

@@ -1,0 +1,129 @@
+//! Wires and controllers that fail.
+
+use crate::bench::{Host, thesis, to};
+use palpate_drivers::emulate::Device;
+use palpate_drivers::emulate::faults::DeviceFault;
+use palpate_drivers::wire::Dialogue;
+use palpate_model::random::SplitMix;
+use palpate_model::rig::{AxisStatus, Fault, RigCommand};
+
+fn moving() -> Host {
+    let mut host = Host::new(&thesis());
+    host.tell(RigCommand::EnableMotor);
+    host.tell(to(6000, 20.0));
+    host.pass(0.6);
+    assert!(!host.is_at_rest());
+    host
+}
+
+#[test]
+fn silence_of_the_host_stops_the_axis_within_the_worst_case() {
+    let host = moving();
+    let worst = host.connected.worst_case_mm;
+    let from = host.newest().pulses;
+    let mut wire = host.wire.lock();
+    let mut now = wire.now;
+    for _ in 0..3_000 {
+        now = now + palpate_model::Nanos::from_millis(1);
+        wire.emulator.advance(now);
+    }
+    assert!(!wire.emulator.is_running(0));
+    wire.emulator.transmit(0);
+    wire.emulator.receive(now, 0, b"MG _TDA\r");
+    let told = String::from_utf8(wire.emulator.transmit(0)).unwrap();
+    let rest: f64 = told.split("\r\n").next().unwrap().trim().parse().unwrap();
+    let way = (rest - from as f64) * 0.015;
+    assert!(way > 5.0 && way < worst, "{way} mm of {worst} mm");
+}
+
+#[test]
+fn who_does_not_look_at_samples_is_silent_too() {
+    let mut host = moving();
+    host.is_attended = false;
+    host.pass(2.0);
+    assert!(host.is_at_rest());
+    assert!(host.newest().pulses < 6000 - 1000);
+}
+
+#[test]
+fn a_reset_is_noticed_and_nothing_moves_after_it() {
+    let mut host = moving();
+    {
+        let mut wire = host.wire.lock();
+        let now = wire.now;
+        wire.emulator.suffer(now, DeviceFault::Reset, true);
+    }
+    host.until("noticed", |host| {
+        host.faults.contains(&Fault::ControllerReset)
+    });
+    let before = host.faults.len();
+    let now = host.now();
+    host.session.command(now, RigCommand::EnableMotor);
+    host.until("refused", |host| host.faults.len() > before);
+    assert!(
+        host.faults[before]
+            .to_string()
+            .contains("open the rig again")
+    );
+    let ticks: Vec<u64> = host.readings.iter().map(|reading| reading.tick).collect();
+    assert!(ticks.windows(2).all(|pair| pair[0] < pair[1]));
+    // A stop is always passed on.
+    host.tell(RigCommand::Stop);
+}
+
+#[test]
+fn a_cut_wire_is_an_error_of_the_link() {
+    let mut host = moving();
+    host.wire.lock().is_cut = true;
+    assert!(host.turn().is_err());
+}
+
+#[test]
+fn a_controller_that_falls_silent_is_dead_after_some_questions() {
+    let mut host = moving();
+    host.wire.lock().spoil = Box::new(|_| Vec::new());
+    let start = host.now();
+    loop {
+        host.turn().unwrap();
+        let now = host.now();
+        if let Some(why) = host.session.is_dead(now) {
+            assert!(why.contains("no sensible answer"), "{why}");
+            break;
+        }
+        assert!(now.since(start).seconds().0 < 10.0);
+    }
+}
+
+/// Bytes lost, doubled or changed on the way here: in the end samples come again, at the right places, and the axis can be
+/// stopped.
+#[test]
+fn spoilt_bytes_are_got_over() {
+    for seed in 0..40 {
+        let mut host = moving();
+        let mut random = SplitMix::seeded(seed);
+        let mut left = 5 + random.below(200);
+        let kind = random.below(3);
+        host.wire.lock().spoil = Box::new(move |byte| {
+            if left == 0 || random.below(7) > 0 {
+                return vec![byte];
+            }
+            left -= 1;
+            match kind {
+                0 => Vec::new(),
+                1 => vec![byte, byte],
+                _ => vec![random.below(256) as u8],
+            }
+        });
+        let now = host.now();
+        host.session.command(now, RigCommand::Stop);
+        host.pass(3.0);
+        let before = host.readings.len();
+        host.pass(0.5);
+        assert!(host.readings.len() > before + 100, "seed {seed}");
+        assert!(host.is_at_rest(), "seed {seed}");
+        assert!(host.acks.contains(&RigCommand::Stop), "seed {seed}");
+        assert!(host.newest().status.has(AxisStatus::MOTOR_ON));
+        let now = host.now();
+        assert_eq!(host.session.is_dead(now), None);
+    }
+}

@@ -1,0 +1,152 @@
+//! What is found out and set when a controller is opened.
+
+use crate::bench::{Host, clock_of, thesis, try_connect, wired};
+use palpate_drivers::emulate::Device;
+use palpate_drivers::emulate::faults::DeviceFault;
+use palpate_drivers::emulate::galil::{self, GalilModel};
+use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, connect};
+use palpate_drivers::wire::pair;
+use palpate_model::Nanos;
+
+#[test]
+fn a_controller_tells_what_it_is() {
+    let host = Host::new(&thesis());
+    let rig = &host.connected.description;
+    assert!(
+        rig.identity
+            .starts_with("Galil DMC4143 Rev 1.3a, no. 1820, axis A, input 1, with a watchdog"),
+        "{}",
+        rig.identity
+    );
+    assert_eq!(rig.tick_nanos, 976_563);
+    assert!((rig.speed_quantum.0 - 0.03).abs() < 1e-12);
+    assert!((rig.acceleration.0 - 61.44).abs() < 1e-9);
+    let adc = rig.adc.unwrap();
+    assert_eq!((adc.counts_min, adc.counts_max), (-32_768, 32_767));
+    // Half a second at 20 mm/s and the brake.
+    assert!((host.connected.worst_case_mm - (10.0 + 400.0 / 122.88)).abs() < 1e-9);
+    assert!(host.connected.stats.round_trip_max < Nanos::from_millis(2));
+    assert!(!host.connected.raw.is_empty());
+}
+
+#[test]
+fn rates_are_those_read_back() {
+    let mut settings = thesis();
+    settings.acceleration.0 = 73_422.0 * 0.015;
+    let host = Host::new(&settings);
+    let made = host.connected.description.acceleration.0 / 0.015;
+    assert!((made - 72_704.0).abs() < 1e-6, "{made}");
+}
+
+#[test]
+fn other_series_and_clocks_are_driven_too() {
+    for model in [GalilModel::Dmc4183, GalilModel::Dmc4040] {
+        let wire = wired(galil::GalilSettings {
+            model,
+            ..galil::GalilSettings::default()
+        });
+        let found = try_connect(&wire, &thesis()).unwrap();
+        assert_eq!(found.board.axes, model.axes());
+    }
+    let wire = wired(galil::GalilSettings::default());
+    {
+        let mut wire = wire.lock();
+        let now = wire.now;
+        wire.emulator.receive(now, 0, b"TM 500\r");
+        wire.emulator.transmit(0);
+    }
+    let found = try_connect(&wire, &thesis()).unwrap();
+    assert_eq!(found.description.tick_nanos, 488_281);
+    assert!((found.description.speed_quantum.0 - 0.06).abs() < 1e-12);
+}
+
+#[test]
+fn what_is_not_the_rig_of_the_file_is_refused_in_words() {
+    let serial = GalilSettings {
+        serial_number: Some(7),
+        ..thesis()
+    };
+    let axis = GalilSettings {
+        axis: 'F',
+        ..thesis()
+    };
+    let speed = GalilSettings {
+        speed_max: palpate_model::MmPerS(1e6),
+        ..thesis()
+    };
+    for (settings, words) in [
+        (serial, "serial number 1820"),
+        (axis, "no axis F"),
+        (speed, "SPA="),
+    ] {
+        let wire = wired(galil::GalilSettings::default());
+        let err = try_connect(&wire, &settings).unwrap_err().to_string();
+        assert!(err.contains(words), "{err}");
+    }
+}
+
+#[test]
+fn a_controller_without_inputs_is_refused() {
+    let wire = wired(galil::GalilSettings {
+        model: GalilModel::Dmc2143,
+        converter: None,
+        ..galil::GalilSettings::default()
+    });
+    let err = try_connect(&wire, &thesis()).unwrap_err();
+    assert!(err.to_string().contains("no analog inputs"), "{err}");
+    let other = wired(galil::GalilSettings::default());
+    other
+        .lock()
+        .emulator
+        .suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+    let err = try_connect(&other, &thesis()).unwrap_err();
+    assert!(matches!(err, GalilOpenError::Unsupported { .. }), "{err}");
+}
+
+#[test]
+fn another_range_has_other_counts() {
+    let mut settings = thesis();
+    settings.range = AnalogRange::Unipolar5;
+    settings.bits = 12;
+    let host = Host::new(&settings);
+    let adc = host.connected.description.adc.unwrap();
+    assert_eq!((adc.counts_min, adc.counts_max), (0, 4095));
+    assert!((adc.volts_per_count - 5.0 / 4096.0).abs() < 1e-15);
+}
+
+#[test]
+fn echo_half_a_line_and_half_a_download_are_got_rid_of() {
+    for left in [&b"PAA=10"[..], b"DL\r#X\rJP #", b"EO 1\rMG 1,2\r"] {
+        let wire = wired(galil::GalilSettings {
+            has_echo: true,
+            ..galil::GalilSettings::default()
+        });
+        {
+            let mut wire = wire.lock();
+            let now = wire.now;
+            wire.emulator.receive(now, 0, left);
+        }
+        try_connect(&wire, &thesis()).unwrap_or_else(|err| panic!("{left:?}: {err}"));
+    }
+}
+
+#[test]
+fn nobody_on_the_wire_is_told() {
+    let (mut here, _there) = pair();
+    // A clock of its own: each look is a tenth of a second later.
+    let now = std::sync::atomic::AtomicU64::new(0);
+    let clock: palpate_drivers::wire::HostClock = std::sync::Arc::new(move || {
+        Nanos(now.fetch_add(100_000_000, std::sync::atomic::Ordering::Relaxed))
+    });
+    let err = connect(&mut here, &clock, &thesis(), &"galil".into()).unwrap_err();
+    assert_eq!(err, GalilOpenError::Silent);
+    let wire = wired(galil::GalilSettings::default());
+    wire.lock().is_cut = true;
+    let lost = connect(
+        &mut wire.clone(),
+        &clock_of(&wire),
+        &thesis(),
+        &"galil".into(),
+    );
+    assert!(matches!(lost, Err(GalilOpenError::Lost { .. })));
+}
