@@ -17,9 +17,10 @@ const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 /// The line is quiet after so long without a byte.
 const QUIET: Nanos = Nanos::from_millis(25);
 /// So long a marker may take to come back; a controller needs a third of a second to start again.
-const MARKER_MAX: Nanos = Nanos::from_millis(500);
-/// Markers sent before the link counts as dead.
-const MARKERS_MAX: u32 = 4;
+const MARKER_MAX: Nanos = Nanos::from_millis(350);
+/// Markers sent before the link counts as dead: on a line that spoils one byte in fifty all come back spoilt once in
+/// four thousand times.
+const MARKERS_MAX: u32 = 6;
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
 /// Lines of a program told at once, of those nobody asked for, are enough to see what it says.
@@ -476,7 +477,7 @@ impl Dialogue for Session {
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        if let Some(search) = &mut self.search {
+        if let Some(search) = self.search.as_mut().filter(|_| !bytes.is_empty()) {
             search.last_byte = now;
         }
         for byte in bytes {
@@ -511,6 +512,10 @@ impl Dialogue for Session {
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
+        if self.search.is_some() {
+            // Often enough to see that the line has become quiet.
+            return now + Nanos(QUIET.0 / 10);
+        }
         let due = match &self.beginning {
             Some((_, due)) => *due,
             None => self.asked_at.map_or(now, |at| at + self.pace.every),

@@ -191,7 +191,7 @@ impl Host {
         }
         let mut buffer = [0_u8; 256];
         let wait = self.session.next_at(self.now()).since(self.now());
-        let wait = wait.min(Nanos(500_000)).max(Nanos(1));
+        let wait = wait.min(Nanos(500_000)).max(Nanos(20_000));
         let count = self.wire.read(&mut buffer, Duration::from_nanos(wait.0))?;
         self.session.received(self.now(), &buffer[..count]);
         while let Some((_, body)) = self.session.take_event() {

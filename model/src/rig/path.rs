@@ -50,6 +50,8 @@ pub struct PathTracker {
     pulse_lag: Seconds,
     position: Option<Position>,
     velocity: MmPerS,
+    /// Speed at which the motion under way was cut short: what its place is uncertain by then stays so to the end.
+    speed_at_stop: MmPerS,
     pending: Option<Pending>,
     motion: Motion,
 }
@@ -64,6 +66,7 @@ impl PathTracker {
             pulse_lag: rig.pulse_lag,
             position: None,
             velocity: MmPerS(0.0),
+            speed_at_stop: MmPerS(0.0),
             pending: None,
             motion: Motion::Rest,
         }
@@ -123,6 +126,7 @@ impl PathTracker {
                 let mut since =
                     Seconds(reading.tick.saturating_sub(*start_tick) as f64 * self.tick.0);
                 if reading.status.has(AxisStatus::STOPPING) && !*is_stopping {
+                    self.speed_at_stop = MmPerS(course.velocity(since).0.abs());
                     *course = course.stopped_at(since);
                     *start_tick = reading.tick;
                     *is_stopping = true;
@@ -142,7 +146,8 @@ impl PathTracker {
         }
         self.position = Some(position);
         let expected_pulses = position.0 / self.mm_per_pulse;
-        let lag_pulses = (self.velocity.0 * self.pulse_lag.0 / self.mm_per_pulse).abs();
+        let speed = self.velocity.0.abs().max(self.speed_at_stop.0);
+        let lag_pulses = speed * self.pulse_lag.0 / self.mm_per_pulse;
         // One pulse, plus rounding of a position of up to 1e5 pulses in double precision.
         if (expected_pulses - reading.pulses as f64).abs() > 1.0 + lag_pulses + 1e-6 {
             return Err(PathError {
@@ -177,6 +182,7 @@ impl PathTracker {
             return here;
         };
         self.motion = Motion::Rest;
+        self.speed_at_stop = MmPerS(0.0);
         // A stepper rests on a whole pulse: its target, or the pulse at which it was cut short.
         if !is_stopping && since.0 + self.tick.0 >= course.duration().0 {
             course.end()
