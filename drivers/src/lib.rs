@@ -10,6 +10,7 @@ pub mod emulate;
 pub mod galil;
 pub mod open;
 pub mod rig;
+pub mod rig_file;
 pub mod serial;
 pub mod sim;
 pub mod wire;

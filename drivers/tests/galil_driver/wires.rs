@@ -1,1 +1,226 @@
-//! The rig over a TCP connection and over a pseudo-terminal, in real time.
+//! The rig over a TCP connection and over a pseudo-terminal, in real time. Waits are generous: nothing here is about
+//! speed.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the clock of a test stands for the runner's"
+)]
+
+use crate::bench::{thesis, to};
+use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings as Emulated};
+use palpate_drivers::emulate::serve::{Place as At, ServeOptions, Told, serve};
+use palpate_drivers::galil::GalilRig;
+use palpate_drivers::wire::{HostClock, Place, WireError};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+struct Served {
+    address: String,
+    orders: SyncSender<String>,
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+}
+
+fn start(place: At, is_serial: bool, latency: Nanos) -> Served {
+    let (orders, received) = sync_channel(16);
+    let (sender, told) = sync_channel(64);
+    let stop = Arc::new(AtomicBool::new(false));
+    let is_over = Arc::clone(&stop);
+    let thread = std::thread::Builder::new()
+        .name("emulator".into())
+        .spawn(move || {
+            let mut device = GalilEmulator::new(Emulated {
+                is_serial,
+                ..Emulated::default()
+            });
+            let options = ServeOptions {
+                place,
+                baud: None,
+                latency,
+                faults: Vec::new(),
+                seed: 1,
+            };
+            // Only where it is matters here.
+            let mut tell = |told| drop(sender.try_send(told));
+            serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
+        })
+        .expect("a thread");
+    let Ok(Told::Ready(address)) = told.recv_timeout(Duration::from_secs(10)) else {
+        panic!("it did not start");
+    };
+    Served {
+        address,
+        orders,
+        stop,
+        thread: Some(thread),
+    }
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let result = thread.join();
+            assert!(result.is_ok() || std::thread::panicking());
+        }
+    }
+}
+
+fn clock() -> HostClock {
+    let start = Instant::now();
+    Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
+}
+
+/// The rig with somebody who takes its reports.
+struct Runner {
+    rig: GalilRig,
+    now: Nanos,
+    newest: Option<Reading>,
+    events: Vec<RigEvent>,
+}
+
+impl Runner {
+    fn open(place: &Place) -> Self {
+        let link = place.open().expect("the emulator is there");
+        let rig = GalilRig::open(link, &thesis(), clock()).expect("it is a Galil controller");
+        assert!(!rig.is_virtual());
+        Self {
+            rig,
+            now: Nanos::ZERO,
+            newest: None,
+            events: Vec::new(),
+        }
+    }
+
+    fn pass(&mut self) {
+        self.now = self.now + Nanos::from_millis(10);
+        while let Some(event) = self.rig.next_event(self.now) {
+            assert!(event.at <= self.now);
+            if let RigEventBody::Reading(reading) = event.body {
+                self.newest = Some(reading);
+            }
+            self.events.push(event);
+        }
+    }
+
+    fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
+        // A minute of waiting is for a computer with much else to do.
+        for _ in 0..6_000 {
+            if is_so(self) {
+                return;
+            }
+            self.pass();
+        }
+        panic!("{what} never: {:?}", self.faults());
+    }
+
+    fn faults(&self) -> Vec<&Fault> {
+        self.events
+            .iter()
+            .filter_map(|event| match &event.body {
+                RigEventBody::Fault(fault) => Some(fault),
+                _ => None,
+            })
+            .collect()
+    }
+
+    fn tell(&mut self, command: RigCommand) {
+        self.events.clear();
+        self.rig.send(command);
+        self.until("acknowledged", |runner| {
+            runner.events.iter().any(
+                |event| matches!(&event.body, RigEventBody::Ack(ack) if command.is_answered_by(&ack.command)),
+            )
+        });
+    }
+
+    fn is_at_rest(&self) -> bool {
+        self.newest
+            .is_some_and(|reading| !reading.status.has(AxisStatus::MOVING))
+    }
+
+    /// A move, a stop, a halt; then the plug is pulled in mid-move.
+    fn exercise(mut self, served: &Served) {
+        self.until("a sample", |runner| runner.newest.is_some());
+        self.tell(RigCommand::EnableMotor);
+        self.tell(to(100, 19.98));
+        self.until("moving", |runner| !runner.is_at_rest());
+        self.until("there", |runner| {
+            runner.is_at_rest() && runner.newest.is_some_and(|reading| reading.pulses == 100)
+        });
+        self.tell(to(6000, 0.75));
+        self.tell(RigCommand::Stop);
+        self.until("at rest", Self::is_at_rest);
+        self.tell(RigCommand::Halt);
+        let sent = self
+            .rig
+            .take_raw()
+            .iter()
+            .filter(|piece| piece.is_sent)
+            .flat_map(|piece| piece.bytes.clone())
+            .collect::<Vec<u8>>();
+        let sent = String::from_utf8(sent).unwrap();
+        assert!(sent.starts_with("\rEO 0\r") && sent.contains("\rSTA;MG @AN[1]"));
+        assert!(self.rig.stats().answers > 10);
+        self.tell(to(6000, 0.75));
+        self.events.clear();
+        served.orders.send("disconnect:60".into()).unwrap();
+        self.until("lost", |runner| {
+            matches!(runner.faults().first(), Some(Fault::LinkLost { .. }))
+        });
+        // Nothing hangs and nothing comes any more.
+        self.rig.send(RigCommand::Stop);
+        self.pass();
+    }
+}
+
+#[test]
+fn a_controller_on_a_network() {
+    let at = At::Tcp(([127, 0, 0, 1], 0).into());
+    let served = start(at, false, Nanos::ZERO);
+    Runner::open(&Place::Tcp(served.address.clone())).exercise(&served);
+}
+
+#[test]
+fn a_controller_on_a_serial_port_that_only_one_program_has() {
+    if !std::path::Path::new("/dev/ptmx").exists() {
+        println!("skipped: there are no pseudo-terminals here");
+        return;
+    }
+    let served = start(At::Pty(None), true, Nanos::ZERO);
+    let place = Place::Serial {
+        port: served.address.clone(),
+        baud: 115_200,
+        has_handshake: false,
+    };
+    let runner = Runner::open(&place);
+    let Err(err) = place.open() else {
+        panic!("two programs have one port");
+    };
+    assert!(matches!(err, WireError::Busy { .. }), "{err:?}");
+    runner.exercise(&served);
+}
+
+#[test]
+fn a_converter_that_waits_is_measured() {
+    if !std::path::Path::new("/dev/ptmx").exists() {
+        println!("skipped: there are no pseudo-terminals here");
+        return;
+    }
+    let served = start(At::Pty(None), true, Nanos::from_millis(16));
+    let place = Place::Serial {
+        port: served.address.clone(),
+        baud: 115_200,
+        has_handshake: false,
+    };
+    let mut runner = Runner::open(&place);
+    runner.until("samples", |runner| runner.events.len() > 50);
+    let stats = runner.rig.stats();
+    assert!(stats.round_trip_max > Nanos::from_millis(8), "{stats:?}");
+    assert!(stats.in_flight > 2, "{stats:?}");
+}

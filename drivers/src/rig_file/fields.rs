@@ -1,0 +1,182 @@
+//! The keys of a file with their lines, taken one after the other; what is left over is a mistake too.
+
+use std::ops::Range;
+use toml::de::{DeTable, DeValue};
+
+/// Something wrong in a file.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Mistake {
+    /// Its line, from 1; 0 for the file as a whole.
+    pub line: usize,
+    /// What is wrong and what would be right, in words.
+    pub message: String,
+}
+
+#[derive(Clone, Debug)]
+enum Value {
+    Text(String),
+    Number(f64),
+    Flag(bool),
+    Other,
+}
+
+struct Field {
+    key: String,
+    line: usize,
+    value: Value,
+    is_taken: bool,
+}
+
+/// The keys of a file.
+pub struct Fields {
+    all: Vec<Field>,
+    mistakes: Vec<Mistake>,
+}
+
+fn line_of(text: &str, span: &Range<usize>) -> usize {
+    let before = text.as_bytes().iter().take(span.start);
+    1 + before.filter(|byte| **byte == b'\n').count()
+}
+
+impl Fields {
+    /// Reads a text; what is no TOML is the only mistake then.
+    pub fn read(text: &str) -> Result<Self, Mistake> {
+        let document = DeTable::parse(text).map_err(|err| Mistake {
+            line: err.span().map_or(0, |span| line_of(text, &span)),
+            message: format!(
+                "this is not TOML ({}); look for a missing quote or '='",
+                err.message().trim().replace('\n', ", ")
+            ),
+        })?;
+        let all = document
+            .get_ref()
+            .iter()
+            .map(|(key, value)| Field {
+                key: key.get_ref().to_string(),
+                line: line_of(text, &key.span()),
+                value: match value.get_ref() {
+                    DeValue::String(text) => Value::Text(text.to_string()),
+                    DeValue::Integer(number) => as_number(&number.to_string()),
+                    DeValue::Float(number) => as_number(&number.to_string()),
+                    DeValue::Boolean(flag) => Value::Flag(*flag),
+                    _ => Value::Other,
+                },
+                is_taken: false,
+            })
+            .collect();
+        Ok(Self {
+            all,
+            mistakes: Vec::new(),
+        })
+    }
+
+    /// Tells a mistake at a key, or at the file where the key is missing.
+    pub fn mistake(&mut self, key: &str, message: &str) {
+        let line = self
+            .all
+            .iter()
+            .find(|field| field.key == key)
+            .map_or(0, |field| field.line);
+        self.mistakes.push(Mistake {
+            line,
+            message: format!("{key}: {message}"),
+        });
+    }
+
+    fn take(&mut self, key: &str) -> Option<Value> {
+        let field = self.all.iter_mut().find(|field| field.key == key)?;
+        field.is_taken = true;
+        Some(field.value.clone())
+    }
+
+    /// A text, if it is there.
+    pub fn text(&mut self, key: &str) -> Option<String> {
+        match self.take(key)? {
+            Value::Text(text) if !text.trim().is_empty() => Some(text),
+            _ => {
+                self.mistake(key, "give a text in quotes");
+                None
+            }
+        }
+    }
+
+    /// A flag, if it is there.
+    pub fn flag(&mut self, key: &str) -> Option<bool> {
+        match self.take(key)? {
+            Value::Flag(flag) => Some(flag),
+            _ => {
+                self.mistake(key, "give true or false, without quotes");
+                None
+            }
+        }
+    }
+
+    /// A number within bounds, if it is there.
+    pub fn number(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
+        match self.take(key)? {
+            Value::Number(number) if (least..=most).contains(&number) => Some(number),
+            _ => {
+                self.mistake(
+                    key,
+                    &format!("give a number from {least} to {most}, without quotes"),
+                );
+                None
+            }
+        }
+    }
+
+    /// A number within bounds that must be there.
+    pub fn needed(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
+        if !self.all.iter().any(|field| field.key == key) {
+            self.mistake(key, "is missing; nobody but you can know it");
+            return None;
+        }
+        self.number(key, least, most)
+    }
+
+    /// One of some words; must be there where there is no usual one.
+    pub fn choice<T: Copy>(
+        &mut self,
+        key: &str,
+        words: &[(&str, T)],
+        usual: Option<T>,
+    ) -> Option<T> {
+        let given = match self.take(key) {
+            None if usual.is_some() => return usual,
+            Some(Value::Text(text)) => text,
+            _ => String::new(),
+        };
+        let found = words.iter().find(|(word, _)| *word == given);
+        if found.is_none() {
+            let all: Vec<String> = words
+                .iter()
+                .map(|(word, _)| format!("\"{word}\""))
+                .collect();
+            self.mistake(key, &format!("give {}", all.join(" or ")));
+        }
+        found.map(|(_, value)| *value)
+    }
+
+    /// All mistakes, keys that mean nothing among them, in the order of their lines.
+    pub fn finish(mut self) -> Vec<Mistake> {
+        for field in self.all.iter().filter(|field| !field.is_taken) {
+            self.mistakes.push(Mistake {
+                line: field.line,
+                message: format!(
+                    "'{}' means nothing here; remove it or correct its spelling",
+                    field.key
+                ),
+            });
+        }
+        self.mistakes.sort_by_key(|mistake| mistake.line);
+        self.mistakes
+    }
+}
+
+fn as_number(text: &str) -> Value {
+    // "inf" and "nan" are TOML, but nothing that a rig has.
+    match text.parse::<f64>() {
+        Ok(number) if number.is_finite() => Value::Number(number),
+        _ => Value::Other,
+    }
+}

@@ -1,0 +1,113 @@
+use super::*;
+
+const THESIS: &str = r#"# The slide of the source thesis
+device = "galil"
+port = "/dev/ttyUSB0"
+mm_per_pulse = 0.015
+travel_mm = 150
+speed_max_mm_s = 20
+acceleration_mm_s2 = 61.44
+converter = "16 bit"
+"#;
+
+fn mistakes(text: &str) -> Vec<(usize, String)> {
+    RigFile::parse("bench.toml", text)
+        .unwrap_err()
+        .mistakes
+        .into_iter()
+        .map(|mistake| (mistake.line, mistake.message))
+        .collect()
+}
+
+#[test]
+fn what_is_not_said_is_usual() {
+    let file = RigFile::parse("rigs/bench 2.toml", THESIS).unwrap();
+    assert_eq!(
+        file.place,
+        Place::Serial {
+            port: "/dev/ttyUSB0".into(),
+            baud: 115_200,
+            has_handshake: false
+        }
+    );
+    assert_eq!(file.galil.name, "bench 2");
+    assert_eq!((file.galil.axis, file.galil.input), ('A', 1));
+    assert_eq!(file.galil.range, AnalogRange::Bipolar10);
+    assert_eq!(file.galil.noise.0, 20.0 / 65_536.0);
+    assert!(file.galil.has_watchdog && !file.galil.is_reversed);
+}
+
+#[test]
+fn everything_can_be_said() {
+    let text = THESIS.replace("port = \"/dev/ttyUSB0\"", "address = \"10.0.0.5:23\"")
+        + r#"
+name = "left bench"
+axis = "C"
+input = 3
+direction = "reverse"
+motor_type = "active-high"
+limit_switches = "active-high"
+home_switch = "active-high"
+range = "0..5 V"
+noise_v = 0.002
+filter = "RC low-pass, 100 Hz"
+serial_number = 1820
+watchdog = false
+"#;
+    let file = RigFile::parse("x.toml", &text).unwrap();
+    assert_eq!(file.place, Place::Tcp("10.0.0.5:23".into()));
+    assert_eq!(file.galil.name, "left bench");
+    assert_eq!((file.galil.axis, file.galil.input), ('C', 3));
+    assert_eq!(file.galil.sign(), -1);
+    assert_eq!(file.galil.serial_number, Some(1820));
+    assert_eq!(file.filter.as_deref(), Some("RC low-pass, 100 Hz"));
+    assert!(!file.galil.has_watchdog);
+}
+
+#[test]
+fn every_mistake_is_told_with_its_line() {
+    let text = THESIS
+        .replace("0.015", "\"0.015\"")
+        .replace("travel_mm = 150", "travel = 150")
+        .replace("\"16 bit\"", "16")
+        + "axis = \"Q\"\n";
+    let told = mistakes(&text);
+    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [0, 4, 5, 8, 9], "{told:?}");
+    assert!(told[0].1.contains("travel_mm: is missing"));
+    assert!(told[2].1.contains("'travel' means nothing"));
+    assert!(told[3].1.contains("\"12 bit\" or \"16 bit\""));
+    let all = RigFile::parse("bench.toml", &text).unwrap_err().to_string();
+    assert!(
+        all.contains("bench.toml, line 9: axis: an axis is a letter"),
+        "{all}"
+    );
+}
+
+#[test]
+fn what_does_not_go_together_is_told() {
+    let both = format!("{THESIS}address = \"10.0.0.5:23\"\n");
+    assert!(mistakes(&both)[0].1.contains("not at both"));
+    let nowhere = THESIS.replace("port = \"/dev/ttyUSB0\"\n", "");
+    assert!(mistakes(&nowhere)[0].1.contains("where is the controller"));
+    let slow = THESIS.replace("61.44", "5");
+    assert!(mistakes(&slow)[0].1.contains("no less than 15.36"));
+    let other = THESIS.replace("\"galil\"", "\"grbl\"");
+    assert!(mistakes(&other)[0].1.contains("give \"galil\""));
+}
+
+#[test]
+fn what_is_no_rig_file_is_told() {
+    assert_eq!(mistakes("device = \"galil")[0].0, 1);
+    assert!(
+        mistakes(&"#".repeat(BYTES_MAX + 1))[0]
+            .1
+            .contains("no rig file")
+    );
+    assert!(mistakes("").len() > 3);
+    assert!(
+        mistakes(&THESIS.replace("150", "inf"))[0]
+            .1
+            .contains("travel_mm")
+    );
+}
