@@ -15,5 +15,5 @@ pub mod serial;
 pub mod sim;
 pub mod wire;
 
-pub use open::open;
+pub use open::{is_rig_file, open, open_wired, read_rig_file};
 pub use rig::{Rig, RigError, RigEvent, RigEventBody};

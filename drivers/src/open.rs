@@ -1,9 +1,12 @@
 //! From a rig's name to the rig.
 
 use crate::rig::{Rig, RigError, RigEvent};
+use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
+use crate::wire::HostClock;
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
+use std::io::Read;
 
 /// Opens the rig called `name`: `sim`, or `sim:NAME` for a simulated rig that people share by name.
 ///
@@ -24,6 +27,41 @@ pub fn open(name: &str, settings: &SimSettings) -> Result<Box<dyn Rig>, RigError
             name: name.to_owned(),
         })
     }
+}
+
+/// Whether a name is that of a rig file.
+#[must_use]
+pub fn is_rig_file(name: &str) -> bool {
+    name.ends_with(".toml")
+}
+
+/// Reads a rig file.
+pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
+    let unreadable = |detail: String| RigError::File {
+        file: file.to_owned(),
+        detail,
+    };
+    let mut bytes = Vec::new();
+    std::fs::File::open(file)
+        .and_then(|open| {
+            // One more than allowed, so that too much is noticed and nothing endless is read.
+            open.take(rig_file::BYTES_MAX as u64 + 1)
+                .read_to_end(&mut bytes)
+        })
+        .map_err(|err| unreadable(err.to_string()))?;
+    let text = String::from_utf8(bytes).map_err(|_| unreadable("it is no text".into()))?;
+    Ok(RigFile::parse(file, &text)?)
+}
+
+/// Opens the rig that a file describes and checks its devices against it. Nothing moves.
+pub fn open_wired(file: &str, clock: &HostClock) -> Result<Box<dyn Rig>, RigError> {
+    let rig = read_rig_file(file)?
+        .open(clock)
+        .map_err(|error| RigError::Galil {
+            file: file.to_owned(),
+            error,
+        })?;
+    Ok(Box::new(rig))
 }
 
 impl<R: Rig + ?Sized> Rig for Box<R> {
@@ -63,6 +101,31 @@ mod tests {
             assert_eq!(rig.description().name, name);
             assert!(rig.is_virtual());
         }
+    }
+
+    #[test]
+    fn a_rig_file_that_cannot_be_used_is_told_by_name() {
+        let clock: HostClock = std::sync::Arc::new(|| Nanos::ZERO);
+        let folder = tempfile::tempdir().unwrap();
+        let file = folder.path().join("bench.toml").display().to_string();
+        assert!(is_rig_file(&file) && !is_rig_file("sim"));
+        let said = |file: &str| match open_wired(file, &clock) {
+            Ok(_) => panic!("{file} was opened"),
+            Err(err) => err.to_string(),
+        };
+        assert!(said(&file).contains("cannot be read"));
+        std::fs::write(&file, b"\xff").unwrap();
+        assert!(said(&file).contains("no text"));
+        std::fs::write(&file, "device = \"grbl\"").unwrap();
+        assert!(said(&file).contains("bench.toml, line 1: device"));
+        let text = "device = \"galil\"\nport = \"/dev/there-is-no-such-port\"\nmm_per_pulse = 0.015\n\
+            travel_mm = 150\nspeed_max_mm_s = 20\nacceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n";
+        std::fs::write(&file, text).unwrap();
+        let missing = said(&file);
+        assert!(
+            missing.contains("bench.toml: there is no serial port"),
+            "{missing}"
+        );
     }
 
     #[test]

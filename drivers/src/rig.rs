@@ -1,5 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
+use crate::galil::GalilOpenError;
+use crate::rig_file::RigFileError;
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
 use thiserror::Error;
@@ -29,10 +31,31 @@ pub enum RigEventBody {
 #[non_exhaustive]
 pub enum RigError {
     /// The name does not stand for a rig.
-    #[error("no rig is called '{name}'; use 'sim', or 'sim:NAME' for a shared simulated rig")]
+    #[error(
+        "no rig is called '{name}'; use 'sim', 'sim:NAME' for a shared simulated rig, or a rig file, NAME.toml"
+    )]
     Unknown {
         /// The name given.
         name: String,
+    },
+    /// The rig file cannot be read.
+    #[error("the rig file {file} cannot be read ({detail}); check its path")]
+    File {
+        /// As it was given.
+        file: String,
+        /// What the operating system said.
+        detail: String,
+    },
+    /// The rig file has mistakes.
+    #[error(transparent)]
+    RigFile(#[from] RigFileError),
+    /// What the rig file describes cannot be used.
+    #[error("rig {file}: {error}")]
+    Galil {
+        /// The rig file.
+        file: String,
+        /// Why.
+        error: GalilOpenError,
     },
 }
 

@@ -14,7 +14,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::Position;
 use palpate_protocols::plans::RampHold;
-use palpate_protocols::runner::TimeScale;
+use palpate_protocols::runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
 
 /// The bench of a simulated rig or behind an emulated device.
@@ -82,7 +82,7 @@ impl BenchArgs {
 /// The rig to use.
 #[derive(Clone, Debug, Args)]
 pub struct RigArgs {
-    /// Rig: sim, or sim:NAME for a simulated rig that only one program may hold
+    /// Rig: sim, sim:NAME for a simulated rig that only one program may hold, or a rig file, NAME.toml
     #[arg(long, default_value = "sim")]
     pub rig: String,
     #[command(flatten)]
@@ -147,6 +147,9 @@ pub struct OpenRig {
 /// Opens the rig, or says who holds it.
 pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     let settings = args.settings();
+    if palpate_drivers::is_rig_file(&args.rig) {
+        return open_wired(args);
+    }
     let rig = palpate_drivers::open(&args.rig, &settings).map_err(Failure::usage)?;
     // A plain `sim` lives and dies with its program; a named one is shared like a real rig.
     let lock = match args.rig.split_once(':') {
@@ -172,6 +175,42 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         doubts,
         limits,
         _lock: lock,
+    })
+}
+
+/// Opens the rig that a file describes.
+fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
+    let Some(calibration) = &args.calibration else {
+        return Err(Failure::usage(format!(
+            "which calibration has the load cell of {}? Give --calibration NAME or FILE",
+            args.rig
+        )));
+    };
+    if args.time_scale != TimeScale::Factor(1.0) {
+        return Err(Failure::usage(
+            "--time-scale is for simulated rigs; leave it out",
+        ));
+    }
+    let source = Source::find(calibration)?;
+    let file = palpate_drivers::read_rig_file(&args.rig).map_err(Failure::usage)?;
+    // Two programs may be connected to one controller on a network; only one may drive it.
+    let place: String = file
+        .place
+        .to_string()
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
+    let lock = rig_lock(&place)?;
+    let rig = palpate_drivers::open_wired(&args.rig, &driver_clock())
+        .map_err(|err| Failure::Failed(err.to_string()))?;
+    let limits = Limits::for_travel(travel(args, rig.description().travel)?);
+    let doubts = source.doubts(&rig.description().name);
+    Ok(OpenRig {
+        rig,
+        calibration: source.calibration,
+        doubts,
+        limits,
+        _lock: Some(lock),
     })
 }
 

@@ -210,7 +210,6 @@ fn set_up_axis(
         here - travel - margin,
         2.0 * (settings.travel.0 + 10.0),
     );
-    debug_assert!(margin > 0);
     for command in limit_commands(a, forward, reverse) {
         if let Some(list) = command.strip_prefix("MG ") {
             let found = console.numbers(list)?;
@@ -321,10 +320,11 @@ fn describe(
         (0, counts - 1)
     };
     let watch = if has_watchdog { "with" } else { "without" };
+    let filter = settings.filter.as_deref().unwrap_or("not known");
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{board}, axis {}, input {}, {watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost",
+            "{board}, axis {}, input {} (filter before it: {filter}), {watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost",
             settings.axis, settings.input
         ),
         settings: BTreeMap::new(),

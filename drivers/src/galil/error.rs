@@ -16,7 +16,7 @@ impl GalilError {
     #[must_use]
     pub const fn remedy(&self) -> &'static str {
         match self.code {
-            1 | 2 | 3 => {
+            1..=3 => {
                 "this firmware does not know the command; update it or choose another controller"
             }
             4 | 50 => "check the axis letter in the rig file",

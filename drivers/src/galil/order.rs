@@ -178,7 +178,7 @@ impl Order {
     fn done(&self, made: RigCommand) -> Next {
         match (self.command, self.numbers.as_slice()) {
             // The number is `_MO`: 1 while the motor is off.
-            (RigCommand::EnableMotor, &[off]) if off == 0.0 => Next::Done(made),
+            (RigCommand::EnableMotor, &[0.0]) => Next::Done(made),
             (RigCommand::EnableMotor, _) => Next::Refused(
                 "the motor stays off after SH; check the amplifier and its enable input".into(),
             ),

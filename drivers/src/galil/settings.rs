@@ -121,6 +121,8 @@ pub struct GalilSettings {
     pub bits: u8,
     /// White noise of the signal at rest, standard deviation.
     pub noise: Volts,
+    /// What is before the converter to keep higher frequencies out, in words.
+    pub filter: Option<String>,
     /// Serial number that the controller must have; any without.
     pub serial_number: Option<u64>,
     /// Whether a program on the controller may stop the axis when palpate falls silent. It takes the place of a program
@@ -176,6 +178,7 @@ pub mod tests {
             range: AnalogRange::Bipolar10,
             bits: 16,
             noise: Volts(0.001),
+            filter: None,
             serial_number: None,
             has_watchdog: true,
         }

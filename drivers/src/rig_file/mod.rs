@@ -24,8 +24,6 @@ pub struct RigFile {
     pub place: Place,
     /// How it is wired.
     pub galil: GalilSettings,
-    /// What is before the converter to keep higher frequencies out, in words.
-    pub filter: Option<String>,
 }
 
 /// A rig file with mistakes, all of them.
@@ -162,8 +160,8 @@ fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
             noise: Volts(noise.unwrap_or(range.span().0 / counts)),
             serial_number: serial_number.map(|number| number as u64),
             has_watchdog,
+            filter,
         },
-        filter,
     })
 }
 

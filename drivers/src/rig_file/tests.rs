@@ -60,7 +60,7 @@ watchdog = false
     assert_eq!((file.galil.axis, file.galil.input), ('C', 3));
     assert_eq!(file.galil.sign(), -1);
     assert_eq!(file.galil.serial_number, Some(1820));
-    assert_eq!(file.filter.as_deref(), Some("RC low-pass, 100 Hz"));
+    assert_eq!(file.galil.filter.as_deref(), Some("RC low-pass, 100 Hz"));
     assert!(!file.galil.has_watchdog);
 }
 

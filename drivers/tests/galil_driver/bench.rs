@@ -110,6 +110,7 @@ pub fn thesis() -> GalilSettings {
         range: AnalogRange::Bipolar10,
         bits: 16,
         noise: Volts(0.001),
+        filter: None,
         serial_number: None,
         has_watchdog: true,
     }

@@ -14,7 +14,7 @@ fn a_controller_tells_what_it_is() {
     let rig = &host.connected.description;
     assert!(
         rig.identity
-            .starts_with("Galil DMC4143 Rev 1.3a, no. 1820, axis A, input 1, with a watchdog"),
+            .starts_with("Galil DMC4143 Rev 1.3a, no. 1820, axis A, input 1 (filter before it: not known), with a watchdog"),
         "{}",
         rig.identity
     );

@@ -164,12 +164,13 @@ impl Runner {
             .filter(|piece| piece.is_sent)
             .flat_map(|piece| piece.bytes.clone())
             .collect::<Vec<u8>>();
-        let sent = String::from_utf8(sent).unwrap();
+        let sent = String::from_utf8(sent).expect("ASCII lines");
         assert!(sent.starts_with("\rEO 0\r") && sent.contains("\rSTA;MG @AN[1]"));
         assert!(self.rig.stats().answers > 10);
         self.tell(to(6000, 0.75));
         self.events.clear();
-        served.orders.send("disconnect:60".into()).unwrap();
+        let order = served.orders.send("disconnect:60".into());
+        order.expect("the emulator takes orders");
         self.until("lost", |runner| {
             matches!(runner.faults().first(), Some(Fault::LinkLost { .. }))
         });

@@ -187,6 +187,13 @@ pub fn wall_now() -> SystemTime {
     SystemTime::now()
 }
 
+/// The computer's monotonic clock, from now on, for drivers: they are handed one and never read a clock by themselves.
+#[must_use]
+pub fn driver_clock() -> palpate_drivers::wire::HostClock {
+    let start = Instant::now();
+    Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
+}
+
 /// Measures how long something took; decides nothing.
 pub struct Stopwatch(Instant);
 
