@@ -1,6 +1,6 @@
 //! Disks without room, before and during a run.
 
-use super::{json, palpate, stderr, succeeded};
+use super::{json, palpate, short_run, stderr, succeeded};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -120,5 +120,30 @@ fn a_disk_without_room_is_refused_before_the_start() {
             println!("skipped: no mount namespace here ({other:?})");
         }
         other => panic!("it was not refused on a disk of 4 MB: {other:?}"),
+    }
+}
+
+#[test]
+fn a_library_that_may_not_be_written_is_searched() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "library/sessions/one", &[]));
+    let script = r#"mount --bind library library && mount -o remount,ro,bind library || exit 77
+        PALPATE_HOME=$PWD/library exec "$0" find --json"#;
+    let output = Command::new("unshare")
+        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .output();
+    match output {
+        other if has_no_namespace(&other) => {
+            println!("skipped: no mount namespace here ({other:?})");
+        }
+        output => {
+            let output = output.unwrap();
+            assert_eq!(json(&output)["count"], 1);
+            assert!(stderr(&output).contains("may not be written"));
+            assert!(!at.join("library/catalog.sqlite").exists());
+        }
     }
 }
