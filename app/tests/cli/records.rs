@@ -481,3 +481,15 @@ fn samples_are_exported_as_messages() {
     }
     assert!(!at.join("b.mcap").exists());
 }
+
+#[test]
+fn an_exported_table_has_the_whole_name_of_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "depth-2.5", &[]));
+    succeeded(&palpate(
+        at,
+        &["export", "depth-2.5", "--format", "csv", "--to", "."],
+    ));
+    assert!(at.join("depth-2.5.csv").exists());
+}
