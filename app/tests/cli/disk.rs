@@ -147,3 +147,23 @@ fn a_library_that_may_not_be_written_is_searched() {
         }
     }
 }
+
+#[test]
+fn a_file_that_may_not_grow_does_not_end_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // 1.5 MB a file, in blocks of 512 bytes. The limit's signal is not ignored here: the program must take it.
+    let script = r#"ulimit -f 3000; exec "$0" run ramp-hold --time-scale max --out session"#;
+    let done = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .env("PALPATE_HOME", at.join("library"))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    succeeded(&done);
+    assert!(at.join("session/001.mcap").exists());
+    let info = json(&palpate(at, &["info", "session", "--json"]));
+    assert_eq!(info["is_complete"], true, "{info}");
+    succeeded(&palpate(at, &["doctor", "session"]));
+}

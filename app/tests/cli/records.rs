@@ -506,3 +506,15 @@ fn words_of_a_session_give_the_terminal_no_orders() {
     let object = json(&palpate(at, &["info", "one", "--json"]));
     assert_eq!(object["verdict_reason"], reason);
 }
+
+#[test]
+fn an_exported_table_has_the_whole_name_of_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "depth-2.5", &[]));
+    succeeded(&palpate(
+        at,
+        &["export", "depth-2.5", "--format", "csv", "--to", "."],
+    ));
+    assert!(at.join("depth-2.5.csv").exists());
+}
