@@ -74,6 +74,16 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert!(stderr(&order).contains("depth>=2mm"), "{}", stderr(&order));
 
     succeeded(&palpate(at, &["tag", &one, &two, "+pilot", "-none"]));
+    // What is not there is told, and leaves no edit.
+    let nothing = palpate(at, &["tag", &two, "-nothere"]);
+    succeeded(&nothing);
+    assert!(
+        stderr(&nothing).contains("no tag 'nothere'"),
+        "{}",
+        stderr(&nothing)
+    );
+    let edits = fs::read_to_string(at.join(&two).join("edits.jsonl")).unwrap();
+    assert!(!edits.contains("nothere"), "{edits}");
     let tagged = palpate(at, &["tag", &two, "-pilot", "+good", "--json"]);
     assert_eq!(json(&tagged)["sessions"][0]["tags"][0], "good");
     assert_eq!(found(at, &["--tag", "pilot"]), ["sessions/one"]);

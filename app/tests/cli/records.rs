@@ -483,6 +483,31 @@ fn samples_are_exported_as_messages() {
 }
 
 #[test]
+fn words_of_a_session_give_the_terminal_no_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "one", &["--specimen", "gel\u{1b}[2J 3"]));
+    let reason = "hair\nsession    \u{1b}[31mother";
+    let said = palpate(at, &["verdict", "one", "suspect", "--reason", reason]);
+    succeeded(&said);
+    let info = palpate(at, &["info", "one"]);
+    succeeded(&info);
+    for output in [&said, &info, &palpate(at, &["doctor", "one"])] {
+        let text = stdout(output) + &stderr(output);
+        assert!(!text.contains('\u{1b}'), "{text:?}");
+        assert!(
+            text.lines()
+                .all(|line| !line.contains("other") || line.contains("hair")),
+            "{text}"
+        );
+    }
+    assert!(stdout(&info).contains("gel [2J 3"), "{}", stdout(&info));
+    // Machines get what was said.
+    let object = json(&palpate(at, &["info", "one", "--json"]));
+    assert_eq!(object["verdict_reason"], reason);
+}
+
+#[test]
 fn an_exported_table_has_the_whole_name_of_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
