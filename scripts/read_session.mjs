@@ -1,13 +1,14 @@
 // Reads a session without palpate: the JavaScript example of docs/guide/format.md, and a reader of scripts/other-readers.
 //
 // Usage: node read_session.mjs SESSION      (needs `npm install @mcap/core fzstd` in the same folder)
-import { readFileSync, readdirSync, statSync } from "node:fs";
+import { existsSync, readFileSync, readdirSync, statSync } from "node:fs";
 import { join } from "node:path";
 import { pathToFileURL } from "node:url";
 import { McapIndexedReader, McapStreamReader } from "@mcap/core";
 import { decompress } from "fzstd";
 
 const decompressHandlers = { zstd: (data, size) => decompress(data, new Uint8Array(Number(size))) };
+const RECORD_VERSION = 2; // The newest that is known here.
 const PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh " +
   "check-home paused imported").split(" ");
 
@@ -97,15 +98,49 @@ function samples(rawBytes, derivedBytes) {
   };
 }
 
-/** [topic, sequence, bytes] of every message up to where the file ends or is cut; a wrong checksum is an error. */
-export function streamed(path) {
-  const reader = new McapStreamReader({ decompressHandlers, validateCrcs: true });
-  reader.append(readFileSync(path));
+/**
+ * [topic, sequence, bytes] of every message up to where the file ends or is cut. Nothing of a damaged chunk is used;
+ * `notes` gets a sentence for each.
+ */
+export function streamed(path, notes = []) {
+  const bytes = readFileSync(path);
+  const view = new DataView(bytes.buffer, bytes.byteOffset, bytes.length);
   const topics = new Map();
   const found = [];
-  for (let record; (record = reader.nextRecord()); ) {
-    if (record.type === "Channel") topics.set(record.id, record.topic);
-    if (record.type === "Message") found.push([topics.get(record.channelId), record.sequence, record.data]);
+  const CHUNK = 6;
+  const beginning = []; // Where the channels are, for a reader that goes on behind damage.
+  let reader;
+  const records = (piece) => {
+    const read = [];
+    reader.append(piece);
+    for (let record; (record = reader.nextRecord()); ) read.push(record);
+    return read;
+  };
+  const restart = () => {
+    reader = new McapStreamReader({ decompressHandlers, validateCrcs: true });
+    beginning.forEach(records);
+  };
+  restart();
+  // The magic of eight bytes, then records: opcode, length of eight bytes, body.
+  for (let at = 0, end = Math.min(8, bytes.length); at < end; ) {
+    const piece = bytes.subarray(at, end);
+    const isChunk = at > 0 && piece[0] === CHUNK;
+    try {
+      const read = records(piece);
+      if (at === 0 || read.some((record) => record.type === "Channel")) beginning.push(piece);
+      for (const record of read) {
+        if (record.type === "Channel") topics.set(record.id, record.topic);
+        if (record.type === "Message") found.push([topics.get(record.channelId), record.sequence, record.data]);
+      }
+    } catch (error) {
+      if (!isChunk) throw error;
+      notes.push(`${path}: a chunk is damaged (${error.message}) and nothing of it is used`);
+      restart();
+    }
+    at = end;
+    // What is left where the file is cut, and the magic at its end, is no record.
+    end = at + 9 <= bytes.length && bytes[at] !== 0 ? at + 9 + Number(view.getBigUint64(at + 1, true)) : at;
+    if (end > bytes.length) break;
   }
   return found;
 }
@@ -125,27 +160,46 @@ export async function indexed(path) {
   return found;
 }
 
-/** The columns of all samples, and of every other topic its messages' bytes. */
-export function read(session) {
-  const isFolder = statSync(session).isDirectory();
-  const names = isFolder ? readdirSync(session).filter((name) => /^\d+\.mcap$/.test(name)) : [];
-  names.sort((a, b) => parseInt(a) - parseInt(b));
-  const files = isFolder ? names.map((name) => join(session, name)) : [session];
-  return assembled(files.flatMap(streamed));
+/** The files of a log in order. Those that its disk could not take are in the folder that the file `spare` names. */
+export function segments(session) {
+  if (!statSync(session).isDirectory()) return [session];
+  const spare = join(session, "spare");
+  const folders = existsSync(spare) ? [readFileSync(spare, "utf8")] : [];
+  const found = new Map();
+  // Where both have a number, that of the session's own folder is it.
+  for (const folder of [...folders.filter((folder) => existsSync(folder)), session]) {
+    for (const name of readdirSync(folder)) if (/^\d+\.mcap$/.test(name)) found.set(parseInt(name), join(folder, name));
+  }
+  return [...found.keys()].sort((a, b) => a - b).map((number) => found.get(number));
 }
 
-export function assembled(messages) {
+/** The columns of all samples, of every other topic its messages' bytes, and in `notes` what is damaged or missing. */
+export function read(session) {
+  const notes = [];
+  const messages = segments(session).flatMap((file) => streamed(file, notes));
+  return assembled(messages, notes);
+}
+
+export function assembled(messages, notes = []) {
   const columns = {};
   const others = {};
   const following = {};
   let raw;
   for (const [topic, sequence, data] of messages) {
     const expected = following[topic] ?? 0;
-    if (sequence > expected) throw new Error(`message ${expected} of ${topic} is missing`);
     if (sequence < expected) continue; // It was written again after the disk had failed.
+    if (sequence > expected) notes.push(`${sequence - expected} messages of ${topic} are missing, from number ${expected}`);
     following[topic] = sequence + 1;
+    if (topic === "/manifest") {
+      const { record_version: version } = JSON.parse(new TextDecoder().decode(data));
+      if (version > RECORD_VERSION) {
+        throw new Error(`record_version ${version} is newer than ${RECORD_VERSION}, the newest that this program reads`);
+      }
+    }
     if (topic === "/daq/block") raw = data;
     else if (topic === "/derived/block") {
+      // Without the block that it was made of it is nothing.
+      if (!raw || fields(raw)[1] !== fields(data)[1]) continue;
       for (const [name, values] of Object.entries(samples(raw, data))) (columns[name] ??= []).push(values);
     } else (others[topic] ??= []).push(data);
   }
@@ -156,13 +210,15 @@ export function assembled(messages) {
     const ticks = columns.tick.map((tick) => Number(BigInt.asIntN(64, tick - columns.tick[0])));
     columns.t_s = ticks.map((n) => (rig ? n * (rig.tick_nanos * 1e-9) : n / 1e12));
   }
-  return { columns, others };
+  return { columns, others, notes };
 }
 
 if (import.meta.url === pathToFileURL(process.argv[1]).href) {
-  const { columns, others } = read(process.argv[2]);
+  const { columns, others, notes } = read(process.argv[2]);
   for (const [name, values] of Object.entries(columns)) {
     console.log(`${name}: ${values.length} samples, first ${values[0]}, last ${values.at(-1)}`);
   }
   for (const [topic, found] of Object.entries(others)) console.log(`${topic}: ${found.length} messages`);
+  if (!others["/end"]) console.log("no /end: the recording was interrupted, or its last file is missing");
+  notes.forEach((note) => console.error(note));
 }

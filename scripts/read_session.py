@@ -8,11 +8,13 @@ import json
 import pathlib
 import struct
 import sys
+import warnings
 
 from mcap.exceptions import EndOfFile
-from mcap.records import Channel, Message
-from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Chunk, Message
+from mcap.stream_reader import StreamReader, breakup_chunk
 
+RECORD_VERSION = 2  # The newest that is known here.
 PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh "
           "check-home paused imported").split()
 
@@ -94,33 +96,52 @@ class Whole(io.BufferedReader):
 
 
 def messages(path):
-    """(topic, sequence, bytes) of every message in whole chunks; a wrong checksum is an error."""
+    """(topic, sequence, bytes) of every message in whole chunks. Nothing of a damaged one is used, with a warning."""
     topics = {}
     try:
-        for record in StreamReader(Whole(io.FileIO(path)), validate_crcs=True).records:
-            if isinstance(record, Channel):
-                topics[record.id] = record.topic
-            elif isinstance(record, Message):
-                yield topics[record.channel_id], record.sequence, record.data
+        for record in StreamReader(Whole(io.FileIO(path)), emit_chunks=True).records:
+            try:
+                records = breakup_chunk(record, validate_crc=True) if isinstance(record, Chunk) else [record]
+            except Exception as error:  # A wrong checksum, or what the decompression says.
+                warnings.warn(f"{path}: a chunk is damaged ({error}) and nothing of it is used")
+                continue
+            for record in records:
+                if isinstance(record, Channel):
+                    topics[record.id] = record.topic
+                elif isinstance(record, Message) and record.channel_id in topics:
+                    yield topics[record.channel_id], record.sequence, record.data
     except EndOfFile:
         pass
 
 
+def segments(session):
+    """The files of a log in order. Those that its disk could not take are in the folder that the file `spare` names."""
+    if not session.is_dir():
+        return [session]
+    spare = session / "spare"
+    folders = [pathlib.Path(spare.read_text())] if spare.is_file() else []
+    # Where both have a number, that of the session's own folder is it.
+    found = {int(file.stem): file for folder in [*folders, session] for file in folder.glob("[0-9]*.mcap")}
+    return [found[number] for number in sorted(found)]
+
+
 def read(session):
-    """The columns of all samples, and of every other topic its messages' bytes."""
-    session = pathlib.Path(session)
-    files = sorted(session.glob("[0-9]*.mcap"), key=lambda file: int(file.stem)) if session.is_dir() else [session]
-    columns, others, following = {}, {}, {}
-    for topic, sequence, data in (message for file in files for message in messages(file)):
+    """The columns of all samples, and of every other topic its messages' bytes. What is damaged or missing is a warning."""
+    columns, others, following, raw = {}, {}, {}, None
+    for topic, sequence, data in (message for file in segments(pathlib.Path(session)) for message in messages(file)):
         expected = following.get(topic, 0)
-        if sequence > expected:
-            raise ValueError(f"message {expected} of {topic} is missing")
         if sequence < expected:
             continue  # It was written again after the disk had failed.
+        if sequence > expected:
+            warnings.warn(f"{sequence - expected} messages of {topic} are missing, from number {expected}")
         following[topic] = sequence + 1
+        if topic == "/manifest" and (version := json.loads(data)["record_version"]) > RECORD_VERSION:
+            raise ValueError(f"record_version {version} is newer than {RECORD_VERSION}, the newest that this program reads")
         if topic == "/daq/block":
             raw = data
         elif topic == "/derived/block":
+            if raw is None or fields(raw).get(1) != fields(data).get(1):
+                continue  # The block that it was made of is missing.
             for name, values in samples(raw, data).items():
                 columns.setdefault(name, []).extend(values)
         else:
@@ -138,3 +159,5 @@ if __name__ == "__main__":
         print(f"{name:<9} {len(values)} samples, first {values[0]}, last {values[-1]}")
     for topic, found in others.items():
         print(f"{topic:<9} {len(found)} messages, first {found[0][:60]}")
+    if "/end" not in others:
+        print("no /end: the recording was interrupted, or its last file is missing")

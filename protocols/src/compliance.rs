@@ -30,6 +30,11 @@ pub enum MeasureError {
     /// The session cannot be used.
     #[error(transparent)]
     Source(#[from] SourceError),
+    /// It was recorded by another program.
+    #[error(
+        "an imported session has no rig and no calibration, so it tells no compliance; run stiff-surface and name its session"
+    )]
+    Imported,
     /// No surface was searched, or none found.
     #[error(
         "the session found no stiff surface, so what it pressed may have been tissue; run stiff-surface and name its session"
@@ -51,6 +56,9 @@ pub fn measured(
     session: &Session,
     seating: Option<Newtons>,
 ) -> Result<RigCompliance, MeasureError> {
+    if session.manifest.imported.is_some() {
+        return Err(MeasureError::Imported);
+    }
     let presses = presses(session)?;
     let forces = presses.iter().flat_map(|(_, samples)| samples);
     let highest = forces.map(|sample| sample.force.0).fold(0.0, f64::max);

@@ -45,7 +45,7 @@ pub fn open(path: &Path) -> Result<Edited, SourceError> {
 fn doubts(edits: &Edits) -> Vec<String> {
     let mut notes = Vec::new();
     if edits.is_torn {
-        notes.push("the last edit was begun and never finished; it does not count".into());
+        notes.push("the last edit was begun and never finished; it does not count, and the next one moves it to edits.jsonl.torn".into());
     }
     if let Some((verdict @ (Verdict::Suspect | Verdict::Rejected), edit)) = edits.verdict() {
         notes.push(format!("{verdict}, says {}: {}", edit.by, edit.reason));

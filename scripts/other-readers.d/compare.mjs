@@ -3,12 +3,12 @@
 // Usage: node compare.mjs FOLDER SESSION CUT...
 // Writes every column of SESSION to FOLDER/NAME.values, 64 bits a value (phases as JSON), and to FOLDER/NAME.known, a byte
 // a value, and of raw bytes to FOLDER/raw.pieces. Prints one object: how many messages each topic of the session and of each cut has, and what differs.
-import { readdirSync, writeFileSync } from "node:fs";
+import { writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { indexed, pieces, read, streamed } from "./read_session.mjs";
+import { indexed, pieces, read, segments, streamed } from "./read_session.mjs";
 
 const [folder, session, ...cuts] = process.argv.slice(2);
-const files = readdirSync(session).filter((name) => /^\d+\.mcap$/.test(name)).sort();
+const files = segments(session);
 const differences = [];
 
 function counted(messages) {
@@ -55,16 +55,16 @@ const lines = raw.map((one) => `${one.time} ${one.device} ${one.isSent} ${Buffer
 writeFileSync(join(folder, "raw.pieces"), lines.join(""));
 
 // A finished file through its index. Only messages with the same time may come in another order.
-const last = join(session, files.at(-1));
+const last = files.at(-1);
 const whole = streamed(last);
 const throughIndex = await indexed(last);
 compare(`the index of ${last}`, throughIndex, byTopic(whole));
 if (throughIndex.length !== whole.length) {
   differences.push(`${last}: ${throughIndex.length} messages through the index, ${whole.length} in the stream`);
 }
-const beginning = byTopic(streamed(join(session, files[0])));
+const beginning = byTopic(streamed(files[0]));
 const cutCounts = cuts.map((cut) => {
-  const messages = streamed(join(cut, files[0]));
+  const messages = streamed(join(cut, "000.mcap"));
   compare(cut, messages, beginning);
   return counted(messages);
 });

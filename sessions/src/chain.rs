@@ -116,7 +116,8 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
     Ok(chain)
 }
 
-/// Adds a line and sees it to the disk. What a crash left unfinished at the end is cut off first.
+/// Adds a line and sees it to the disk. What a crash left unfinished at the end is first moved to a file beside it,
+/// which is named like it with `.torn` behind.
 pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainError> {
     let failed = |source| ChainError::Io {
         what: "added to",
@@ -139,6 +140,7 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
     file.read_to_end(&mut bytes).map_err(failed)?;
     let chain = parse(path, name, &bytes)?;
     if chain.is_torn {
+        keep_torn(path, &bytes[chain.whole..]).map_err(failed)?;
         file.set_len(chain.whole as u64).map_err(failed)?;
     }
     let line = Line {
@@ -150,6 +152,16 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
         sync_folder_of(path).map_err(failed)?;
     }
     Ok(())
+}
+
+/// Adds what was never finished to the file beside, a line for each time.
+fn keep_torn(path: &Path, torn: &[u8]) -> io::Result<()> {
+    let mut name = path.as_os_str().to_owned();
+    name.push(".torn");
+    let mut file = OpenOptions::new().append(true).create(true).open(name)?;
+    file.write_all(torn)?;
+    file.write_all(b"\n")?;
+    file.sync_all()
 }
 
 fn write_line(file: &mut File, line: &Line) -> io::Result<()> {
@@ -234,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn what_a_crash_left_unfinished_is_cut_off() {
+    fn what_a_crash_left_unfinished_is_moved_away_and_kept() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines.jsonl");
         three(&path);
@@ -245,6 +257,12 @@ mod tests {
         append(&path, "session", json!({"word": "four"})).unwrap();
         let chain = read(&path, "session").unwrap();
         assert_eq!(chain.bodies[2], json!({"word": "four"}));
+        let kept = fs::read(folder.path().join("lines.jsonl.torn")).unwrap();
+        let line = bytes[..bytes.len() - 1]
+            .rsplit(|byte| *byte == b'\n')
+            .next();
+        let torn = &line.unwrap()[..line.unwrap().len() - 8];
+        assert_eq!(kept, [torn, b"\n"].concat());
         assert!(!chain.is_torn);
     }
 }

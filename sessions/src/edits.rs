@@ -323,7 +323,7 @@ pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), Edit
             path: folder.into(),
         });
     }
-    let _lock = HolderLock::acquire(&folder.join(LOCK_FILE))?;
+    let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
     let path = folder.join(EDITS_FILE);
     let body = serde_json::to_value(edit).map_err(|err| ChainError::Io {
         what: "added to",
@@ -462,8 +462,12 @@ mod tests {
         let held = HolderLock::acquire(&at.join(LOCK_FILE)).unwrap();
         let busy = add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap_err();
         assert!(busy.to_string().contains("in use by process"), "{busy}");
-        drop(held);
-        add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap();
+        // Whoever only adds an edit at the same time is waited for.
+        std::thread::scope(|scope| {
+            scope.spawn(|| add_edit(at, "id", &edit("why", verdict(Verdict::Valid))).unwrap());
+            std::thread::sleep(std::time::Duration::from_millis(100));
+            drop(held);
+        });
         assert_eq!(Edits::read(at, "id").unwrap().all.len(), 1);
     }
 }

@@ -3,6 +3,7 @@
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
+use std::time::Duration;
 use thiserror::Error;
 
 /// A lock could not be taken.
@@ -26,6 +27,10 @@ pub enum LockError {
         source: std::io::Error,
     },
 }
+
+/// Tries to take a lock that is soon free, and the time between them: 2 s in all.
+const TRIES: u32 = 80;
+const BETWEEN_TRIES: Duration = Duration::from_millis(25);
 
 /// Holds a lock file until dropped. The system releases it when the process dies.
 #[derive(Debug)]
@@ -80,6 +85,18 @@ impl HolderLock {
             file,
             path: path.into(),
         })
+    }
+
+    /// As [`acquire`](Self::acquire), for work that is done in a moment: whoever else does such work is waited for,
+    /// 2 s at most.
+    pub fn acquire_soon(path: &Path) -> Result<Self, LockError> {
+        for _ in 0..TRIES {
+            match Self::acquire(path) {
+                Err(LockError::Held { .. }) => std::thread::sleep(BETWEEN_TRIES),
+                done => return done,
+            }
+        }
+        Self::acquire(path)
     }
 
     /// The lock file.

@@ -145,7 +145,7 @@ fn text(found: &RigCompliance, kept: Option<&Kept>) -> String {
 fn failure(err: MeasureError) -> Failure {
     match err {
         MeasureError::Source(err) => super::source_failure(err),
-        MeasureError::NoSurface => Failure::usage(err),
+        MeasureError::NoSurface | MeasureError::Imported => Failure::usage(err),
         _ => Failure::failed(err),
     }
 }

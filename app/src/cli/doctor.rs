@@ -119,11 +119,12 @@ fn is_unwell(patient: &Patient) -> bool {
     !matches!(
         patient.health,
         Health::Healthy | Health::BeingRecorded | Health::Interrupted
-    )
+    ) || !patient.wrong_beside.is_empty()
 }
 
 fn patient_text(patient: &Patient) -> String {
     let state = match &patient.health {
+        Health::Healthy if !patient.wrong_beside.is_empty() => "its log is healthy",
         Health::Healthy => "healthy",
         Health::BeingRecorded => "being recorded",
         Health::Interrupted => "interrupted",
@@ -140,7 +141,8 @@ fn patient_text(patient: &Patient) -> String {
             patient.until_s
         ),
     }];
-    lines.extend(patient.findings.iter().map(|one| format!("  {one}")));
+    let sentences = patient.findings.iter().chain(&patient.wrong_beside);
+    lines.extend(sentences.map(|one| format!("  {one}")));
     let can_be_kept = matches!(patient.health, Health::Damaged { .. } | Health::Interrupted);
     match &patient.recovered {
         Some(folder) => lines.push(format!(

@@ -10,7 +10,7 @@ use palpate_sessions::export::{
     Beside, ExportError, Feed, Format, Selection, Table, dictionary_path,
 };
 use palpate_sessions::log::Session;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `palpate export`.
 #[derive(Debug, Args)]
@@ -244,7 +244,11 @@ fn stem(args: &ExportArgs, table: &Table) -> String {
         .sessions
         .first()
         .and_then(|path| path.canonicalize().ok());
-    let stem = whole.as_deref().and_then(Path::file_stem);
+    // A folder's name may have dots in it; the ending of a file's does not count.
+    let stem = whole.as_deref().and_then(|path| match path.is_dir() {
+        true => path.file_name(),
+        false => path.file_stem(),
+    });
     stem.map_or_else(
         || table.manifest.session_id.clone(),
         |name| name.to_string_lossy().into_owned(),

@@ -146,7 +146,17 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
         skip: limit.saturating_mul(page - 1),
         limit: Some(limit),
     };
-    let found = with_updated(&library, output, |catalog| catalog.find(&query))?;
+    let (found, doubts) = with_updated(&library, output, |catalog| {
+        let found = catalog.find(&query)?;
+        let is_none = found.count == 0;
+        let doubts = if is_none {
+            catalog.doubts(&query.conditions)?
+        } else {
+            Vec::new()
+        };
+        Ok((found, doubts))
+    })?;
+    doubts.iter().for_each(|doubt| output.note(doubt));
     let object = FindReport {
         command: "find",
         library: &library,

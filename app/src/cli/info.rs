@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::output::Output;
+use crate::report::catalog::one_line;
 use clap::Args;
 use palpate_model::rig::SignalFacts;
 use palpate_protocols::analysed;
@@ -125,7 +126,7 @@ fn text(info: &Info<'_>) -> String {
         if text.is_empty() {
             "-".to_string()
         } else {
-            text.to_string()
+            one_line(text)
         }
     };
     let mut lines = vec![
@@ -139,7 +140,7 @@ fn text(info: &Info<'_>) -> String {
         info.about
             .lines()
             .iter()
-            .map(|(key, value)| format!("           {key} {value}")),
+            .map(|(key, value)| format!("           {key} {}", one_line(value))),
     );
     lines.extend(protocol_text(info.plan));
     lines.extend(info.imported.map(imported_text));
@@ -196,7 +197,11 @@ fn text(info: &Info<'_>) -> String {
     }
     lines.extend(info.review.as_ref().map(review_text));
     lines.extend(info.analyses.iter().map(analysis_text));
-    lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
+    lines.extend(
+        info.notes
+            .iter()
+            .map(|note| format!("note       {}", one_line(note))),
+    );
     lines.join("\n")
 }
 
@@ -269,9 +274,9 @@ fn edit_text(edit: &Edit) -> String {
     };
     let why = match edit.reason.as_str() {
         "" => String::new(),
-        reason => format!(": {reason}"),
+        reason => format!(": {}", one_line(reason)),
     };
-    format!("edit       {at} {}: {what}{why}", edit.by)
+    format!("edit       {at} {}: {what}{why}", one_line(&edit.by))
 }
 
 fn review_text(review: &Review) -> String {

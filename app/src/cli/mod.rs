@@ -40,6 +40,7 @@ use palpate_sessions::Labels;
 use palpate_sessions::log::ReadError;
 use protocol::ProtocolCommand;
 use std::process::ExitCode;
+use std::sync::Arc;
 
 /// Workbench for soft-tissue indentation. Without a command it opens the window on the simulated rig.
 #[derive(Debug, Parser)]
@@ -178,9 +179,17 @@ fn parse() -> Result<Cli, ExitCode> {
     })
 }
 
+/// A file that reaches the limit of its size (`ulimit -f`) ends a program by a signal, in the middle of a run. Where
+/// the signal is taken the write fails instead, and the log knows how to go on from there.
+fn outlive_file_limits() {
+    // If it cannot be taken the signal ends the program as ever.
+    let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
+}
+
 /// Runs what the arguments ask for.
 #[must_use]
 pub fn main() -> ExitCode {
+    outlive_file_limits();
     let cli = match parse() {
         Ok(cli) => cli,
         Err(code) => return code,

@@ -1,5 +1,6 @@
 //! What a command prints: text for people or one JSON object for machines.
 
+use crate::report::catalog::one_line;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use serde::Serialize;
 use std::io::Write;
@@ -36,18 +37,18 @@ impl Output {
     /// Prints what only people read.
     pub fn text_only(&self, text: impl FnOnce() -> String) {
         if !self.is_json {
-            print(&text());
+            print(&harmless(&text()));
         }
     }
 
     /// Prints a remark that is not the result.
     pub fn note(&self, text: &str) {
-        let _ = writeln!(std::io::stderr(), "note: {text}");
+        let _ = writeln!(std::io::stderr(), "note: {}", one_line(text));
     }
 
     /// Prints why the command failed.
     pub fn error(&self, sentence: &str, exit: u8) {
-        let _ = writeln!(std::io::stderr(), "error: {sentence}");
+        let _ = writeln!(std::io::stderr(), "error: {}", harmless(sentence));
         if self.is_json {
             let object = serde_json::json!({ "error": sentence, "exit": exit });
             let _ = writeln!(std::io::stdout(), "{object}");
@@ -79,6 +80,13 @@ impl Output {
         }
         bar
     }
+}
+
+/// A text of lines without anything that moves the cursor or gives the terminal an order: words of a session may hold
+/// whatever somebody typed.
+fn harmless(text: &str) -> String {
+    let is_order = |letter: char| letter.is_control() && letter != '\n';
+    text.replace(is_order, " ")
 }
 
 fn print(line: &str) {

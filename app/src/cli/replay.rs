@@ -120,7 +120,7 @@ fn failure(err: &ReplayError, path: &Path) -> Failure {
 fn replay_one(path: &Path, is_strict: bool, output: &Output) -> Result<ReplayReport, Failure> {
     let session = Session::open(path).map_err(super::read_failure)?;
     session.notes.iter().for_each(|note| output.note(note));
-    if is_strict && (session.end.is_none() || !session.notes.is_empty()) {
+    if is_strict && !session.is_whole() {
         let reason = session.notes.join("; ");
         return Err(Failure::failed(format!(
             "{} is not whole: {reason}",

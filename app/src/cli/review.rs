@@ -119,21 +119,37 @@ pub(super) fn tag(args: &TagArgs, output: &Output) -> Result<(), Failure> {
         .iter()
         .map(|path| summary(path))
         .collect::<Result<_, Failure>>()?;
-    let edit = Edit {
-        at: wall_now().into(),
-        by: author(args.by.as_deref()),
-        reason: String::new(),
-        change: Change::Tags { add, remove },
-    };
+    let by = author(args.by.as_deref());
     let mut tagged = Vec::new();
     for (session, found) in sessions.into_iter().zip(found) {
         let id = &found.manifest.session_id;
-        add_edit(&session, id, &edit).map_err(edit_failure)?;
+        let before = Edits::read(&session, id).map_err(edit_failure)?;
+        let tags = before.tags();
+        let (remove, absent): (Vec<_>, Vec<_>) = remove
+            .iter()
+            .cloned()
+            .partition(|tag| add.contains(tag) || tags.contains(tag.as_str()));
+        for tag in absent {
+            let name = session.display();
+            output.note(&format!("{name} has no tag '{tag}' to take away"));
+        }
+        if !add.is_empty() || !remove.is_empty() {
+            let edit = Edit {
+                at: wall_now().into(),
+                by: by.clone(),
+                reason: String::new(),
+                change: Change::Tags {
+                    add: add.clone(),
+                    remove,
+                },
+            };
+            add_edit(&session, id, &edit).map_err(edit_failure)?;
+        }
         let edits = Edits::read(&session, id).map_err(edit_failure)?;
         let tags = edits.tags().into_iter().map(str::to_owned).collect();
         tagged.push(Tagged { session, tags });
     }
-    let object = serde_json::json!({ "command": "tag", "by": edit.by, "sessions": tagged });
+    let object = serde_json::json!({ "command": "tag", "by": by, "sessions": tagged });
     output.result(&object, || {
         let line = |one: &Tagged| match one.tags.as_slice() {
             [] => format!("{}: no tags", one.session.display()),

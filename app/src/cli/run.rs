@@ -16,6 +16,7 @@ use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
     TimeScale, wall_now,
 };
+use palpate_sessions::recover::examine;
 use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -139,7 +140,10 @@ struct RunReport {
     session: PathBuf,
     ending: &'static str,
     reason: String,
+    /// What is in the session.
     samples: u64,
+    /// What came after it and is in no file, because no disk took it.
+    samples_lost: u64,
     duration_s: f64,
     contact_mm: Option<f64>,
     contact_std_error_mm: Option<f64>,
@@ -358,13 +362,19 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
     let Some(outcome) = &view.outcome else {
         return Err(Failure::failed("the run did not end"));
     };
+    // What a failed disk kept is only known from what can be read.
+    let kept = match &view.log_error {
+        Some(_) => examine(&view.folder).samples,
+        None => view.samples,
+    };
     let report = RunReport {
         command: "run",
         plan: view.plan_name.clone(),
         session: view.folder.clone(),
         ending: outcome.ending.name(),
         reason: outcome.reason.clone(),
-        samples: view.samples,
+        samples: kept,
+        samples_lost: view.samples.saturating_sub(kept),
         duration_s: view.now.seconds().0,
         contact_mm: view.contact.map(|contact| contact.position.0),
         contact_std_error_mm: view.contact.map(|contact| contact.std_error_mm),
@@ -384,17 +394,24 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
     output.result(&report, || run_text(&report));
     if let Some(reason) = &view.log_error {
         return Err(Failure::failed(format!(
-            "the session log could not be closed: {reason}"
+            "the session log could not be closed: {reason}; the last {} of {} samples are lost",
+            report.samples_lost, view.samples
         )));
     }
-    match outcome.ending {
-        EndingKind::Finish => Ok(()),
-        ending => Err(Failure::failed(format!(
-            "{ending}: {}; the data so far is in {}",
-            outcome.reason,
-            view.folder.display()
-        ))),
+    let no_verdict = view.verdict_error.as_ref().map(|reason| {
+        let folder = view.folder.display();
+        format!("the recording is whole, but the verdict could not be written beside it: {reason}; say it again with 'palpate verdict {folder}'")
+    });
+    if outcome.ending == EndingKind::Finish {
+        return no_verdict.map_or(Ok(()), |sentence| Err(Failure::failed(sentence)));
     }
+    no_verdict.iter().for_each(|sentence| output.note(sentence));
+    Err(Failure::failed(format!(
+        "{}: {}; the data so far is in {}",
+        outcome.ending,
+        outcome.reason,
+        view.folder.display()
+    )))
 }
 
 fn run_text(report: &RunReport) -> String {

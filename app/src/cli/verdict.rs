@@ -2,6 +2,7 @@
 
 use super::Failure;
 use super::output::Output;
+use crate::report::catalog::one_line;
 use clap::Args;
 use palpate_model::units::Position;
 use palpate_protocols::edited::{self, Edited};
@@ -95,7 +96,7 @@ pub(super) fn verdict(args: &VerdictArgs, output: &Output) -> Result<(), Failure
             "{}: {} ({was}); {}",
             args.session.display(),
             args.verdict,
-            edit.reason
+            one_line(&edit.reason)
         )
     });
     Ok(())

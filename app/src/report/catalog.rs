@@ -44,14 +44,25 @@ fn line(entry: &Entry) -> Vec<String> {
     if !entry.tags.is_empty() {
         folder += &format!("  [{}]", entry.tags.join(", "));
     }
+    // What is known of it may then be old, or less than there is.
+    if let Some(trouble) = &entry.trouble {
+        folder += &format!("  ({})", one_line(trouble));
+    }
     vec![
         started.replace('T', " "),
         or_dash(&entry.specimen),
         or_dash(&entry.operator),
         or_dash(&entry.protocol),
         length,
-        entry.verdict.map_or("-".into(), |it| it.to_string()),
-        ReviewIs::of(entry.review.as_ref()).word().to_owned(),
+        match entry.verdict {
+            Some(verdict) => verdict.to_string(),
+            None if entry.trouble.is_some() => "?".into(),
+            None => "-".into(),
+        },
+        match entry.review.as_ref() {
+            None if entry.trouble.is_some() => "?".into(),
+            review => ReviewIs::of(review).word().to_owned(),
+        },
         folder,
     ]
 }
@@ -79,7 +90,7 @@ pub fn history(events: &[Event]) -> String {
 }
 
 /// A text without anything that would end its line or move the cursor.
-fn one_line(text: &str) -> String {
+pub(crate) fn one_line(text: &str) -> String {
     let plain = text
         .trim()
         .chars()

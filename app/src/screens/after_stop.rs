@@ -59,9 +59,15 @@ fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
 
 fn log_ui(ui: &mut Ui, run: &RunView) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    match &run.log_error {
-        Some(reason) => {
-            let text = format!("The session could not be closed: {reason}");
+    let alarm = match (&run.log_error, &run.verdict_error) {
+        (Some(reason), _) => Some(format!("The session could not be closed: {reason}")),
+        (None, Some(reason)) => Some(format!(
+            "The recording is whole, but the verdict could not be written beside it: {reason}"
+        )),
+        (None, None) => None,
+    };
+    match alarm {
+        Some(text) => {
             ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
         }
         None => {

@@ -53,11 +53,37 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(found(at, &["--where", "ramp.depth_mm<6"]).len(), 0);
     assert_eq!(found(at, &["--verdict", "valid"]).len(), 2);
     assert_eq!(found(at, &["--until", "2001-01-01"]).len(), 0);
+    // What can never be found is told apart from what is not there.
+    for (condition, word) in [
+        ("ramp.dept>=1mm", "no session has a value called ramp.dept"),
+        ("depth>=1kg", "it is in mm"),
+        ("ramp.depth>=100mm", ""),
+    ] {
+        let none = palpate(at, &["find", "--where", condition]);
+        succeeded(&none);
+        assert_eq!(
+            stderr(&none).is_empty(),
+            word.is_empty(),
+            "{}",
+            stderr(&none)
+        );
+        assert!(stderr(&none).contains(word), "{}", stderr(&none));
+    }
     let order = palpate(at, &["find", "--where", "depth~3"]);
     assert_eq!(order.status.code(), Some(2));
     assert!(stderr(&order).contains("depth>=2mm"), "{}", stderr(&order));
 
     succeeded(&palpate(at, &["tag", &one, &two, "+pilot", "-none"]));
+    // What is not there is told, and leaves no edit.
+    let nothing = palpate(at, &["tag", &two, "-nothere"]);
+    succeeded(&nothing);
+    assert!(
+        stderr(&nothing).contains("no tag 'nothere'"),
+        "{}",
+        stderr(&nothing)
+    );
+    let edits = fs::read_to_string(at.join(&two).join("edits.jsonl")).unwrap();
+    assert!(!edits.contains("nothere"), "{edits}");
     let tagged = palpate(at, &["tag", &two, "-pilot", "+good", "--json"]);
     assert_eq!(json(&tagged)["sessions"][0]["tags"][0], "good");
     assert_eq!(found(at, &["--tag", "pilot"]), ["sessions/one"]);
@@ -112,6 +138,23 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     }
     succeeded(&palpate(at, &["find"]));
     succeeded(&palpate(at, &["catalog", "check"]));
+
+    // A journal that cannot be read hides no verdict: nobody can say that there is none.
+    let journal = at.join(&two).join("edits.jsonl");
+    fs::write(
+        &journal,
+        fs::read_to_string(&journal)
+            .unwrap()
+            .replace("good", "food"),
+    )
+    .unwrap();
+    assert!(found(at, &["--verdict", "none"]).is_empty());
+    assert!(found(at, &["--review", "none"]).is_empty());
+    let listed = stdout(&palpate(at, &["find"]));
+    assert!(
+        listed.contains("edits.jsonl is not as it was written"),
+        "{listed}"
+    );
 }
 
 #[test]

@@ -1,6 +1,8 @@
 //! Disks without room, before and during a run.
 
-use super::{json, palpate, stderr, succeeded};
+use super::{json, palpate, short_run, stderr, succeeded};
+use serde_json::Value;
+use std::path::Path;
 use std::process::{Command, Output, Stdio};
 
 /// Whether this machine gives no namespace or no mount in it; anything else is palpate's doing.
@@ -11,15 +13,14 @@ fn has_no_namespace(done: &std::io::Result<Output>) -> bool {
     }
 }
 
-/// A disk that fills up in mid-run: a 24 MB file system of its own, in a mount namespace.
-#[test]
-fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
-    let folder = tempfile::tempdir().unwrap();
-    let at = folder.path();
-    std::fs::create_dir(at.join("disk")).unwrap();
+/// Runs with `variables` on a 24 MB file system of its own, in a mount namespace, that fills up in mid-run: what the
+/// run said, on stdout as JSON and on stderr. The session is copied to `saved`. `None` where this machine has no
+/// such namespace.
+fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Option<(Value, String)> {
+    std::fs::create_dir(at.join("disk")).expect("a folder");
     let script = r#"
         mount -t tmpfs -o size=24m none disk || exit 77
-        "$0" run ramp-hold --time-scale 50 --out disk/session 2>error.txt >/dev/null &
+        "$0" run ramp-hold --time-scale 50 --out disk/session --json 2>error.txt >out.json &
         run=$!
         until [ -s disk/session/000.mcap ]; do sleep 0.05; done
         sleep 0.3
@@ -27,8 +28,9 @@ fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
         wait $run; echo $? >exit.txt
         cp -r disk/session saved
     "#;
+    let script = format!("{variables}\n{script}");
     let done = Command::new("unshare")
-        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .args(["-Urm", "sh", "-c", &script, env!("CARGO_BIN_EXE_palpate")])
         .current_dir(at)
         .stdin(Stdio::null())
         .output();
@@ -36,21 +38,62 @@ fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
         Ok(output) if output.status.code() == Some(0) => {}
         other if has_no_namespace(&other) => {
             println!("skipped: no mount namespace here ({other:?})");
-            return;
+            return None;
         }
         other => panic!("{other:?}"),
     }
-    let said = std::fs::read_to_string(at.join("error.txt")).unwrap();
-    assert_eq!(
-        std::fs::read_to_string(at.join("exit.txt")).unwrap().trim(),
-        "1",
-        "{said}"
-    );
+    let read = |name: &str| std::fs::read_to_string(at.join(name)).expect("what the run left");
+    let said = read("error.txt");
+    assert_eq!(read("exit.txt").trim(), "1", "{said}");
     assert!(said.contains("No space left on device"), "{said}");
+    // The report is the first line, the error the second.
+    let out = read("out.json");
+    let report = serde_json::from_str(out.lines().next().unwrap_or_default());
+    Some((report.expect("a report"), said))
+}
+
+#[test]
+fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let Some((report, said)) = run_on_a_disk_that_fills_up(at, "") else {
+        return;
+    };
     let info = json(&palpate(at, &["info", "saved", "--json"]));
     assert_eq!(info["is_complete"], false);
     assert!(info["samples"].as_u64().unwrap() > 1000, "{info}");
     succeeded(&palpate(at, &["replay", "saved"]));
+    // The run says what is in the file, and what is not.
+    assert_eq!(report["samples"], info["samples"], "{said}");
+    let lost = report["samples_lost"].as_u64().unwrap();
+    assert!(lost > 0, "{report}");
+    assert!(
+        said.contains(&format!("the last {lost} of ")),
+        "{lost}: {said}"
+    );
+}
+
+#[test]
+fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let spare = "export PALPATE_SPARE=$PWD/spare";
+    let Some((report, said)) = run_on_a_disk_that_fills_up(at, spare) else {
+        return;
+    };
+    assert_eq!(report["samples_lost"], 0, "{said}");
+    assert!(said.contains("lacks nothing"), "{said}");
+    for wrong in ["cannot be written (the disk", "could not be closed"] {
+        assert!(!said.contains(wrong), "{said}");
+    }
+    assert!(
+        said.contains("the verdict could not be written") && said.contains("palpate verdict"),
+        "{said}"
+    );
+    // Segments elsewhere make it no less whole.
+    succeeded(&palpate(at, &["doctor", "saved"]));
+    let replayed = json(&palpate(at, &["replay", "--check", "saved", "--json"]));
+    assert_eq!(replayed["sessions"][0]["samples"], report["samples"]);
 }
 
 #[test]
@@ -78,4 +121,49 @@ fn a_disk_without_room_is_refused_before_the_start() {
         }
         other => panic!("it was not refused on a disk of 4 MB: {other:?}"),
     }
+}
+
+#[test]
+fn a_library_that_may_not_be_written_is_searched() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "library/sessions/one", &[]));
+    let script = r#"mount --bind library library && mount -o remount,ro,bind library || exit 77
+        PALPATE_HOME=$PWD/library exec "$0" find --json"#;
+    let output = Command::new("unshare")
+        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .output();
+    match output {
+        other if has_no_namespace(&other) => {
+            println!("skipped: no mount namespace here ({other:?})");
+        }
+        output => {
+            let output = output.unwrap();
+            assert_eq!(json(&output)["count"], 1);
+            assert!(stderr(&output).contains("may not be written"));
+            assert!(!at.join("library/catalog.sqlite").exists());
+        }
+    }
+}
+
+#[test]
+fn a_file_that_may_not_grow_does_not_end_a_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    // 1.5 MB a file, in blocks of 512 bytes. The limit's signal is not ignored here: the program must take it.
+    let script = r#"ulimit -f 3000; exec "$0" run ramp-hold --time-scale max --out session"#;
+    let done = Command::new("sh")
+        .args(["-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .env("PALPATE_HOME", at.join("library"))
+        .stdin(Stdio::null())
+        .output()
+        .unwrap();
+    succeeded(&done);
+    assert!(at.join("session/001.mcap").exists());
+    let info = json(&palpate(at, &["info", "session", "--json"]));
+    assert_eq!(info["is_complete"], true, "{info}");
+    succeeded(&palpate(at, &["doctor", "session"]));
 }

@@ -147,3 +147,44 @@ fn several_sessions_are_recovered_one_after_the_other() {
         "{text}"
     );
 }
+
+#[test]
+fn what_stands_beside_a_healthy_log_is_looked_at_too() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "whole", &[]));
+    succeeded(&palpate(at, &["tag", "whole", "+pilot"]));
+    succeeded(&palpate(at, &["doctor", "whole"]));
+    let journal = at.join("whole/edits.jsonl");
+    let text = fs::read_to_string(&journal).unwrap();
+    fs::write(&journal, text.replace("pilot", "pilow")).unwrap();
+    let visit = palpate(at, &["doctor", "whole"]);
+    assert_eq!(visit.status.code(), Some(1), "{}", stdout(&visit));
+    assert!(
+        stdout(&visit).contains("edits.jsonl is not as it was written"),
+        "{}",
+        stdout(&visit)
+    );
+
+    let line = |i: u32| {
+        format!(
+            "{0},{0},{1}\n",
+            f64::from(i) * 0.01,
+            f64::from(i * i) * 1e-4
+        )
+    };
+    let table: String = (0..300).map(line).collect();
+    fs::write(
+        at.join("table.csv"),
+        format!("t_s,depth_mm,force_N\n{table}"),
+    )
+    .unwrap();
+    succeeded(&palpate(at, &["import", "table.csv", "--into", "in"]));
+    succeeded(&palpate(at, &["doctor", "in/table"]));
+    let original = at.join("in/table/original/table.csv");
+    fs::write(&original, "t_s,depth_mm,force_N\n").unwrap();
+    let visit = palpate(at, &["doctor", "in/table", "--json"]);
+    assert_eq!(visit.status.code(), Some(1));
+    fs::remove_file(&original).unwrap();
+    assert_eq!(palpate(at, &["doctor", "in/table"]).status.code(), Some(1));
+}

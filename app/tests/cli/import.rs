@@ -54,6 +54,12 @@ fn an_imported_table_is_a_session_for_every_command() {
     let original = at.join("in/zug/original/zug.csv");
     assert_eq!(fs::read_to_string(original).unwrap(), table());
 
+    let none = palpate(at, &["compliance", "in/zug"]);
+    assert!(
+        stderr(&none).contains("imported session has no rig"),
+        "{}",
+        stderr(&none)
+    );
     let info = json(&palpate(at, &["info", "in/zug", "--json"]));
     assert_eq!(
         (&info["imported"]["file"], &info["specimen"]),

@@ -481,3 +481,40 @@ fn samples_are_exported_as_messages() {
     }
     assert!(!at.join("b.mcap").exists());
 }
+
+#[test]
+fn words_of_a_session_give_the_terminal_no_orders() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "one", &["--specimen", "gel\u{1b}[2J 3"]));
+    let reason = "hair\nsession    \u{1b}[31mother";
+    let said = palpate(at, &["verdict", "one", "suspect", "--reason", reason]);
+    succeeded(&said);
+    let info = palpate(at, &["info", "one"]);
+    succeeded(&info);
+    for output in [&said, &info, &palpate(at, &["doctor", "one"])] {
+        let text = stdout(output) + &stderr(output);
+        assert!(!text.contains('\u{1b}'), "{text:?}");
+        assert!(
+            text.lines()
+                .all(|line| !line.contains("other") || line.contains("hair")),
+            "{text}"
+        );
+    }
+    assert!(stdout(&info).contains("gel [2J 3"), "{}", stdout(&info));
+    // Machines get what was said.
+    let object = json(&palpate(at, &["info", "one", "--json"]));
+    assert_eq!(object["verdict_reason"], reason);
+}
+
+#[test]
+fn an_exported_table_has_the_whole_name_of_the_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "depth-2.5", &[]));
+    succeeded(&palpate(
+        at,
+        &["export", "depth-2.5", "--format", "csv", "--to", "."],
+    ));
+    assert!(at.join("depth-2.5.csv").exists());
+}

@@ -38,6 +38,11 @@ pub enum Fault {
         /// What the disk said.
         detail: String,
     },
+    /// The session log is whole so far, but the disk will not take it for much longer.
+    LogAtRisk {
+        /// What became of the log.
+        detail: String,
+    },
     /// The computer stood still, as when it is suspended, so that nobody watched the rig.
     HostPaused {
         /// For how long.
@@ -58,6 +63,9 @@ impl fmt::Display for Fault {
                 )
             }
             Self::LogFailed { detail } => write!(f, "the session log cannot be written ({detail})"),
+            Self::LogAtRisk { detail } => {
+                write!(f, "the run ends before the disks take no more ({detail})")
+            }
             Self::HostPaused { missed } => write!(
                 f,
                 "the computer stood still for {missed:.1} and nobody watched the rig"

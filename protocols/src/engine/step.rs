@@ -337,7 +337,7 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
             }
             stop::begin(cx, EndingKind::Abort, reason);
         }
-        Fault::LogFailed { .. } | Fault::HostPaused { .. } => {
+        Fault::LogFailed { .. } | Fault::LogAtRisk { .. } | Fault::HostPaused { .. } => {
             stop::begin(cx, EndingKind::Abort, reason);
         }
     }

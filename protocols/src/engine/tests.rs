@@ -297,6 +297,13 @@ fn faults_end_the_run_and_unhome_where_position_is_lost() {
             EndingKind::Abort,
             true,
         ),
+        (
+            Fault::LogAtRisk {
+                detail: "slow".into(),
+            },
+            EndingKind::Abort,
+            true,
+        ),
     ] {
         let mut bench = Bench::holding(10.0);
         let effects = bench.give(Input::Fault(fault.clone()));

@@ -46,9 +46,10 @@ pub(super) struct ActiveRun {
     watch: Option<HostWatch>,
     time_use: BTreeMap<&'static str, u64>,
     /// Why the log failed, and whether the engine knows.
-    log_failure: Option<String>,
+    log_failure: Option<Fault>,
     is_log_failure_told: bool,
     log_error: Option<String>,
+    verdict_error: Option<String>,
 }
 
 impl ActiveRun {
@@ -87,6 +88,7 @@ impl ActiveRun {
             log_failure: None,
             is_log_failure_told: false,
             log_error: None,
+            verdict_error: None,
         };
         if let Some(begin) = begin {
             run.log_health(begin);
@@ -178,10 +180,10 @@ impl ActiveRun {
     /// an operator who is not there.
     fn after_feed(&mut self, now: Nanos, send: &mut dyn FnMut(ToRig)) {
         self.heed_log();
-        if let (Some(detail), false) = (&self.log_failure, self.is_log_failure_told) {
+        if let (Some(fault), false) = (&self.log_failure, self.is_log_failure_told) {
             self.is_log_failure_told = true;
-            let detail = detail.clone();
-            self.feed(now, Input::Fault(Fault::LogFailed { detail }), send);
+            let fault = Input::Fault(fault.clone());
+            self.feed(now, fault, send);
         }
         let is_holding = self
             .engine
@@ -212,7 +214,8 @@ impl ActiveRun {
             let text = notice.to_string();
             self.board.note(text.clone(), true);
             if notice.ends_the_run() {
-                self.log_failure.get_or_insert(text);
+                let fault = Fault::LogAtRisk { detail: text };
+                self.log_failure.get_or_insert(fault);
             }
         }
     }
@@ -314,7 +317,8 @@ impl ActiveRun {
 
     fn note_log(&mut self, result: Result<(), LogError>) {
         if let Err(err) = result {
-            self.log_failure.get_or_insert_with(|| err.to_string());
+            let detail = err.to_string();
+            self.log_failure.get_or_insert(Fault::LogFailed { detail });
         }
     }
 
@@ -357,7 +361,7 @@ impl ActiveRun {
             change: Change::Verdict { verdict },
         };
         if let Err(err) = add_edit(&self.folder, &self.session_id, &edit) {
-            self.log_error.get_or_insert_with(|| err.to_string());
+            self.verdict_error = Some(err.to_string());
         }
     }
 
@@ -370,6 +374,7 @@ impl ActiveRun {
             lateness: self.lateness,
             verdict: self.verdict.clone(),
             error: self.log_error.clone(),
+            verdict_error: self.verdict_error.clone(),
         };
         Some(self.board.view(state, log))
     }

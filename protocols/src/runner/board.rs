@@ -43,6 +43,7 @@ pub(crate) struct LogState {
     pub lateness: Option<Lateness>,
     pub verdict: Option<(Verdict, String)>,
     pub error: Option<String>,
+    pub verdict_error: Option<String>,
 }
 
 impl Board {
@@ -191,6 +192,7 @@ impl Board {
             outcome: self.outcome.clone(),
             verdict: log.verdict,
             log_error: log.error,
+            verdict_error: log.verdict_error,
             events: Arc::new(self.events.iter().cloned().collect()),
         }
     }

@@ -114,6 +114,8 @@ pub struct RunView {
     pub verdict: Option<(Verdict, String)>,
     /// What the log said when it could not be closed.
     pub log_error: Option<String>,
+    /// Why the first verdict could not be written beside the log.
+    pub verdict_error: Option<String>,
     /// What happened, newest last; the oldest lines fall out past [`RunView::EVENTS_MAX`].
     pub events: Arc<Vec<LogLine>>,
 }

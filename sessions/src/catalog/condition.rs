@@ -223,6 +223,32 @@ impl Condition {
         }
         format!("id IN (SELECT session FROM named WHERE {sql})")
     }
+
+    /// Whether values of these names are known at all, whatever they are and in whatever unit, as a condition on the table
+    /// of named values.
+    pub(super) fn sql_of_names(&self, values: &mut Vec<Sql>) -> String {
+        values.extend(self.ways.iter().map(|way| Sql::from(way.name.clone())));
+        let mut sql = vec!["?"; self.ways.len()].join(", ");
+        sql = format!("name IN ({sql})");
+        if let Some(source) = self.source {
+            values.push(source.word().to_owned().into());
+            sql += " AND source = ?";
+        }
+        sql
+    }
+
+    /// What is compared, as it was named.
+    pub(super) fn name(&self) -> &str {
+        &self.ways[0].name
+    }
+
+    /// The units that a value may be in; empty where any will do.
+    pub(super) fn units(&self) -> Vec<&'static str> {
+        if self.ways.iter().any(|way| way.unit.is_none()) {
+            return Vec::new();
+        }
+        self.ways.iter().filter_map(|way| way.unit).collect()
+    }
 }
 
 impl fmt::Display for Condition {

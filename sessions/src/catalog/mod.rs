@@ -74,6 +74,15 @@ impl CatalogError {
         }
     }
 
+    /// Whether the system lets nobody, or not this user, write there.
+    fn is_forbidden(&self) -> bool {
+        use io::ErrorKind::{PermissionDenied, ReadOnlyFilesystem};
+        let Self::Io { source, .. } = self else {
+            return false;
+        };
+        matches!(source.kind(), PermissionDenied | ReadOnlyFilesystem)
+    }
+
     /// Whether the file's content is at fault, so that a new one helps.
     fn is_damage(&self) -> bool {
         let Self::Sql { source, .. } = self else {
@@ -95,6 +104,9 @@ impl CatalogError {
     }
 }
 
+/// What SQLite calls a database without a file.
+const IN_MEMORY: &str = ":memory:";
+
 /// An open catalog.
 #[derive(Debug)]
 pub struct Catalog {
@@ -105,10 +117,21 @@ pub struct Catalog {
 }
 
 impl Catalog {
-    /// Opens the catalog of a library, and makes it if there is none.
+    /// Opens the catalog of a library, and makes it if there is none. Where the library may not be written, it is made
+    /// in memory.
     pub fn open(library: &Path) -> Result<Self, CatalogError> {
-        let _gate = gate(library)?;
-        Self::open_behind_gate(library, Vec::new())
+        match gate(library) {
+            Ok(_gate) => Self::open_behind_gate(library, Vec::new()),
+            Err(err) if err.is_forbidden() && library.is_dir() => Ok(Self {
+                db: open_new(Path::new(IN_MEMORY))?,
+                library: library.to_owned(),
+                remarks: vec![format!(
+                    "{} may not be written, so every session in it is read anew for each search",
+                    library.display()
+                )],
+            }),
+            Err(err) => Err(err),
+        }
     }
 
     /// Does some work with the catalog of a library. If its file proves to be damaged, it is set aside and

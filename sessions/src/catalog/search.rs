@@ -249,4 +249,38 @@ impl Catalog {
         };
         find().map_err(self.failed())
     }
+
+    /// What cannot be found because it is never so: a sentence for each condition on a value that no session has, or has in
+    /// units of something else.
+    pub fn doubts(&self, conditions: &[Condition]) -> Result<Vec<String>, CatalogError> {
+        let units = |condition: &Condition| -> rusqlite::Result<Vec<String>> {
+            let mut values = Vec::new();
+            let sql = condition.sql_of_names(&mut values);
+            let sql = format!("SELECT DISTINCT unit FROM named WHERE {sql} ORDER BY unit");
+            let mut statement = self.db.prepare_cached(&sql)?;
+            let units = statement.query_map(params_from_iter(&values), |row| row.get(0))?;
+            units.collect()
+        };
+        let mut doubts = Vec::new();
+        for condition in conditions {
+            let name = condition.name();
+            let there = units(condition).map_err(self.failed())?;
+            let wanted = condition.units();
+            let is_fit = |unit: &String| {
+                unit.is_empty() || wanted.is_empty() || wanted.contains(&unit.as_str())
+            };
+            if there.is_empty() {
+                doubts.push(format!(
+                    "no session has a value called {name}; palpate find --json tells what they are called"
+                ));
+            } else if !there.iter().any(is_fit) {
+                doubts.push(format!(
+                    "no session has {name} in {}; it is in {} where it is",
+                    wanted.join(" or "),
+                    there.join(" or ")
+                ));
+            }
+        }
+        Ok(doubts)
+    }
 }

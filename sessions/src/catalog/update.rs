@@ -175,7 +175,17 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
     let text = serde_json::to_string(entry)
         .map_err(|err| rusqlite::Error::ToSqlConversionFailure(err.into()))?;
     let started = chrono::DateTime::parse_from_rfc3339(&entry.started_at);
-    let verdict = entry.verdict.map_or("", |verdict| verdict.word());
+    // Where it cannot be read nobody can say that there is none.
+    let is_unread = entry.trouble.is_some();
+    let verdict = match entry.verdict {
+        Some(verdict) => verdict.word(),
+        None if is_unread => "?",
+        None => "",
+    };
+    let review = match entry.review.as_ref() {
+        None if is_unread => "?",
+        review => ReviewIs::of(review).word(),
+    };
     db.prepare_cached(
         "INSERT INTO session (folder, fingerprint, started_ms, operator, specimen, protocol, rig, cell, verdict, review, duration_s, entry, checksum)
          VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
@@ -190,7 +200,7 @@ fn put(db: &Connection, place: &Place, entry: &Entry) -> rusqlite::Result<()> {
         entry.rig,
         entry.cell,
         verdict,
-        ReviewIs::of(entry.review.as_ref()).word(),
+        review,
         entry.duration_s,
         text,
         checksum(&text),

@@ -4,6 +4,7 @@ mod cells;
 mod foreign;
 mod header;
 mod table;
+mod torn;
 mod weights;
 
 pub use foreign::{

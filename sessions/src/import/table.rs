@@ -3,6 +3,7 @@
 
 use super::cells::{delimiter_of, split};
 use super::header::{Meaning, Quantity, Scale, meaning};
+use super::torn;
 use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
@@ -163,6 +164,8 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
     if table.t.is_empty() {
         return Err("the table has no rows to fit".into());
     }
+    let last_cell = |line: &str| split(line, delimiter, 0).ok()?.pop();
+    table.notes.extend(torn::remark(text, last_cell));
     if left_out > 0 {
         table.notes.push(format!(
             "{left_out} rows outside ramp, hold and unload are left out"
@@ -311,6 +314,18 @@ mod tests {
         check("t_s,x_mm,F_N\n0,0,0\n", "already");
         let reason = "t_s,x_mm".parse::<ColumnNames>().unwrap_err();
         assert!(reason.contains("no column is a force"), "{reason}");
+    }
+
+    #[test]
+    fn a_last_number_that_may_be_cut_off_is_told() {
+        let notes = |text: &str| parse_table(text, None).unwrap().notes;
+        let cut = notes("t_s,x_mm,F_N\n0,0,0.1034\n1,1,2.3310\n2,2,3.4");
+        assert!(
+            cut[0].contains("'3.4'") && cut[0].contains("cut off"),
+            "{cut:?}"
+        );
+        let whole = "t_s,x_mm,F_N\n0,0,0.1034\n1,1,2.3310\n2,2,3.4810";
+        assert!(notes(whole).is_empty());
     }
 
     #[test]

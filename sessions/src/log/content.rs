@@ -265,7 +265,13 @@ impl<'v> Content<'v> {
         }
         // The version is read first: the rest of a newer manifest may not fit this program.
         let value: serde_json::Value = serde_json::from_slice(data).map_err(unreadable)?;
-        let Some(version) = value["record_version"].as_u64() else {
+        let version = &value["record_version"];
+        if version.is_number() && !version.is_u64() {
+            return Err(format!(
+                "the manifest's record version is {version}, and none is"
+            ));
+        }
+        let Some(version) = version.as_u64() else {
             self.refusal = Some(Refusal::Foreign);
             return Ok(());
         };

@@ -140,6 +140,17 @@ impl Session {
         })
     }
 
+    /// Whether it is as it was recorded, to the end: nothing was interrupted, lost, cut off or left out. Files that a
+    /// failing disk made a recording go on in do not make it less.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        let recovered = self.manifest.recovered.as_ref();
+        let is_cut = |note: &String| [NO_INDEX, LATER_PART].contains(&note.as_str());
+        self.end.is_some()
+            && recovered.is_none_or(|recovered| recovered.missing.sentences().is_empty())
+            && !self.notes.iter().any(is_cut)
+    }
+
     /// CRC-32 over the raw of every sample in order: tick, volts and pulses, eight bytes each, lowest first.
     /// How the log is cut into files is not in it.
     #[must_use]
@@ -355,13 +366,10 @@ impl<'v> Reader<'v> {
                 "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
             ));
         } else if !self.is_finished {
-            notes.push("the index at the end is missing; all samples and entries are there".into());
+            notes.push(NO_INDEX.into());
         }
         if self.content.is_later_part {
-            notes.push(
-                "this is a later part of a recording; open the session's folder for what came before"
-                    .into(),
-            );
+            notes.push(LATER_PART.into());
         }
         Ok(Outline {
             path,
@@ -466,6 +474,10 @@ impl<'v> Reader<'v> {
         Ok(Ok(Outcome::GoOn))
     }
 }
+
+const NO_INDEX: &str = "the index at the end is missing; all samples and entries are there";
+const LATER_PART: &str =
+    "this is a later part of a recording; open the session's folder for what came before";
 
 pub(crate) const NOT_BEGUN: &str =
     "the recording was interrupted before it began, or its beginning is lost";

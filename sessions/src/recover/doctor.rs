@@ -1,5 +1,6 @@
 //! Tells in which state a session is.
 
+use super::beside::wrong_beside;
 use super::write::{is_in_use, recover};
 use super::{Missing, recovered_folder, salvage};
 use crate::log::{ReadError, Session, Summary};
@@ -45,6 +46,8 @@ pub struct Patient {
     pub until_s: f64,
     /// Everything there is to know, one sentence each.
     pub findings: Vec<String>,
+    /// What stands beside the log and is not as it was written, one sentence each.
+    pub wrong_beside: Vec<String>,
     /// What it was recovered into.
     pub recovered: Option<PathBuf>,
 }
@@ -62,6 +65,7 @@ pub fn examine(path: &Path) -> Patient {
         samples,
         until_s,
         findings,
+        wrong_beside: Vec::new(),
         recovered: Some(recovered_folder(path)).filter(|folder| folder.is_dir()),
     };
     match opened {
@@ -73,7 +77,10 @@ pub fn examine(path: &Path) -> Patient {
             } else {
                 Health::Interrupted
             };
-            patient(health, outline.samples, until, outline.notes)
+            Patient {
+                wrong_beside: wrong_beside(path, &outline.manifest),
+                ..patient(health, outline.samples, until, outline.notes)
+            }
         }
         Err(err @ ReadError::Newer { .. }) => patient(Health::Newer, 0, 0.0, vec![err.to_string()]),
         Err(err @ (ReadError::NotASession { .. } | ReadError::Missing { .. })) => {

@@ -4,6 +4,7 @@
 //! is damaged is passed over; where a length is damaged, the search goes on for the next chunk that
 //! is whole.
 
+mod beside;
 mod doctor;
 mod salvage;
 mod write;

@@ -204,3 +204,26 @@ fn the_doctor_says_what_each_file_is() {
         Err(RecoverError::Whole { .. })
     ));
 }
+
+#[test]
+fn a_record_version_that_is_none_is_told_as_it_is() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut file = std::io::Cursor::new(Vec::new());
+    let options = mcap::WriteOptions::new().profile("palpate");
+    let mut writer = options.create(&mut file).unwrap();
+    let channel = writer.add_channel(0, "/manifest", "json", &BTreeMap::new());
+    let header = mcap::records::MessageHeader {
+        channel_id: channel.unwrap(),
+        sequence: 0,
+        log_time: 0,
+        publish_time: 0,
+    };
+    writer
+        .write_to_known_channel(&header, br#"{"record_version": -1}"#)
+        .unwrap();
+    writer.finish().unwrap();
+    drop(writer);
+    let path = session_with(folder.path(), "odd", &file.into_inner());
+    let told = Session::open(&path).unwrap_err().to_string();
+    assert!(told.contains("record version is -1"), "{told}");
+}

@@ -327,6 +327,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
                 "{:?}",
                 session.notes
             );
+            assert!(session.is_whole());
             fs::remove_file(folder.path().join(SPARE_FILE)).unwrap();
             let rest = Session::open(folder.path()).unwrap();
             assert!(same_bits(&rest.rows, &rows[..rest.rows.len()]));

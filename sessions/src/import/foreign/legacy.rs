@@ -42,8 +42,8 @@ pub(super) fn check(bytes: &[u8]) -> Result<(), String> {
 fn chain(sectors: &[u8], size: usize, table: &[u32], start: u32) -> Option<Vec<u8>> {
     let mut content = Vec::new();
     let mut at = start;
-    // A chain that comes back to itself is longer than the table.
-    for _ in 0..=table.len() {
+    // A chain that comes back to itself has more sectors than there are.
+    for _ in 0..=sectors.len() / size {
         if at >= NO_SECTOR {
             return Some(content);
         }
@@ -82,7 +82,12 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
         places.extend(more);
     }
     let mut table = Vec::new();
-    for place in places.into_iter().filter(|place| *place < NO_SECTOR) {
+    places.retain(|place| *place < NO_SECTOR);
+    // A sector that is named twice would count twice.
+    if places.len() > sectors.len() / size {
+        return None;
+    }
+    for place in places {
         let from = (place as usize).checked_mul(size)?;
         table.extend(numbers(sectors.get(from..from.checked_add(size)?)?));
     }
@@ -100,9 +105,17 @@ fn workbook_stream(bytes: &[u8]) -> Option<Vec<u8>> {
         .into_iter()
         .find_map(|name| entries.iter().find(|entry| is_called(entry, name)))?;
     let (start, length) = (u32_at(entry, 116)?, u32_at(entry, 120)? as usize);
+    // The reader of cells follows these chains wherever there are small sectors, needed or not.
+    let has_small = u32_at(bytes, 64)? > 0;
+    let small = match has_small || length < SMALL_STREAM {
+        true => Some((
+            chain(sectors, size, &table, u32_at(entries.first()?, 116)?)?,
+            numbers(&chain(sectors, size, &table, u32_at(bytes, 60)?)?),
+        )),
+        false => None,
+    };
     let mut stream = if length < SMALL_STREAM {
-        let small = chain(sectors, size, &table, u32_at(entries.first()?, 116)?)?;
-        let table = numbers(&chain(sectors, size, &table, u32_at(bytes, 60)?)?);
+        let (small, table) = small?;
         chain(&small, SMALL_SECTOR, &table, start)?
     } else {
         chain(sectors, size, &table, start)?

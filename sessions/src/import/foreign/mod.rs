@@ -24,6 +24,7 @@ pub use rows::Delimiter;
 pub use samples::Sample;
 pub use told::{ColumnChoice, Fault, Format, Told, UnitChoice, ZeroChoice};
 
+use super::torn;
 use crate::imported::Imported;
 use columns::Unknown;
 use rows::Rows;
@@ -185,7 +186,12 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
         .collect();
     origin.format = format.name().into();
     origin.readings = said.0;
-    let (parts, left_out) = understand(cut, &origin, told)?;
+    let (mut parts, left_out) = understand(cut, &origin, told)?;
+    let last_cell = |line: &str| Some(delimiter.cells(line, 0).ok()?.pop()?.text());
+    if let Some(last) = parts.last_mut() {
+        let remark = torn::remark(&text, last_cell);
+        last.imported.remarks.extend(remark);
+    }
     Ok(Foreign {
         bytes,
         parts,

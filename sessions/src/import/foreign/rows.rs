@@ -61,7 +61,7 @@ impl Delimiter {
         }
     }
 
-    fn cells(self, line: &str, number: usize) -> Result<Vec<Cell>, String> {
+    pub(super) fn cells(self, line: &str, number: usize) -> Result<Vec<Cell>, String> {
         if self.0 == ' ' {
             let words = line.split_whitespace();
             return Ok(words.map(|word| Cell::Text(word.to_owned())).collect());
