@@ -23,8 +23,6 @@ const MARKER_MAX: Nanos = Nanos::from_millis(350);
 const MARKERS_MAX: u32 = 6;
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
-/// Lines of a program told at once, of those nobody asked for, are enough to see what it says.
-const UNASKED_MAX: usize = 64;
 
 /// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -98,7 +96,6 @@ pub struct Session {
     renewed_at: Option<Nanos>,
     answered_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
-    unasked: VecDeque<String>,
     stats: LinkStats,
 }
 
@@ -134,17 +131,11 @@ impl Session {
             renewed_at: None,
             answered_at: now,
             events: VecDeque::new(),
-            unasked: VecDeque::new(),
             stats: LinkStats {
                 in_flight: pace.in_flight,
                 ..stats
             },
         }
-    }
-
-    /// What programs of the controller have said since this was last asked.
-    pub fn take_unasked(&mut self) -> Vec<String> {
-        self.unasked.drain(..).collect()
     }
 
     fn report(&mut self, now: Nanos, body: RigEventBody) {
@@ -483,12 +474,8 @@ impl Dialogue for Session {
         for byte in bytes {
             match self.parser.take(*byte) {
                 Some(Incoming::Reply(reply)) => self.on_reply(now, &reply),
-                Some(Incoming::Unasked(line)) => {
-                    if self.unasked.len() >= UNASKED_MAX {
-                        self.unasked.pop_front();
-                    }
-                    self.unasked.push_back(line);
-                }
+                // What programs of the controller say is in the log of raw bytes.
+                Some(Incoming::Unasked(_)) => {}
                 Some(Incoming::Flood) if self.search.is_none() => self.lose_order(now),
                 Some(Incoming::Flood) | None => {}
             }

@@ -305,3 +305,7 @@ impl<D: Dialogue> Owner<D> {
         came.notify_all();
     }
 }
+
+#[cfg(test)]
+#[path = "line_tests.rs"]
+mod tests;

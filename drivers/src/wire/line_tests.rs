@@ -1,0 +1,178 @@
+use super::*;
+use std::sync::atomic::AtomicU64;
+use std::sync::mpsc::Receiver;
+
+/// Notes what it is told, writes a line for each command and reports every byte as an acknowledgement of a stop.
+#[derive(Default)]
+struct Notes {
+    heard: Arc<Mutex<Vec<String>>>,
+    lines: VecDeque<Vec<u8>>,
+    events: VecDeque<(Nanos, RigEventBody)>,
+    fails_at: Option<u8>,
+}
+
+impl Notes {
+    fn note(&self, text: String) {
+        self.heard.lock().unwrap().push(text);
+    }
+}
+
+impl Dialogue for Notes {
+    fn attended(&mut self, _at: Nanos) {}
+
+    fn command(&mut self, _now: Nanos, command: RigCommand) {
+        self.note(format!("{command:?}"));
+        self.lines.push_back(format!("{command:?}\r").into_bytes());
+    }
+
+    fn overtaken(&mut self, _now: Nanos, command: RigCommand) {
+        self.note(format!("overtaken {command:?}"));
+    }
+
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        for byte in bytes {
+            assert!(Some(*byte) != self.fails_at, "a driver that fails");
+            let ack = palpate_model::rig::Ack {
+                command: RigCommand::Stop,
+            };
+            self.events.push_back((now, RigEventBody::Ack(ack)));
+        }
+    }
+
+    fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
+        self.lines.pop_front()
+    }
+
+    fn next_at(&self, now: Nanos) -> Nanos {
+        now + Nanos::from_millis(1)
+    }
+
+    fn take_event(&mut self) -> Option<(Nanos, RigEventBody)> {
+        self.events.pop_front()
+    }
+
+    fn is_dead(&self, _now: Nanos) -> Option<String> {
+        None
+    }
+
+    fn stats(&self) -> LinkStats {
+        LinkStats::default()
+    }
+}
+
+/// A link whose reads wait until the test lets them go on.
+struct Gate {
+    inner: super::super::MemoryLink,
+    waits: SyncSender<()>,
+    go_on: Receiver<()>,
+}
+
+impl Link for Gate {
+    fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+        // The test looks once; once it has let go nothing waits any more.
+        let _ = self.waits.try_send(());
+        let _ = self.go_on.recv();
+        self.inner.read(buffer, wait)
+    }
+
+    fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+        self.inner.write(bytes)
+    }
+}
+
+fn clock() -> HostClock {
+    let count = AtomicU64::new(0);
+    Arc::new(move || Nanos(count.fetch_add(1_000, Ordering::Relaxed)))
+}
+
+fn settings() -> LineSettings {
+    LineSettings {
+        device: "controller".into(),
+        farewell: b"bye".to_vec(),
+    }
+}
+
+/// Generous: a computer with much else to do.
+const WAIT: Duration = Duration::from_secs(20);
+
+fn read(link: &mut impl Link, count: usize) -> Vec<u8> {
+    let mut all = Vec::new();
+    while all.len() < count {
+        let mut part = [0_u8; 64];
+        let got = link.read(&mut part, WAIT).unwrap();
+        assert!(got > 0, "only {all:?}");
+        all.extend_from_slice(&part[..got]);
+    }
+    all
+}
+
+#[test]
+fn stops_overtake_what_waits() {
+    let (here, mut there) = super::super::pair();
+    let (release, go_on) = sync_channel::<()>(1);
+    let (waits, waiting) = sync_channel(1);
+    let notes = Notes::default();
+    let heard = Arc::clone(&notes.heard);
+    let gate = Gate {
+        inner: here,
+        waits,
+        go_on,
+    };
+    let mut line = Line::start(Box::new(gate), notes, clock(), settings()).unwrap();
+    waiting.recv().unwrap();
+    let define = RigCommand::DefinePosition { pulses: 3 };
+    line.send(define).unwrap();
+    line.send(RigCommand::Halt).unwrap();
+    line.send(RigCommand::EnableMotor).unwrap();
+    drop(release);
+    assert_eq!(read(&mut there, 17), b"Halt\rEnableMotor\r");
+    let heard = heard.lock().unwrap().clone();
+    assert_eq!(
+        heard,
+        [
+            "Halt",
+            "overtaken DefinePosition { pulses: 3 }",
+            "EnableMotor"
+        ]
+    );
+    let raw = line.take_raw();
+    assert!(
+        raw.iter()
+            .all(|piece| piece.is_sent && &*piece.device == "controller")
+    );
+    drop(line);
+    assert_eq!(read(&mut there, 3), b"bye");
+}
+
+#[test]
+fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
+    let (here, mut there) = super::super::pair();
+    let line = Line::start(Box::new(here), Notes::default(), clock(), settings()).unwrap();
+    there.write(b"ab").unwrap();
+    let late = Nanos(u64::MAX);
+    for _ in 0..2 {
+        let event = line.next_event(late, WAIT).unwrap();
+        assert!(matches!(event.body, RigEventBody::Ack(_)));
+    }
+    drop(there);
+    let last = line.next_event(late, WAIT).unwrap();
+    assert!(
+        matches!(&last.body, RigEventBody::Fault(Fault::LinkLost { .. })),
+        "{last:?}"
+    );
+    // Nobody waits for what will not come.
+    assert_eq!(line.next_event(late, Duration::from_secs(600)), None);
+}
+
+#[test]
+fn a_driver_that_fails_is_a_lost_link() {
+    let (here, mut there) = super::super::pair();
+    let notes = Notes {
+        fails_at: Some(b'!'),
+        ..Notes::default()
+    };
+    let line = Line::start(Box::new(here), notes, clock(), settings()).unwrap();
+    there.write(b"!").unwrap();
+    let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
+    assert!(last.body == lost("the driver has failed; open the rig again"));
+}
