@@ -33,6 +33,8 @@ const IN_FLIGHT_MAX: usize = 8;
 /// By how many samples reported pulses may differ from the command: 1.5 of the smoothing filter, and two between
 /// `BG` or `ST` and the sample behind it.
 const LAG_SAMPLES: f64 = 4.0;
+/// A computer with much else to do may get half of the samples that the link carries.
+const SHARE_MIN: f64 = 0.5;
 
 /// A controller that was set up.
 #[derive(Clone, Debug)]
@@ -80,14 +82,10 @@ pub fn connect(
     } else {
         settings.travel.0 + 2.0 * super::order::LIMIT_MARGIN_MM
     };
-    let description = describe(
-        settings,
-        &board,
-        tm,
-        acceleration,
-        has_watchdog,
-        worst_case_mm,
-    );
+    let watch = if has_watchdog { "with" } else { "without" };
+    let safety =
+        format!("{watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost");
+    let description = describe(settings, &board, acceleration, pace, &safety, tm);
     Ok(Connected {
         board,
         description,
@@ -308,10 +306,10 @@ fn measure(
 fn describe(
     settings: &GalilSettings,
     board: &GalilBoard,
-    tm: f64,
     acceleration: MmPerS2,
-    has_watchdog: bool,
-    worst_case_mm: f64,
+    pace: Pace,
+    safety: &str,
+    tm: f64,
 ) -> RigDescription {
     let counts = 1_i32 << settings.bits.min(24);
     let (counts_min, counts_max) = if settings.range.is_bipolar() {
@@ -319,12 +317,11 @@ fn describe(
     } else {
         (0, counts - 1)
     };
-    let watch = if has_watchdog { "with" } else { "without" };
     let filter = settings.filter.as_deref().unwrap_or("not known");
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{board}, axis {}, input {} (filter before it: {filter}), {watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost",
+            "{board}, axis {}, input {} (filter before it: {filter}), {safety}",
             settings.axis, settings.input
         ),
         settings: BTreeMap::new(),
@@ -341,6 +338,7 @@ fn describe(
             volts_per_count: settings.volts_per_count(),
         }),
         noise_expected: settings.noise,
+        ticks_per_sample: (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) / SHARE_MIN,
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
     }
 }

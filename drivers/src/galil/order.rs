@@ -47,6 +47,8 @@ pub struct Order {
     /// Numbers read back so far.
     numbers: Vec<f64>,
     is_refused: bool,
+    /// The part that counts was written, so that the axis may already be doing it.
+    pub is_begun: bool,
 }
 
 impl Order {
@@ -59,13 +61,8 @@ impl Order {
             open: 0,
             numbers: Vec::new(),
             is_refused: false,
+            is_begun: false,
         }
-    }
-
-    /// Whether the axis may already be doing it.
-    #[must_use]
-    pub const fn is_doing(&self) -> bool {
-        matches!(self.stage, Stage::Doing(_))
     }
 
     /// How it begins.

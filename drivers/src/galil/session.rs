@@ -24,6 +24,16 @@ const MARKERS_MAX: u32 = 6;
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
 
+/// Why a motion is not begun.
+const OVERTAKEN: &str = "a stop came first, so it was not begun";
+/// Why nothing is done any more.
+const RESET: &str = "the controller was reset; open the rig again";
+
+/// Whether a command moves the axis.
+const fn is_motion(command: &RigCommand) -> bool {
+    matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_))
+}
+
 /// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Asked {
@@ -34,13 +44,20 @@ enum Asked {
     /// A part of the order under way.
     Part,
     /// A command that stops.
-    Stop(RigCommand),
+    Stop(u64, RigCommand),
     /// A stop that nobody waits for.
     QuietStop,
     /// `TC1`, after a refusal of the order under way.
     Why,
     /// A number that must come back.
     Marker(u32),
+}
+
+/// A command that was not answered for yet.
+#[derive(Clone, Debug)]
+struct Owed {
+    number: u64,
+    answer: Option<RigEventBody>,
 }
 
 /// A line to be written.
@@ -83,12 +100,15 @@ pub struct Session {
     lines: VecDeque<Outgoing>,
     /// The part of an order that begins something, and when it may go out.
     beginning: Option<(Outgoing, Nanos)>,
-    orders: VecDeque<RigCommand>,
-    order: Option<Order>,
+    orders: VecDeque<(u64, RigCommand)>,
+    order: Option<(u64, Order)>,
+    /// Commands in the order in which they came, so that answers come in it too.
+    owed: VecDeque<Owed>,
+    commands: u64,
     is_motion_begun: bool,
     search: Option<Search>,
     /// Stops whose answers went by while the order was being looked for.
-    unconfirmed: Vec<RigCommand>,
+    unconfirmed: Vec<(u64, RigCommand)>,
     /// Why nothing but stops is done any more.
     is_reset: bool,
     attended: Option<Nanos>,
@@ -122,6 +142,8 @@ impl Session {
             beginning: None,
             orders: VecDeque::new(),
             order: None,
+            owed: VecDeque::new(),
+            commands: 0,
             is_motion_begun: false,
             search: None,
             unconfirmed: Vec::new(),
@@ -142,9 +164,35 @@ impl Session {
         self.events.push_back((now, body));
     }
 
-    fn refuse(&mut self, now: Nanos, detail: impl Into<String>) {
+    /// Notes a command that wants an answer.
+    fn owe(&mut self) -> u64 {
+        self.commands += 1;
+        self.owed.push_back(Owed {
+            number: self.commands,
+            answer: None,
+        });
+        self.commands
+    }
+
+    /// Answers a command; it is told when all before it are answered.
+    fn answer(&mut self, now: Nanos, number: u64, answer: RigEventBody) {
+        if let Some(owed) = self.owed.iter_mut().find(|owed| owed.number == number) {
+            owed.answer = Some(answer);
+        }
+        while let Some(answer) = self.owed.front_mut().and_then(|owed| owed.answer.take()) {
+            self.owed.pop_front();
+            self.report(now, answer);
+        }
+    }
+
+    fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
+        self.answer(now, number, RigEventBody::Ack(Ack { command }));
+    }
+
+    fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
         let detail = detail.into();
-        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+        let fault = Fault::CommandRefused { detail };
+        self.answer(now, number, RigEventBody::Fault(fault));
     }
 
     fn with_sample(&self, commands: &[String], is_begun: bool, asked: Asked) -> Outgoing {
@@ -157,21 +205,28 @@ impl Session {
         Outgoing { text, asked: all }
     }
 
-    /// Puts a stop before everything. What waits is not begun any more.
+    /// Puts a stop before everything. Motions that wait are not begun any more.
     fn stop(&mut self, now: Nanos, command: RigCommand) {
-        let waiting = self.orders.len();
-        self.orders.clear();
-        // What is not under way on the axis ends here; its answers are taken and thrown away.
-        let is_cancelled = self.order.as_ref().is_some_and(|order| !order.is_doing())
-            || self.beginning.take().is_some();
-        if is_cancelled {
-            self.order = None;
+        let mut ended = Vec::new();
+        self.orders.retain(|(number, order)| {
+            let stays = !is_motion(order);
+            if !stays {
+                ended.push(*number);
+            }
+            stays
+        });
+        // A motion that is being set ends here; its answers are taken and thrown away.
+        let is_ended = |(_, order): &mut (u64, Order)| is_motion(&order.command) && !order.is_begun;
+        if let Some((number, _)) = self.order.take_if(is_ended) {
             self.lines.clear();
+            self.beginning = None;
+            ended.push(number);
         }
-        for _ in 0..waiting + usize::from(is_cancelled) {
-            self.refuse(now, "a stop came first, so it was not begun");
+        for number in ended {
+            self.refuse(now, number, OVERTAKEN);
         }
-        self.urge(command, Asked::Stop(command));
+        let number = self.owe();
+        self.urge(command, Asked::Stop(number, command));
     }
 
     fn urge(&mut self, command: RigCommand, asked: Asked) {
@@ -196,11 +251,9 @@ impl Session {
                 }
             }
             Next::SendAndSample(commands) => {
-                let is_motion = !matches!(
-                    self.order.as_ref().map(|order| order.command),
-                    Some(RigCommand::DefinePosition { .. })
-                );
-                let line = self.with_sample(&commands, is_motion, Asked::Part);
+                let order = self.order.as_ref();
+                let begins = order.is_some_and(|(_, order)| is_motion(&order.command));
+                let line = self.with_sample(&commands, begins, Asked::Part);
                 // The sample behind the begin is to be a new one, so that the motion begins at its tick: two samples
                 // of the controller after the last one that was asked for.
                 let pause = Nanos(2 * self.pace.tick.0);
@@ -208,16 +261,18 @@ impl Session {
                 self.beginning = Some((line, from + pause));
             }
             Next::Done(made) => {
-                self.order = None;
-                self.report(now, RigEventBody::Ack(Ack { command: made }));
+                if let Some((number, _)) = self.order.take() {
+                    self.acknowledge(now, number, made);
+                }
             }
             Next::AskWhy => self.lines.push_back(Outgoing {
                 text: "TC1\r".into(),
                 asked: vec![Asked::Why],
             }),
             Next::Refused(why) => {
-                self.order = None;
-                self.refuse(now, why);
+                if let Some((number, _)) = self.order.take() {
+                    self.refuse(now, number, why);
+                }
             }
         }
     }
@@ -244,24 +299,27 @@ impl Session {
             Asked::Part => {
                 let settings = self.settings.clone();
                 // Answers of an order that a stop has ended belong to nobody.
-                if let Some(order) = &mut self.order {
+                if let Some((_, order)) = &mut self.order {
                     let next = order.take(reply, &settings);
                     self.go_on(now, next);
                 }
             }
-            Asked::Stop(command) if reply.is_accepted && reply.bytes.is_empty() => {
-                self.report(now, RigEventBody::Ack(Ack { command }));
+            Asked::Stop(number, command) if reply.is_accepted && reply.bytes.is_empty() => {
+                self.acknowledge(now, number, command);
             }
-            Asked::Stop(command) if reply.is_accepted => {
-                self.unconfirmed.push(command);
+            Asked::Stop(number, command) if reply.is_accepted => {
+                self.unconfirmed.push((number, command));
                 self.lose_order(now);
             }
-            Asked::Stop(command) => self.refuse(now, format!("it refuses {command:?}")),
+            Asked::Stop(number, command) => {
+                self.refuse(now, number, format!("it refuses {command:?}"));
+            }
             Asked::QuietStop => {}
             Asked::Why => {
-                if self.order.take().is_some() {
+                if let Some((number, _)) = self.order.take() {
                     let why = error_of(reply).map(|err| err.to_string());
-                    self.refuse(now, why.unwrap_or_else(|| "it does not say why".into()));
+                    let why = why.unwrap_or_else(|| "it does not say why".into());
+                    self.refuse(now, number, why);
                 }
             }
             Asked::Marker(_) => {}
@@ -290,9 +348,12 @@ impl Session {
     fn on_reset(&mut self, now: Nanos) {
         self.is_reset = true;
         self.has_watchdog = false;
-        self.orders.clear();
-        self.order = None;
         self.beginning = None;
+        let under_way = self.order.take().map(|(number, _)| number);
+        let waiting: Vec<u64> = self.orders.drain(..).map(|(number, _)| number).collect();
+        for number in under_way.into_iter().chain(waiting) {
+            self.refuse(now, number, RESET);
+        }
         self.report(now, RigEventBody::Fault(Fault::ControllerReset));
     }
 
@@ -301,17 +362,18 @@ impl Session {
         self.stats.resynchronised += 1;
         self.parser.clear();
         for (asked, _) in self.expected.drain(..) {
-            if let Asked::Stop(command) = asked {
-                self.unconfirmed.push(command);
+            if let Asked::Stop(number, command) = asked {
+                self.unconfirmed.push((number, command));
             }
         }
         self.lines.clear();
         self.beginning = None;
         self.is_motion_begun = false;
-        if self.order.take().is_some() {
+        if let Some((number, _)) = self.order.take() {
             // It may or may not be under way: to be safe, it is not.
             self.refuse(
                 now,
+                number,
                 "its answer was garbled, so the axis was stopped; check the cable",
             );
             self.urge(RigCommand::Stop, Asked::QuietStop);
@@ -331,8 +393,8 @@ impl Session {
             self.expected.clear();
             self.search = None;
             self.answered_at = now;
-            for command in std::mem::take(&mut self.unconfirmed) {
-                self.urge(command, Asked::Stop(command));
+            for (number, command) in std::mem::take(&mut self.unconfirmed) {
+                self.urge(command, Asked::Stop(number, command));
             }
         }
     }
@@ -383,8 +445,8 @@ impl Session {
                 search.marker_at = None;
                 search.last_byte = now;
                 for asked in &line.asked {
-                    if let Asked::Stop(command) = asked {
-                        self.unconfirmed.push(*command);
+                    if let Asked::Stop(number, command) = asked {
+                        self.unconfirmed.push((*number, *command));
                     }
                 }
                 return Some(Outgoing {
@@ -411,11 +473,11 @@ impl Session {
             .any(|(asked, _)| matches!(asked, Asked::Part | Asked::Why));
         if self.order.is_none()
             && !has_answers_to_come
-            && let Some(command) = self.orders.pop_front()
+            && let Some((number, command)) = self.orders.pop_front()
         {
             let mut order = Order::new(command);
             let next = order.begin(&self.settings);
-            self.order = Some(order);
+            self.order = Some((number, order));
             self.go_on(now, next);
         }
         if let Some(line) = self.lines.pop_front() {
@@ -426,6 +488,9 @@ impl Session {
                 return None;
             }
             let (line, _) = self.beginning.take()?;
+            if let Some((_, order)) = &mut self.order {
+                order.is_begun = true;
+            }
             self.asked_at = Some(now);
             return Some(line);
         }
@@ -454,17 +519,21 @@ impl Dialogue for Session {
     fn command(&mut self, now: Nanos, command: RigCommand) {
         if command.is_stopping() {
             self.stop(now, command);
-        } else if self.is_reset {
-            self.refuse(now, "the controller was reset; open the rig again");
+            return;
+        }
+        let number = self.owe();
+        if self.is_reset {
+            self.refuse(now, number, RESET);
         } else if self.orders.len() >= ORDERS_MAX {
-            self.refuse(now, "too many commands at once");
+            self.refuse(now, number, "too many commands at once");
         } else {
-            self.orders.push_back(command);
+            self.orders.push_back((number, command));
         }
     }
 
-    fn overtaken(&mut self, now: Nanos, _command: RigCommand) {
-        self.refuse(now, "a stop came first, so it was not begun");
+    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
+        // The stop that comes next ends it, if it is a motion.
+        self.command(now, command);
     }
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {

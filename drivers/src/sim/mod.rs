@@ -272,5 +272,6 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         adc: load_cell::adc(settings.profile),
         noise_expected: load_cell::noise_expected(settings),
         pulse_lag: palpate_model::units::Seconds(0.0),
+        ticks_per_sample: 1.0,
     }
 }

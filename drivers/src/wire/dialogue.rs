@@ -48,10 +48,11 @@ pub trait Dialogue: Send {
     /// When the rig's owner last asked for reports. Who is not asked should let the device stop by itself.
     fn attended(&mut self, at: Nanos);
 
-    /// A command from the host. Commands that stop come before all that wait, and those that wait are not begun.
+    /// A command from the host. Commands that stop are written before all that wait, and motions that wait are not
+    /// begun. Whatever the order of writing, commands are acknowledged or refused in the order in which they came.
     fn command(&mut self, now: Nanos, command: RigCommand);
 
-    /// A command that a stop has overtaken before it got here: it is not begun.
+    /// A command that a stop has overtaken before it got here; the stop comes next. A motion is not begun.
     fn overtaken(&mut self, now: Nanos, command: RigCommand);
 
     /// Bytes have arrived.

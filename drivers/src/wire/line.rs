@@ -80,7 +80,7 @@ impl Line {
             settings,
             urgent,
             queued,
-            stops_seen: 0,
+            arrived: VecDeque::new(),
             reports: Arc::clone(&reports),
         };
         let closing = Arc::clone(&is_closing);
@@ -163,7 +163,8 @@ struct Owner<D> {
     settings: LineSettings,
     urgent: Receiver<Numbered>,
     queued: Receiver<Numbered>,
-    stops_seen: u64,
+    /// Taken out of `queued`, not looked at.
+    arrived: VecDeque<Numbered>,
     reports: Shared,
 }
 
@@ -215,15 +216,11 @@ impl<D: Dialogue> Owner<D> {
     /// Commands, lines, bytes: once.
     fn turn(&mut self) -> io::Result<()> {
         self.take_stops();
-        for (stops, command) in self.queued.try_iter().collect::<Vec<_>>() {
+        self.arrived.extend(self.queued.try_iter());
+        while let Some((_, command)) = self.arrived.pop_front() {
+            self.dialogue.command((self.clock)(), command);
             // A stop may have come while this was looked at.
             self.take_stops();
-            let now = (self.clock)();
-            if stops < self.stops_seen {
-                self.dialogue.overtaken(now, command);
-            } else {
-                self.dialogue.command(now, command);
-            }
         }
         loop {
             self.take_stops();
@@ -252,9 +249,13 @@ impl<D: Dialogue> Owner<D> {
     }
 
     fn take_stops(&mut self) {
-        while let Ok((stops, command)) = self.urgent.try_recv() {
-            self.stops_seen = stops;
-            self.dialogue.command((self.clock)(), command);
+        while let Ok((number, stop)) = self.urgent.try_recv() {
+            // What was sent before it is in the queue by now, or was there.
+            self.arrived.extend(self.queued.try_iter());
+            while let Some((_, command)) = self.arrived.pop_front_if(|(stops, _)| *stops < number) {
+                self.dialogue.overtaken((self.clock)(), command);
+            }
+            self.dialogue.command((self.clock)(), stop);
         }
     }
 

@@ -130,8 +130,8 @@ fn stops_overtake_what_waits() {
     assert_eq!(
         heard,
         [
-            "Halt",
             "overtaken DefinePosition { pulses: 3 }",
+            "Halt",
             "EnableMotor"
         ]
     );

@@ -45,6 +45,18 @@ pub struct RigDescription {
     /// a command to the sample behind it. Zero on a simulated rig.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub pulse_lag: Seconds,
+    /// On average at least one sample comes in so many ticks of the controller. One on a rig that reports every tick;
+    /// more on one that is asked for its samples over a link.
+    #[serde(default = "one", skip_serializing_if = "is_one")]
+    pub ticks_per_sample: f64,
+}
+
+const fn one() -> f64 {
+    1.0
+}
+
+fn is_one(count: &f64) -> bool {
+    *count == one()
 }
 
 fn is_zero(span: &Seconds) -> bool {
