@@ -4,6 +4,7 @@
 //! is damaged is passed over; where a length is damaged, the search goes on for the next chunk that
 //! is whole.
 
+mod beside;
 mod doctor;
 mod salvage;
 mod write;
@@ -53,6 +54,9 @@ pub struct Missing {
     pub is_end_lost: bool,
     /// The damage itself.
     pub wounds: Vec<Wound>,
+    /// What stood beside the log and is not beside the copy, one sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
 impl Missing {
@@ -72,6 +76,9 @@ impl Missing {
                 samples, from_s, ..
             } = gap;
             told.push(match gap.to_s {
+                Some(to_s) if gap.after_sample == 0 => format!(
+                    "the first {samples} samples, before {to_s:.3} s of the recording, are missing: t_s counts from the first sample that was kept, so it is less than in the original by their time"
+                ),
                 Some(to_s) => {
                     format!("{samples} samples between {from_s:.3} s and {to_s:.3} s are missing")
                 }
@@ -97,6 +104,7 @@ impl Missing {
         if self.is_end_lost {
             told.push("the end is missing: how the run ended, and whether anything came after, is not known".into());
         }
+        told.extend(self.left_out.iter().cloned());
         told
     }
 }

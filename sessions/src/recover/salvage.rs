@@ -22,6 +22,8 @@ pub struct Salvage {
     pub samples: u64,
     /// Entries that are left, by `order`. Their `after_sample` counts the samples that were recorded.
     pub entries: Vec<Entry>,
+    /// Whether every decision up to the last sample is among them.
+    pub has_every_decision: bool,
     /// Raw bytes of devices that are left.
     pub raw_bytes: u64,
     /// How the session ended, if that is left.
@@ -101,7 +103,8 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         wounds,
         ..
     } = search;
-    let (lost_entries, later) = (content.lost_entries, content.is_later_part);
+    let (mut lost_entries, later) = (content.lost_entries, content.is_later_part);
+    let lost_decisions = content.lost_decisions;
     let (raw_bytes, mut lost_raw_bytes) = (content.raw_bytes, content.lost_raw_bytes);
     let raw_bytes_left = raw_bytes - lost_raw_bytes;
     let entries = std::mem::take(&mut content.entries);
@@ -120,23 +123,33 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
             to_s: None,
         });
     }
+    let mut lost_after_last = 0;
     if let Some(end) = &end
         && (!later || path.is_dir())
     {
         lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
+        lost_after_last = end
+            .entries
+            .saturating_sub(entries.len() as u64 + lost_entries);
+        lost_entries += lost_after_last;
     }
     // The first sample of a later part that is read alone is not its first.
     if later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
     }
+    let missing = Missing {
+        gaps,
+        entries: lost_entries,
+        raw_bytes: lost_raw_bytes,
+        is_end_lost: end.is_none(),
+        wounds,
+        left_out: Vec::new(),
+    };
+    // Without the end nobody knows what the last damage took.
+    let is_end_known = end.is_some() || !missing.is_lossy();
     Ok(Salvage {
-        missing: Missing {
-            gaps,
-            entries: lost_entries,
-            raw_bytes: lost_raw_bytes,
-            is_end_lost: end.is_none(),
-            wounds,
-        },
+        has_every_decision: lost_decisions + lost_after_last == 0 && is_end_known && !later,
+        missing,
         manifest,
         samples: kept,
         raw_bytes: raw_bytes_left,

@@ -1,7 +1,9 @@
 //! Writes what is left of a session as a session of its own, beside the original.
 
+use super::beside::Beside;
 use super::salvage::parts;
 use super::{Missing, Salvage, salvage};
+use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
 use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
@@ -58,6 +60,17 @@ pub enum RecoverError {
     /// The new session cannot be written.
     #[error(transparent)]
     Write(#[from] LogError),
+    /// Its edits or analyses cannot be written.
+    #[error(transparent)]
+    Beside(#[from] ChainError),
+    /// What an import was made from cannot be copied.
+    #[error("the files in {} cannot be copied ({source}); check their permissions and the room on the disk", path.display())]
+    Original {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
 }
 
 /// A recovered session and what is missing of it.
@@ -118,7 +131,8 @@ pub(super) fn is_in_use(path: &Path) -> bool {
 /// Recovers an interrupted or damaged session into a folder beside it. The original is only read.
 ///
 /// Samples are numbered anew without gaps; their times are the recorded ones, and the manifest
-/// says what is missing between them.
+/// says what is missing between them. Edits, analyses and the original of an import go with it, unless they
+/// would mean something else.
 pub fn recover(
     path: &Path,
     software_version: &str,
@@ -135,10 +149,12 @@ pub fn recover(
             folder,
         });
     }
-    let left = salvage(path, &mut |_| {})?;
+    let mut left = salvage(path, &mut |_| {})?;
     if !left.missing.is_lossy() && !left.missing.is_end_lost {
         return Err(RecoverError::Whole { path: path.into() });
     }
+    let beside = Beside::of(path, &left);
+    left.missing.left_out.clone_from(&beside.left_out);
     let unfinished = folder.with_extension("recovering");
     clear(&unfinished)?;
     let session_id = format!("{}-recovered", left.manifest.session_id);
@@ -159,6 +175,7 @@ pub fn recover(
         let sink = FileSink::create(&log_path).map_err(|err| LogError::disk(&err, &shown))?;
         let mut log = LogWriter::begin(sink, &shown, &manifest)?;
         copy(path, &left, &mut log)?;
+        beside.write(&unfinished, &session_id)?;
     }
     // Either all of it is there, or nothing is.
     std::fs::rename(&unfinished, &folder)
