@@ -11,7 +11,7 @@ mod write;
 
 pub use doctor::{Health, Patient, examine, examine_library, recover_library};
 pub use salvage::{Salvage, salvage};
-pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder};
+pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder, recovered_id};
 
 use crate::record::is_zero;
 use serde::{Deserialize, Serialize};

@@ -3,7 +3,9 @@
 use super::{Gap, Missing, Wound};
 use crate::log::content::{Content, Part};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
-use crate::log::reader::{NOT_BEGUN, check_beginning, damaged, find_files, name_of, refused};
+use crate::log::reader::{
+    NOT_BEGUN, check_beginning, check_files, damaged, find_files, name_of, refused,
+};
 use crate::log::source::Source;
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
@@ -24,6 +26,8 @@ pub struct Salvage {
     pub entries: Vec<Entry>,
     /// Whether every decision up to the last sample is among them.
     pub has_every_decision: bool,
+    /// Whether a segment between others is not there at all.
+    pub lacks_segments: bool,
     /// Raw bytes of devices that are left.
     pub raw_bytes: u64,
     /// How the session ended, if that is left.
@@ -59,6 +63,7 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
 /// As [`salvage`] for everything a log holds, and only what lies where samples are is looked at.
 pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
+    check_files(path, &files)?;
     let failed = |source| ReadError::Io {
         path: path.into(),
         source,
@@ -150,6 +155,7 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
     Ok(Salvage {
         has_every_decision: lost_decisions + lost_after_last == 0 && is_end_known && !later,
         missing,
+        lacks_segments: files.iter().any(|file| !file.is_file()),
         manifest,
         samples: kept,
         raw_bytes: raw_bytes_left,

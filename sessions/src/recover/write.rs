@@ -5,6 +5,7 @@ use super::salvage::parts;
 use super::{Missing, Salvage, salvage};
 use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
+use crate::log::reader::{absent_spare, away};
 use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
@@ -45,6 +46,14 @@ pub enum RecoverError {
     InUse {
         /// The session.
         path: PathBuf,
+    },
+    /// A disk that its segments may be on is not there.
+    #[error("{} is not recovered yet: {}, or, if it is lost for good, take the file 'spare' out of the session's folder", path.display(), away(spare))]
+    Away {
+        /// The session.
+        path: PathBuf,
+        /// The folder on that disk.
+        spare: PathBuf,
     },
     /// It was done before.
     #[error("{} was recovered before, into {}; use that", path.display(), folder.display())]
@@ -117,6 +126,12 @@ pub fn recovered_folder(path: &Path) -> PathBuf {
     folder.with_file_name(format!("{name}.recovered"))
 }
 
+/// The name that what is recovered of a session gets.
+#[must_use]
+pub fn recovered_id(session_id: &str) -> String {
+    format!("{session_id}-recovered")
+}
+
 /// Whether a session's folder is locked by whoever records it. The lock is only looked at.
 pub(super) fn is_in_use(path: &Path) -> bool {
     let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
@@ -150,6 +165,11 @@ pub fn recover(
         });
     }
     let mut left = salvage(path, &mut |_| {})?;
+    let lacks_files = left.missing.is_end_lost || left.lacks_segments;
+    if let Some(spare) = absent_spare(path).filter(|_| lacks_files) {
+        let path = path.into();
+        return Err(RecoverError::Away { path, spare });
+    }
     if !left.missing.is_lossy() && !left.missing.is_end_lost {
         return Err(RecoverError::Whole { path: path.into() });
     }
@@ -157,7 +177,7 @@ pub fn recover(
     left.missing.left_out.clone_from(&beside.left_out);
     let unfinished = folder.with_extension("recovering");
     clear(&unfinished)?;
-    let session_id = format!("{}-recovered", left.manifest.session_id);
+    let session_id = recovered_id(&left.manifest.session_id);
     let manifest = Manifest {
         session_id: session_id.clone(),
         recovered: Some(Recovered {
