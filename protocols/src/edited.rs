@@ -4,11 +4,12 @@
 //! decision that found it. The log itself stays as it is.
 
 use crate::analysis::SourceError;
-use palpate_model::units::{Depth, Position};
+use palpate_model::units::Depth;
+pub use palpate_sessions::contacts::{FoundContact, contacts};
+use palpate_sessions::contacts::{contact_position, is_record};
 use palpate_sessions::edits::{Edits, Verdict};
 use palpate_sessions::log::{Outline, ReadError, Session};
-use palpate_sessions::record::{Block, Entry, EntryKind, Row};
-use serde_json::Value;
+use palpate_sessions::record::{Block, Entry, Row};
 use std::ops::Range;
 use std::path::Path;
 
@@ -100,37 +101,6 @@ impl Passing {
     }
 }
 
-/// A contact that a session found.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct FoundContact {
-    /// Samples before it; those that follow count their depth from it.
-    pub after_sample: u64,
-    /// Position from home.
-    pub position: Position,
-}
-
-/// Every contact among a session's entries, in order.
-#[must_use]
-pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
-    let found = entries.iter().filter_map(|entry| {
-        Some(FoundContact {
-            after_sample: entry.after_sample,
-            position: Position(found_at(entry)?.as_f64()?),
-        })
-    });
-    found.collect()
-}
-
-/// The position in a decision that found contact.
-fn found_at(entry: &Entry) -> Option<&Value> {
-    is_record(entry, "contact_found").then(|| entry.body.get("position"))?
-}
-
-fn is_record(entry: &Entry, name: &str) -> bool {
-    let body = &entry.body;
-    entry.kind == EntryKind::Decision && body["effect"] == "record" && body["record"] == name
-}
-
 /// By how much the depths of some samples move.
 #[derive(Clone, Debug)]
 struct Shift {
@@ -189,7 +159,9 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
             samples: from..until.unwrap_or(last).clamp(from, last),
             deeper,
         });
-        let mut entries = entries.iter_mut().filter(|entry| found_at(entry).is_some());
+        let mut entries = entries
+            .iter_mut()
+            .filter(|entry| contact_position(entry).is_some());
         if let Some(at) = entries
             .nth(index)
             .and_then(|entry| entry.body.get_mut("position"))
@@ -207,6 +179,7 @@ fn shifts(entries: &mut [Entry], last: u64, edits: &Edits) -> (Vec<Shift>, Vec<S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_model::units::Position;
     use palpate_sessions::edits::{Change, Edit};
 
     fn edit(number: u32, position_mm: f64) -> Edit {
@@ -238,7 +211,7 @@ mod tests {
         let mut again = session
             .entries
             .iter()
-            .find(|entry| found_at(entry).is_some())
+            .find(|entry| contact_position(entry).is_some())
             .unwrap()
             .clone();
         again.after_sample = second as u64;

@@ -17,6 +17,7 @@ pub mod catalog;
 mod chain;
 pub mod checks;
 pub mod compliances;
+pub mod contacts;
 pub mod edits;
 pub mod export;
 pub mod folder;

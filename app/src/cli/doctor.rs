@@ -128,6 +128,7 @@ fn patient_text(patient: &Patient) -> String {
         Health::Healthy => "healthy",
         Health::BeingRecorded => "being recorded",
         Health::Interrupted => "interrupted",
+        Health::Incomplete => "incomplete",
         Health::Damaged { .. } => "damaged",
         Health::Lost => "lost",
         Health::Newer => "newer",

@@ -9,7 +9,7 @@ use palpate_sessions::lake::{Added, Told, add};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(), Failure> {
-    let found = sources::find_sessions(named)?;
+    let found = sources::find_sessions(named, output)?;
     let bar = output.count_bar(found.len() as u64);
     let (mut was_there, mut failed) = (0, Vec::new());
     for session in &found {

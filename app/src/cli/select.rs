@@ -68,7 +68,7 @@ pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
     new_file::check("plot", args.plot.as_deref())?;
-    let found = sources::find(&args.sources)?;
+    let found = sources::find(&args.sources, output)?;
     let wanted = Wanted {
         stretch: match args.unload {
             true => Stretch::WithUnload,

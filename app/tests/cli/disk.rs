@@ -14,9 +14,9 @@ fn has_no_namespace(done: &std::io::Result<Output>) -> bool {
 }
 
 /// Runs with `variables` on a 24 MB file system of its own, in a mount namespace, that fills up in mid-run: what the
-/// run said, on stdout as JSON and on stderr. The session is copied to `saved`. `None` where this machine has no
-/// such namespace.
-fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Option<(Value, String)> {
+/// run said, on stdout as JSON and on stderr. The session is copied to `saved`. Why not, where this machine has
+/// no such namespace.
+fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Result<(Value, String), String> {
     std::fs::create_dir(at.join("disk")).expect("a folder");
     let script = r#"
         mount -t tmpfs -o size=24m none disk || exit 77
@@ -37,8 +37,7 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Option<(Value, Str
     match done {
         Ok(output) if output.status.code() == Some(0) => {}
         other if has_no_namespace(&other) => {
-            println!("skipped: no mount namespace here ({other:?})");
-            return None;
+            return Err(format!("skipped: no mount namespace here ({other:?})"));
         }
         other => panic!("{other:?}"),
     }
@@ -49,15 +48,19 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Option<(Value, Str
     // The report is the first line, the error the second.
     let out = read("out.json");
     let report = serde_json::from_str(out.lines().next().unwrap_or_default());
-    Some((report.expect("a report"), said))
+    Ok((report.expect("a report"), said))
 }
 
 #[test]
 fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let Some((report, said)) = run_on_a_disk_that_fills_up(at, "") else {
-        return;
+    let (report, said) = match run_on_a_disk_that_fills_up(at, "") {
+        Ok(done) => done,
+        Err(reason) => {
+            println!("{reason}");
+            return;
+        }
     };
     let info = json(&palpate(at, &["info", "saved", "--json"]));
     assert_eq!(info["is_complete"], false);
@@ -78,8 +81,12 @@ fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let spare = "export PALPATE_SPARE=$PWD/spare";
-    let Some((report, said)) = run_on_a_disk_that_fills_up(at, spare) else {
-        return;
+    let (report, said) = match run_on_a_disk_that_fills_up(at, spare) {
+        Ok(done) => done,
+        Err(reason) => {
+            println!("{reason}");
+            return;
+        }
     };
     assert_eq!(report["samples_lost"], 0, "{said}");
     assert!(said.contains("lacks nothing"), "{said}");

@@ -188,3 +188,42 @@ fn what_stands_beside_a_healthy_log_is_looked_at_too() {
     fs::remove_file(&original).unwrap();
     assert_eq!(palpate(at, &["doctor", "in/table"]).status.code(), Some(1));
 }
+
+/// The samples of an interrupted session and of its recovered copy are the same ones.
+#[test]
+fn a_session_and_its_recovered_copy_count_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "whole", &[]));
+    let bytes = fs::read(log_file(&at.join("whole"))).unwrap();
+    fs::create_dir_all(at.join("L/cut")).unwrap();
+    fs::write(at.join("L/cut/000.mcap"), &bytes[..bytes.len() * 9 / 10]).unwrap();
+    // In the lake before it was recovered.
+    succeeded(&palpate(at, &["export", "L", "--lake", "lake"]));
+    succeeded(&palpate(at, &["recover", "L/cut"]));
+    let told = "because the copy that was recovered from it is there too: ";
+    for (args, is_told) in [
+        (["export", "L", "--lake", "other", "--json"], true),
+        (
+            ["export", "L/cut.recovered", "--lake", "lake", "--json"],
+            false,
+        ),
+        (["fit", "lake", "--jobs", "1", "--json"], true),
+        (["fit", "L", "--jobs", "1", "--json"], true),
+    ] {
+        let output = palpate(at, &args);
+        succeeded(&output);
+        assert_eq!(
+            stderr(&output).contains(told),
+            is_told,
+            "{args:?}: {}",
+            stderr(&output)
+        );
+        if args[0] == "export" {
+            assert_eq!(json(&output)["added"], 1, "{args:?}");
+        }
+        if args[1] == "lake" {
+            assert_eq!(json(&output)["sessions"], 1, "{args:?}");
+        }
+    }
+}

@@ -73,6 +73,8 @@ pub(crate) struct Content<'v> {
     allows_gaps: bool,
     /// Messages with entries that are missing.
     pub lost_entries: u64,
+    /// Those of them that were decisions.
+    pub lost_decisions: u64,
     /// Raw bytes that are missing between those that are there.
     pub lost_raw_bytes: u64,
 }
@@ -105,6 +107,7 @@ impl<'v> Content<'v> {
             end: None,
             allows_gaps: false,
             lost_entries: 0,
+            lost_decisions: 0,
             lost_raw_bytes: 0,
         }
     }
@@ -217,7 +220,9 @@ impl<'v> Content<'v> {
         }
         if sequence > expected && self.allows_gaps {
             let is_entry = matches!(channel, Channel::Input | Channel::Decision | Channel::Fit);
-            self.lost_entries += u64::from(sequence - expected) * u64::from(is_entry);
+            let lost = u64::from(sequence - expected);
+            self.lost_entries += lost * u64::from(is_entry);
+            self.lost_decisions += lost * u64::from(channel == Channel::Decision);
             if matches!(channel, Channel::Daq | Channel::Derived) {
                 self.has_raw &= channel == Channel::Derived;
             }

@@ -234,6 +234,31 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         .collect())
 }
 
+/// The folder that segments may be in and that is not there, as on a disk that is not connected. The writer makes
+/// it before the log.
+pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
+    let spare = std::fs::read_to_string(path.join(SPARE_FILE)).ok()?;
+    let is_absent = !spare.is_empty() && !Path::new(&spare).is_dir();
+    is_absent.then(|| spare.into())
+}
+
+/// What to say of such a folder.
+pub(crate) fn away(spare: &Path) -> String {
+    let spare = spare.display();
+    format!("a part of it may be in {spare}, which is not there; connect that disk")
+}
+
+/// Refuses a folder without a log.
+pub(crate) fn check_files(path: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
+    if files[0].is_file() || (files.len() > 1 && path.is_dir()) {
+        return Ok(());
+    }
+    Err(ReadError::NotASession {
+        path: path.into(),
+        reason: format!("it holds no {LOG_FILE}"),
+    })
+}
+
 /// What a segment adds to the session.
 enum Outcome {
     /// The next segment goes on from here.
@@ -255,6 +280,7 @@ struct Damage {
 struct Reader<'v> {
     files: Vec<PathBuf>,
     is_folder: bool,
+    absent_spare: Option<PathBuf>,
     chunks: ChunkReader,
     content: Content<'v>,
     /// Session time of the newest sample.
@@ -273,17 +299,13 @@ impl<'v> Reader<'v> {
         let files = find_files(path)?;
         let is_folder = path.is_dir();
         let first = &files[0];
-        if !first.is_file() && (files.len() == 1 || !is_folder) {
-            return Err(ReadError::NotASession {
-                path: path.into(),
-                reason: format!("it holds no {LOG_FILE}"),
-            });
-        }
+        check_files(path, &files)?;
         let chunks = ChunkReader::new().map_err(|source| ReadError::Io {
             path: first.clone(),
             source,
         })?;
         Ok(Self {
+            absent_spare: absent_spare(path),
             files,
             is_folder,
             chunks,
@@ -361,6 +383,13 @@ impl<'v> Reader<'v> {
             notes.push(format!(
                 "no end record: this part of a recording goes to {last:.1} s; open the session's folder for what follows"
             ));
+        } else if end.is_none()
+            && let Some(spare) = &self.absent_spare
+        {
+            let away = away(spare);
+            notes.push(format!(
+                "no end record: the recording stops at {last:.1} s here; {away}"
+            ));
         } else if end.is_none() {
             notes.push(format!(
                 "no end record: the recording was interrupted at {last:.1} s; everything before is complete"
@@ -402,8 +431,11 @@ impl<'v> Reader<'v> {
             source,
         };
         if !path.is_file() {
-            let reason = "this segment is missing, though a later one is there";
-            return Ok(Err(damage(0, reason)));
+            let mut reason = "this segment is missing, though a later one is there".to_owned();
+            if let Some(spare) = &self.absent_spare {
+                reason = format!("{reason}; {}", away(spare));
+            }
+            return Ok(Err(damage(0, &reason)));
         }
         let source = Source::open(path).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;

@@ -56,13 +56,15 @@ impl FolderSegments {
         }
     }
 
-    /// Segments in this folder, or in one of the same name in `spare` when its disk fails. The
+    /// Segments in this folder, or in one in `spare`, named by the session's id, when its disk fails. The
     /// session's folder says so in its file [`SPARE_FILE`], so that a reader finds them.
-    pub fn with_spare(folder: &Path, spare: &Path) -> io::Result<Self> {
-        let spare = std::path::absolute(spare)?.join(folder.file_name().unwrap_or_default());
+    pub fn with_spare(folder: &Path, spare: &Path, session_id: &str) -> io::Result<Self> {
+        let spare = std::path::absolute(spare)?.join(session_id);
         let text = spare
             .to_str()
             .ok_or_else(|| io::Error::other("the spare folder's name is not Unicode"))?;
+        // Made now, so that a reader knows: if it is not there, neither is its disk.
+        create_folder(&spare)?;
         let mut pointer = FileSink::create(&folder.join(SPARE_FILE))?;
         pointer.append(text.as_bytes())?;
         pointer.sync()?;
@@ -88,7 +90,6 @@ impl SegmentSource for FolderSegments {
         let Some(spare) = &self.spare else {
             return Err(io::Error::other("no spare folder was chosen"));
         };
-        create_folder(spare)?;
         let path = spare.join(segment_file(number));
         Ok((FileSink::create(&path)?, path.display().to_string()))
     }

@@ -212,7 +212,7 @@ pub struct SessionWriter {
 impl SessionWriter {
     /// Starts a session in a folder. When this returns, the manifest survives a power cut.
     ///
-    /// Should the folder's disk fail, the recording goes on in a folder of the same name in
+    /// Should the folder's disk fail, the recording goes on in a folder of the session's id in
     /// `spare`, best on another disk.
     pub fn start(
         folder: SessionFolder,
@@ -222,8 +222,10 @@ impl SessionWriter {
     ) -> Result<Self, LogError> {
         let source = match spare {
             None => FolderSegments::new(folder.path()),
-            Some(spare) => FolderSegments::with_spare(folder.path(), spare)
-                .map_err(|err| LogError::disk(&err, &folder.path().display().to_string()))?,
+            Some(spare) => {
+                FolderSegments::with_spare(folder.path(), spare, &manifest.session_id)
+                    .map_err(|err| LogError::disk(&err, &folder.path().display().to_string()))?
+            }
         };
         let mut writer = Self::start_in_segments(source, BATCHES_PER_SEGMENT, manifest, pace)?;
         writer._folder = Some(folder);

@@ -1,8 +1,9 @@
 //! Tells in which state a session is.
 
-use super::beside::wrong_beside;
 use super::write::{is_in_use, recover};
+use super::wrong_beside::wrong_beside;
 use super::{Missing, recovered_folder, salvage};
+use crate::log::reader::{absent_spare, away};
 use crate::log::{ReadError, Session, Summary};
 use chrono::{DateTime, Utc};
 use serde::Serialize;
@@ -19,6 +20,8 @@ pub enum Health {
     BeingRecorded,
     /// Everything in it is whole, but the recording broke off.
     Interrupted,
+    /// The end is not there, and neither is a disk that it may be on.
+    Incomplete,
     /// Parts of it are damaged or missing.
     Damaged {
         /// Which.
@@ -74,6 +77,8 @@ pub fn examine(path: &Path) -> Patient {
                 Health::Healthy
             } else if is_in_use(path) {
                 Health::BeingRecorded
+            } else if absent_spare(path).is_some() {
+                Health::Incomplete
             } else {
                 Health::Interrupted
             };
@@ -93,7 +98,10 @@ pub fn examine(path: &Path) -> Patient {
             });
             match left {
                 Ok(left) => {
-                    let findings = left.missing.sentences();
+                    let mut findings = left.missing.sentences();
+                    let lacks_files = left.missing.is_end_lost || left.lacks_segments;
+                    let spare = absent_spare(path).filter(|_| lacks_files);
+                    findings.extend(spare.map(|spare| away(&spare)));
                     let missing = left.missing;
                     patient(Health::Damaged { missing }, left.samples, until, findings)
                 }

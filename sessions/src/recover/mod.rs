@@ -8,10 +8,11 @@ mod beside;
 mod doctor;
 mod salvage;
 mod write;
+mod wrong_beside;
 
 pub use doctor::{Health, Patient, examine, examine_library, recover_library};
 pub use salvage::{Salvage, salvage};
-pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder};
+pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder, recovered_id};
 
 use crate::record::is_zero;
 use serde::{Deserialize, Serialize};
@@ -54,6 +55,9 @@ pub struct Missing {
     pub is_end_lost: bool,
     /// The damage itself.
     pub wounds: Vec<Wound>,
+    /// What stood beside the log and is not beside the copy, one sentence each.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub left_out: Vec<String>,
 }
 
 impl Missing {
@@ -73,6 +77,9 @@ impl Missing {
                 samples, from_s, ..
             } = gap;
             told.push(match gap.to_s {
+                Some(to_s) if gap.after_sample == 0 => format!(
+                    "the first {samples} samples, before {to_s:.3} s of the recording, are missing: t_s counts from the first sample that was kept, so it is less than in the original by their time"
+                ),
                 Some(to_s) => {
                     format!("{samples} samples between {from_s:.3} s and {to_s:.3} s are missing")
                 }
@@ -98,6 +105,7 @@ impl Missing {
         if self.is_end_lost {
             told.push("the end is missing: how the run ended, and whether anything came after, is not known".into());
         }
+        told.extend(self.left_out.iter().cloned());
         told
     }
 }

@@ -3,7 +3,9 @@
 use super::{Gap, Missing, Wound};
 use crate::log::content::{Content, Part};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
-use crate::log::reader::{NOT_BEGUN, check_beginning, damaged, find_files, name_of, refused};
+use crate::log::reader::{
+    NOT_BEGUN, check_beginning, check_files, damaged, find_files, name_of, refused,
+};
 use crate::log::source::Source;
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
@@ -22,6 +24,10 @@ pub struct Salvage {
     pub samples: u64,
     /// Entries that are left, by `order`. Their `after_sample` counts the samples that were recorded.
     pub entries: Vec<Entry>,
+    /// Whether every decision up to the last sample is among them.
+    pub has_every_decision: bool,
+    /// Whether a segment between others is not there at all.
+    pub lacks_segments: bool,
     /// Raw bytes of devices that are left.
     pub raw_bytes: u64,
     /// How the session ended, if that is left.
@@ -57,6 +63,7 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
 /// As [`salvage`] for everything a log holds, and only what lies where samples are is looked at.
 pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
+    check_files(path, &files)?;
     let failed = |source| ReadError::Io {
         path: path.into(),
         source,
@@ -101,7 +108,8 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         wounds,
         ..
     } = search;
-    let (lost_entries, later) = (content.lost_entries, content.is_later_part);
+    let (mut lost_entries, later) = (content.lost_entries, content.is_later_part);
+    let lost_decisions = content.lost_decisions;
     let (raw_bytes, mut lost_raw_bytes) = (content.raw_bytes, content.lost_raw_bytes);
     let raw_bytes_left = raw_bytes - lost_raw_bytes;
     let entries = std::mem::take(&mut content.entries);
@@ -120,23 +128,34 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
             to_s: None,
         });
     }
+    let mut lost_after_last = 0;
     if let Some(end) = &end
         && (!later || path.is_dir())
     {
         lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
+        lost_after_last = end
+            .entries
+            .saturating_sub(entries.len() as u64 + lost_entries);
+        lost_entries += lost_after_last;
     }
     // The first sample of a later part that is read alone is not its first.
     if later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
     }
+    let missing = Missing {
+        gaps,
+        entries: lost_entries,
+        raw_bytes: lost_raw_bytes,
+        is_end_lost: end.is_none(),
+        wounds,
+        left_out: Vec::new(),
+    };
+    // Without the end nobody knows what the last damage took.
+    let is_end_known = end.is_some() || !missing.is_lossy();
     Ok(Salvage {
-        missing: Missing {
-            gaps,
-            entries: lost_entries,
-            raw_bytes: lost_raw_bytes,
-            is_end_lost: end.is_none(),
-            wounds,
-        },
+        has_every_decision: lost_decisions + lost_after_last == 0 && is_end_known && !later,
+        missing,
+        lacks_segments: files.iter().any(|file| !file.is_file()),
         manifest,
         samples: kept,
         raw_bytes: raw_bytes_left,

@@ -1,8 +1,11 @@
 //! Writes what is left of a session as a session of its own, beside the original.
 
+use super::beside::Beside;
 use super::salvage::parts;
 use super::{Missing, Salvage, salvage};
+use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
+use crate::log::reader::{absent_spare, away};
 use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
@@ -44,6 +47,14 @@ pub enum RecoverError {
         /// The session.
         path: PathBuf,
     },
+    /// A disk that its segments may be on is not there.
+    #[error("{} is not recovered yet: {}, or, if it is lost for good, take the file 'spare' out of the session's folder", path.display(), away(spare))]
+    Away {
+        /// The session.
+        path: PathBuf,
+        /// The folder on that disk.
+        spare: PathBuf,
+    },
     /// It was done before.
     #[error("{} was recovered before, into {}; use that", path.display(), folder.display())]
     Before {
@@ -58,6 +69,17 @@ pub enum RecoverError {
     /// The new session cannot be written.
     #[error(transparent)]
     Write(#[from] LogError),
+    /// Its edits or analyses cannot be written.
+    #[error(transparent)]
+    Beside(#[from] ChainError),
+    /// What an import was made from cannot be copied.
+    #[error("the files in {} cannot be copied ({source}); check their permissions and the room on the disk", path.display())]
+    Original {
+        /// The folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
 }
 
 /// A recovered session and what is missing of it.
@@ -104,6 +126,12 @@ pub fn recovered_folder(path: &Path) -> PathBuf {
     folder.with_file_name(format!("{name}.recovered"))
 }
 
+/// The name that what is recovered of a session gets.
+#[must_use]
+pub fn recovered_id(session_id: &str) -> String {
+    format!("{session_id}-recovered")
+}
+
 /// Whether a session's folder is locked by whoever records it. The lock is only looked at.
 pub(super) fn is_in_use(path: &Path) -> bool {
     let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
@@ -118,7 +146,8 @@ pub(super) fn is_in_use(path: &Path) -> bool {
 /// Recovers an interrupted or damaged session into a folder beside it. The original is only read.
 ///
 /// Samples are numbered anew without gaps; their times are the recorded ones, and the manifest
-/// says what is missing between them.
+/// says what is missing between them. Edits, analyses and the original of an import go with it, unless they
+/// would mean something else.
 pub fn recover(
     path: &Path,
     software_version: &str,
@@ -135,13 +164,20 @@ pub fn recover(
             folder,
         });
     }
-    let left = salvage(path, &mut |_| {})?;
+    let mut left = salvage(path, &mut |_| {})?;
+    let lacks_files = left.missing.is_end_lost || left.lacks_segments;
+    if let Some(spare) = absent_spare(path).filter(|_| lacks_files) {
+        let path = path.into();
+        return Err(RecoverError::Away { path, spare });
+    }
     if !left.missing.is_lossy() && !left.missing.is_end_lost {
         return Err(RecoverError::Whole { path: path.into() });
     }
+    let beside = Beside::of(path, &left);
+    left.missing.left_out.clone_from(&beside.left_out);
     let unfinished = folder.with_extension("recovering");
     clear(&unfinished)?;
-    let session_id = format!("{}-recovered", left.manifest.session_id);
+    let session_id = recovered_id(&left.manifest.session_id);
     let manifest = Manifest {
         session_id: session_id.clone(),
         recovered: Some(Recovered {
@@ -159,6 +195,7 @@ pub fn recover(
         let sink = FileSink::create(&log_path).map_err(|err| LogError::disk(&err, &shown))?;
         let mut log = LogWriter::begin(sink, &shown, &manifest)?;
         copy(path, &left, &mut log)?;
+        beside.write(&unfinished, &session_id)?;
     }
     // Either all of it is there, or nothing is.
     std::fs::rename(&unfinished, &folder)

@@ -210,7 +210,7 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
         && query
             .review
             .is_none_or(|wanted| match (wanted, &entry.review) {
-                (ReviewIs::None, review) => review.is_none(),
+                (ReviewIs::None, review) => review.is_none() && entry.trouble.is_none(),
                 (_, None) => false,
                 (ReviewIs::Outdated, Some(review)) => !review.changed.is_empty(),
                 (ReviewIs::Given(decision), Some(review)) => {
@@ -226,7 +226,7 @@ fn is_meant(query: &Query, entry: &Entry) -> bool {
         && query.conditions.iter().all(|one| one.is_met(entry))
         && query.verdict.is_none_or(|wanted| match wanted {
             VerdictIs::Given(verdict) => entry.verdict == Some(verdict),
-            VerdictIs::None => entry.verdict.is_none(),
+            VerdictIs::None => entry.verdict.is_none() && entry.trouble.is_none(),
         })
         && plain_words(&query.words).iter().all(has_word)
 }

@@ -1,6 +1,8 @@
 //! Sessions through the crate's public door: written, damaged, read back, exported.
 
 #[cfg(test)]
+mod beside;
+#[cfg(test)]
 mod catalog;
 #[cfg(test)]
 mod damage;

@@ -186,6 +186,13 @@ fn the_doctor_says_what_each_file_is() {
         Health::Foreign
     );
 
+    // Where nothing is, nothing is damaged, and recovery would not help.
+    let hollow = library.path().join("hollow");
+    fs::create_dir(&hollow).unwrap();
+    let refusal = recover(&hollow, "1", at()).unwrap_err().to_string();
+    let expected = "is not a palpate session (it holds no 000.mcap)";
+    assert!(refusal.contains(expected), "{refusal}");
+
     // Somebody records it: it is left alone.
     let path = library.path().join("sessions/live");
     let held = SessionFolder::create(&path).unwrap();

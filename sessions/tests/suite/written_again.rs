@@ -2,6 +2,7 @@
 
 use crate::support::{Random, end, entries, manifest, quick_folder, rows, same_bits};
 use palpate_model::Nanos;
+use palpate_sessions::recover::{Health, RecoverError, examine, recover, recovered_folder};
 use palpate_sessions::{
     Entry, FileSink, FolderSegments, LogError, Notice, Pace, ReadError, Row, SPARE_FILE,
     SegmentSource, Session, SessionWriter, Sink, Summary, segment_file,
@@ -286,9 +287,10 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
         }
     }
     let rows = rows(1000, 63);
+    let mut away = 0;
     for room in (12_000..60_000).step_by(3001) {
         let (folder, spare) = (quick_folder(), quick_folder());
-        let own = FolderSegments::with_spare(folder.path(), spare.path()).unwrap();
+        let own = FolderSegments::with_spare(folder.path(), spare.path(), "id").unwrap();
         let room = Arc::new(Mutex::new(room));
         let source = Full {
             own,
@@ -328,6 +330,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
                 session.notes
             );
             assert!(session.is_whole());
+            away += u32::from(is_told_away(folder.path(), spare.path()));
             fs::remove_file(folder.path().join(SPARE_FILE)).unwrap();
             let rest = Session::open(folder.path()).unwrap();
             assert!(same_bits(&rest.rows, &rows[..rest.rows.len()]));
@@ -335,6 +338,29 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
             assert!(!rest.notes.is_empty());
         }
     }
+    assert!(away > 2, "{away}");
+}
+
+/// While the spare disk is away, nobody takes what is left for all there is; whether something is missing at all.
+fn is_told_away(folder: &Path, spare: &Path) -> bool {
+    let away = spare.with_extension("away");
+    fs::rename(spare, &away).unwrap();
+    let words = "which is not there; connect that disk";
+    let open = Session::open(folder).unwrap();
+    if open.end.is_some() {
+        fs::rename(away, spare).unwrap();
+        return false;
+    }
+    assert!(open.notes.iter().any(|note| note.contains(words)));
+    let patient = examine(folder);
+    assert_eq!(patient.health, Health::Incomplete);
+    assert!(patient.findings.iter().any(|one| one.contains(words)));
+    let refusal = recover(folder, "1", chrono::DateTime::UNIX_EPOCH).unwrap_err();
+    assert!(matches!(refusal, RecoverError::Away { .. }), "{refusal}");
+    assert!(!recovered_folder(folder).exists());
+    fs::rename(away, spare).unwrap();
+    assert_eq!(examine(folder).health, Health::Healthy);
+    true
 }
 
 /// A process can die at any byte of the file that is written again.
@@ -363,4 +389,22 @@ fn a_crash_while_writing_again_keeps_what_the_old_file_held() {
         );
         assert!(same_bits(&session.rows, &rows[..session.rows.len()]));
     }
+}
+
+/// Folders of one name, as `--out` makes them, in two places.
+#[test]
+fn sessions_of_one_name_go_on_in_spare_folders_of_their_own() {
+    let disks = quick_folder();
+    let mut paths = Vec::new();
+    for id in ["one", "two"] {
+        let folder = disks.path().join(id).join("s");
+        fs::create_dir_all(&folder).unwrap();
+        let spare = disks.path().join("spare");
+        let mut own = FolderSegments::with_spare(&folder, &spare, id).unwrap();
+        let (_, path) = own.create_elsewhere(1).unwrap();
+        let named = fs::read_to_string(folder.join(SPARE_FILE)).unwrap();
+        assert!(path.starts_with(&named), "{path}");
+        paths.push(named);
+    }
+    assert_ne!(paths[0], paths[1]);
 }

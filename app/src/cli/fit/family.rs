@@ -70,7 +70,7 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     let family = by_key(key).map_err(Failure::usage)?;
-    let found = sources::find(&args.sources)?;
+    let found = sources::find(&args.sources, output)?;
     let to = args.picture.as_deref();
     new_file::check("picture", to)?;
     if to.is_some() && found.len() > 1 {

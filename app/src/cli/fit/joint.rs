@@ -35,7 +35,7 @@ pub(super) fn run(
     recipe: &Recipe,
     output: &Output,
 ) -> Result<(), Failure> {
-    let found = sources::find(given)?;
+    let found = sources::find(given, output)?;
     if found.len() < 2 {
         return Err(Failure::usage(
             "--share needs at least two recordings; name them all, or a folder of them",

@@ -1,6 +1,7 @@
 //! The sessions of a lake, or one part of them, each fitted and kept in the lake.
 
 use super::super::{Failure, export, output::Output, source_failure};
+use super::sources::tell_copied;
 use super::{FitArgs, Recipe, batch};
 use crate::workers::pool::{News, NoAnswer, in_order};
 use palpate_model::fit::{FitReport, Systematic};
@@ -9,9 +10,11 @@ use palpate_protocols::compliance::Correction;
 use palpate_sessions::lake::{
     FitFile, FitState, InLake, LakeError, Shard, keep_fit, read_session, sessions, state_of_fit,
 };
+use palpate_sessions::recover::recovered_id;
 use palpate_sessions::text::sha256_of_file;
 use serde::Serialize;
 use serde_json::{Value, json};
+use std::collections::BTreeSet;
 use std::num::NonZeroUsize;
 use std::path::Path;
 use std::sync::Arc;
@@ -50,7 +53,12 @@ pub(super) fn run(
     let settings = settings(args)?;
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let mut found = sessions(lake).map_err(failure)?;
-    found.retain(|one| shard.has(&one.id));
+    // Before the shards are made, so that all leave out the same.
+    let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
+    let is_copied = |one: &InLake| ids.contains(&recovered_id(&one.id));
+    let copied = found.iter().filter(|one| is_copied(one));
+    tell_copied(copied.map(|one| one.id.clone()).collect(), output);
+    found.retain(|one| !is_copied(one) && shard.has(&one.id));
     let jobs = args.jobs.or(std::thread::available_parallelism().ok());
     let jobs = jobs.map_or(1, NonZeroUsize::get);
     let is_ending = Arc::new(AtomicBool::new(false));

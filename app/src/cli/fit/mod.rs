@@ -203,7 +203,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
             "--picture, --profile, --bootstrap and --save are for one fit; name a single session or table",
         ));
     }
-    let found = sources::find(&args.sources)?;
+    let found = sources::find(&args.sources, output)?;
     let jobs = args.jobs.or(std::thread::available_parallelism().ok());
     batch::run(&found, jobs.map_or(1, NonZeroUsize::get), &recipe, output)
 }

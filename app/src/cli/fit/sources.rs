@@ -10,7 +10,8 @@ use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_protocols::origin::Origin;
 use palpate_sessions::import::ColumnNames;
-use palpate_sessions::log::ReadError;
+use palpate_sessions::log::{ReadError, Summary};
+use std::collections::BTreeSet;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -50,8 +51,46 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
     })
 }
 
+/// Every source named, and every one in the folders named: folder by folder, by name. A session whose
+/// recovered copy is among them is left out, so that its samples count once.
+pub(in crate::cli) fn find(paths: &[PathBuf], output: &Output) -> Result<Vec<PathBuf>, Failure> {
+    let found = all(paths)?;
+    let ids: Vec<Option<(String, Option<String>)>> = found
+        .iter()
+        .map(|path| {
+            let is_log = path.is_dir() || has_ending(path, &[LOG]);
+            let manifest = Summary::read(path).ok().filter(|_| is_log)?.manifest;
+            Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
+        })
+        .collect();
+    let copied: BTreeSet<&String> = ids
+        .iter()
+        .flatten()
+        .filter_map(|it| it.1.as_ref())
+        .collect();
+    let is_copied =
+        |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));
+    let (originals, rest): (Vec<_>, Vec<_>) = found
+        .into_iter()
+        .zip(&ids)
+        .partition(|(_, one)| is_copied(one));
+    let names = originals.iter().map(|(path, _)| path.display().to_string());
+    tell_copied(names.collect(), output);
+    Ok(rest.into_iter().map(|(path, _)| path).collect())
+}
+
+/// Tells which sessions are left out for their recovered copies.
+pub(super) fn tell_copied(names: Vec<String>, output: &Output) {
+    if !names.is_empty() {
+        output.note(&format!(
+            "left out, because the copy that was recovered from it is there too: {}",
+            names.join(", ")
+        ));
+    }
+}
+
 /// Every source named, and every one in the folders named: folder by folder, by name.
-pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
     let mut found = Vec::new();
     for path in paths {
         if !path.exists() {
@@ -79,7 +118,10 @@ pub(in crate::cli) fn find(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Every session named, and every one in the folders named; tables are none.
-pub(in crate::cli) fn find_sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
+pub(in crate::cli) fn find_sessions(
+    paths: &[PathBuf],
+    output: &Output,
+) -> Result<Vec<PathBuf>, Failure> {
     let is_table = |path: &PathBuf| path.is_file() && !has_ending(path, &[LOG]);
     if let Some(table) = paths.iter().find(|path| is_table(path)) {
         return Err(Failure::usage(format!(
@@ -87,7 +129,7 @@ pub(in crate::cli) fn find_sessions(paths: &[PathBuf]) -> Result<Vec<PathBuf>, F
             table.display()
         )));
     }
-    let mut found = find(paths)?;
+    let mut found = find(paths, output)?;
     found.retain(|path| !is_table(path));
     Ok(found)
 }
@@ -251,7 +293,7 @@ mod tests {
         // A loop, and a second way to the same sessions.
         std::os::unix::fs::symlink(at, at.join("a/loop")).unwrap();
         std::os::unix::fs::symlink(at.join("b"), at.join("again")).unwrap();
-        let found = find(&[at.to_path_buf()]).unwrap();
+        let found = all(&[at.to_path_buf()]).unwrap();
         let names: Vec<_> = found
             .iter()
             .map(|path| path.strip_prefix(at).unwrap())
@@ -265,9 +307,9 @@ mod tests {
         ];
         assert_eq!(names, expected.map(Path::new));
         // Named itself, a link is what it leads to; a session is a source and not a folder of some.
-        assert_eq!(find(&[at.join("again")]).unwrap().len(), 3);
-        assert_eq!(find(&[at.join("b/s9")]).unwrap(), [at.join("b/s9")]);
-        let refusal = find(&[at.join("empty")]).unwrap_err();
+        assert_eq!(all(&[at.join("again")]).unwrap().len(), 3);
+        assert_eq!(all(&[at.join("b/s9")]).unwrap(), [at.join("b/s9")]);
+        let refusal = all(&[at.join("empty")]).unwrap_err();
         assert!(refusal.sentence().contains("holds no session"));
     }
 }

@@ -1,0 +1,39 @@
+//! The contacts that a session found, as edits number them.
+
+use crate::record::{Entry, EntryKind};
+use palpate_model::units::Position;
+use serde_json::Value;
+
+/// A contact that a session found.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct FoundContact {
+    /// Samples before it; those that follow count their depth from it.
+    pub after_sample: u64,
+    /// Position from home.
+    pub position: Position,
+}
+
+/// Every contact among a session's entries, in order.
+#[must_use]
+pub fn contacts(entries: &[Entry]) -> Vec<FoundContact> {
+    let found = entries.iter().filter_map(|entry| {
+        Some(FoundContact {
+            after_sample: entry.after_sample,
+            position: Position(contact_position(entry)?.as_f64()?),
+        })
+    });
+    found.collect()
+}
+
+/// The position in a decision that found contact.
+#[must_use]
+pub fn contact_position(entry: &Entry) -> Option<&Value> {
+    is_record(entry, "contact_found").then(|| entry.body.get("position"))?
+}
+
+/// Whether an entry is a decision that keeps a record of this name.
+#[must_use]
+pub fn is_record(entry: &Entry, name: &str) -> bool {
+    let body = &entry.body;
+    entry.kind == EntryKind::Decision && body["effect"] == "record" && body["record"] == name
+}
