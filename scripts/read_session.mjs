@@ -57,6 +57,18 @@ function summed(data, asType) {
   return signed(data).map((difference) => (value = asType(64, value + difference)));
 }
 
+/** The pieces of a message of /raw: session time in ns (BigInt), device, whether the computer sent it, bytes. */
+export function pieces(message) {
+  const block = fields(message);
+  const isSent = numbers(block[4]);
+  const lengths = numbers(block[5]).map(Number);
+  let at = 0;
+  return summed(block[3], BigInt.asUintN).map((time, i) => {
+    const bytes = block[6].subarray(at, (at += lengths[i]));
+    return { time, device: new TextDecoder().decode(block[2]), isSent: isSent[i] !== 0n, bytes };
+  });
+}
+
 export function doubles(data) {
   const view = new DataView(data.buffer, data.byteOffset, data.length);
   return Array.from({ length: data.length / 8 }, (_, i) => view.getFloat64(8 * i, true));

@@ -75,6 +75,14 @@ def samples(raw, derived):
             "phase": [PHASES[code] for code in numbers(derived[5])], "cycle": numbers(derived[6])}
 
 
+def pieces(message):
+    """The pieces of a message of /raw: session time in ns, device, whether the computer sent it, bytes."""
+    block, at = fields(message), 0
+    for time, is_sent, length in zip(summed(block[3]), numbers(block[4]), numbers(block[5])):
+        yield time, block[2].decode(), bool(is_sent), block[6][at:at + length]
+        at += length
+
+
 class Whole(io.BufferedReader):
     """A file whose end is where the last whole piece ends: a session that was interrupted is cut anywhere."""
 

@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::rig::{HandAction, RigCommand, RigDescription};
+use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
 
 /// Opens the rig called `name`: `sim`, or `sim:NAME` for a simulated rig that people share by name.
 ///
@@ -45,6 +45,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn by_hand(&mut self, action: HandAction) {
         (**self).by_hand(action);
+    }
+
+    fn take_raw(&mut self) -> Vec<RawBytes> {
+        (**self).take_raw()
     }
 }
 

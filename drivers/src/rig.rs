@@ -1,7 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, HandAction, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
 use thiserror::Error;
 
 /// Something a rig reported, with the time it reached the host.
@@ -57,4 +57,10 @@ pub trait Rig: Send {
     /// A person has done something at the rig, as an instruction asked. On a rig on wires it is done by
     /// then and there is nothing to do; a simulated rig does it now.
     fn by_hand(&mut self, _action: HandAction) {}
+
+    /// The bytes exchanged with devices since this was last asked, in order, at the caller's time. A rig without
+    /// wires has none. Must not wait.
+    fn take_raw(&mut self) -> Vec<RawBytes> {
+        Vec::new()
+    }
 }

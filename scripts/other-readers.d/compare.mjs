@@ -2,10 +2,10 @@
 //
 // Usage: node compare.mjs FOLDER SESSION CUT...
 // Writes every column of SESSION to FOLDER/NAME.values, 64 bits a value (phases as JSON), and to FOLDER/NAME.known, a byte
-// a value. Prints one object: how many messages each topic of the session and of each cut has, and what differs.
+// a value, and of raw bytes to FOLDER/raw.pieces. Prints one object: how many messages each topic of the session and of each cut has, and what differs.
 import { readdirSync, writeFileSync } from "node:fs";
 import { join } from "node:path";
-import { indexed, read, streamed } from "./read_session.mjs";
+import { indexed, pieces, read, streamed } from "./read_session.mjs";
 
 const [folder, session, ...cuts] = process.argv.slice(2);
 const files = readdirSync(session).filter((name) => /^\d+\.mcap$/.test(name)).sort();
@@ -48,6 +48,11 @@ for (const [name, values] of Object.entries(columns)) {
 for (const [topic, found] of Object.entries(others)) {
   writeFileSync(join(folder, `${topic.replaceAll("/", "_")}.messages`), Buffer.concat(found.flatMap((one) => [one, Buffer.from("\n")])));
 }
+
+// Raw bytes unpacked, a piece a line.
+const raw = (others["/raw"] ?? []).flatMap(pieces);
+const lines = raw.map((one) => `${one.time} ${one.device} ${one.isSent} ${Buffer.from(one.bytes).toString("hex")}\n`);
+writeFileSync(join(folder, "raw.pieces"), lines.join(""));
 
 // A finished file through its index. Only messages with the same time may come in another order.
 const last = join(session, files.at(-1));

@@ -77,6 +77,7 @@ fn make(library: &Path, original: &Session, number: usize) -> Outcome<()> {
         reason: "the plan is complete".into(),
         samples: 0,
         entries: 0,
+        raw_bytes: 0,
         ended_at: original.rows[SAMPLES - 1].host,
         time_use: Vec::new(),
     })?;

@@ -108,6 +108,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 reason: "done".into(),
                 samples: 0,
                 entries: 0,
+                raw_bytes: 0,
                 ended_at: Nanos(samples * 50_000),
                 time_use: Vec::new(),
             };

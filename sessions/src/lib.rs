@@ -20,6 +20,7 @@ pub mod compliances;
 pub mod edits;
 pub mod export;
 pub mod folder;
+pub mod health;
 pub mod import;
 pub mod imported;
 pub mod journal;
@@ -28,6 +29,7 @@ mod lock;
 pub mod log;
 pub mod manifest;
 mod packed;
+pub mod raw;
 pub mod record;
 pub mod recover;
 mod schema;
@@ -47,12 +49,14 @@ pub use folder::{
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
     spare_folder,
 };
+pub use health::{Health, HealthSummary, MachineState};
 pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
-    BATCHES_PER_SEGMENT, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline, Pace,
-    ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
+    BATCHES_PER_SEGMENT, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline,
+    Pace, Part, Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
+pub use raw::{RawBlock, RawPiece};
 pub use record::{Block, EndRecord, Entry, EntryKind, Row};
 pub use shelf::{Document, LibraryError, age_days, save, supersede, taken_at};

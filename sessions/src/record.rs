@@ -94,10 +94,18 @@ pub struct EndRecord {
     pub samples: u64,
     /// Entries in the session; set by the writer.
     pub entries: u64,
+    /// Raw bytes in the session; set by the writer.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub raw_bytes: u64,
     /// Session time of the end.
     pub ended_at: Nanos,
     /// Seconds spent per activity, in the order they are shown.
     pub time_use: Vec<(String, f64)>,
+}
+
+/// Whether a count says nothing, so that it is left out.
+pub(crate) fn is_zero(count: &u64) -> bool {
+    *count == 0
 }
 
 /// An [`Entry`] to be written as JSON; its kind is the channel it is on.

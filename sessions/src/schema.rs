@@ -6,7 +6,10 @@
 use crate::record::EntryKind;
 use prost::Message;
 use prost_types::field_descriptor_proto::{Label, Type};
-use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet};
+use prost_types::{
+    DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet,
+    OneofDescriptorProto,
+};
 use std::collections::BTreeMap;
 
 /// A channel of a session log.
@@ -23,10 +26,14 @@ pub(crate) enum Channel {
     View,
     /// Says that what may be lost of the segments before is written again in this one.
     Rewrite,
+    /// Bytes as exchanged with devices.
+    Raw,
+    /// How the computer kept up, and its clocks.
+    Health,
 }
 
 impl Channel {
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 11] = [
         Self::Manifest,
         Self::Daq,
         Self::Derived,
@@ -36,6 +43,8 @@ impl Channel {
         Self::End,
         Self::View,
         Self::Rewrite,
+        Self::Raw,
+        Self::Health,
     ];
 
     pub fn topic(self) -> &'static str {
@@ -49,6 +58,8 @@ impl Channel {
             Self::End => "/end",
             Self::View => "/daq/view",
             Self::Rewrite => "/rewrite",
+            Self::Raw => "/raw",
+            Self::Health => "/health",
         }
     }
 
@@ -67,14 +78,14 @@ impl Channel {
     /// The encoding of messages, and so of the schema: `protobuf` or `json`.
     pub fn message_encoding(self) -> &'static str {
         match self {
-            Self::Daq | Self::Derived | Self::View => "protobuf",
+            Self::Daq | Self::Derived | Self::View | Self::Raw => "protobuf",
             _ => "json",
         }
     }
 
     pub fn schema_encoding(self) -> &'static str {
         match self {
-            Self::Daq | Self::Derived | Self::View => "protobuf",
+            Self::Daq | Self::Derived | Self::View | Self::Raw => "protobuf",
             _ => "jsonschema",
         }
     }
@@ -88,6 +99,8 @@ impl Channel {
             Self::End => "palpate.EndRecord",
             Self::View => "palpate.View",
             Self::Rewrite => "palpate.Rewrite",
+            Self::Raw => "palpate.RawBlock",
+            Self::Health => "palpate.Health",
         }
     }
 
@@ -100,6 +113,8 @@ impl Channel {
             Self::End => END_SCHEMA.into(),
             Self::View => descriptor_set("View", VIEW_FIELDS),
             Self::Rewrite => REWRITE_SCHEMA.into(),
+            Self::Raw => descriptor_set("RawBlock", RAW_FIELDS),
+            Self::Health => HEALTH_SCHEMA.into(),
         }
     }
 
@@ -129,6 +144,18 @@ impl Channel {
                 ("force_N", "N"),
                 ("depth_mm", "mm"),
             ],
+            Self::Raw => &[
+                ("first_byte", "bytes"),
+                ("at_delta_ns", "ns since session start"),
+                ("length", "bytes"),
+            ],
+            Self::Health => &[
+                ("now_ns", "ns since session start"),
+                ("lateness_s", "s"),
+                ("sync_s", "s"),
+                ("free_bytes", "bytes"),
+                ("shift_s", "s"),
+            ],
             Self::Manifest | Self::Rewrite => &[],
         };
         units
@@ -136,6 +163,31 @@ impl Channel {
             .map(|(field, unit)| (format!("unit.{field}"), (*unit).to_owned()))
             .collect()
     }
+}
+
+/// Topic of an export of one message per sample.
+pub(crate) const SAMPLE_TOPIC: &str = "/sample";
+
+/// Descriptor of its messages, where what is unknown is told apart from 0.
+pub(crate) fn sample_schema() -> Vec<u8> {
+    let always = ["t_s", "phase", "cycle", "sample"];
+    descriptor_set_with("Sample", SAMPLE_FIELDS, |name| !always.contains(&name))
+}
+
+/// Units of its fields.
+pub(crate) fn sample_metadata() -> BTreeMap<String, String> {
+    let units = [
+        ("t_s", "s since the first sample"),
+        ("depth_mm", "mm"),
+        ("force_N", "N"),
+        ("signal_V", "V"),
+        ("counts", "1"),
+        ("pulses", "1"),
+        ("cycle", "1"),
+        ("sample", "1"),
+    ];
+    let pairs = units.map(|(field, unit)| (format!("unit.{field}"), unit.to_owned()));
+    pairs.into()
 }
 
 type Field = (&'static str, i32, Label, Type);
@@ -167,9 +219,47 @@ const VIEW_FIELDS: &[Field] = &[
     ("cycle", 5, Label::Optional, Type::Uint32),
 ];
 
+const RAW_FIELDS: &[Field] = &[
+    ("first_byte", 1, Label::Optional, Type::Uint64),
+    ("device", 2, Label::Optional, Type::String),
+    ("at_delta_ns", 3, Label::Repeated, Type::Sint64),
+    ("is_sent", 4, Label::Repeated, Type::Bool),
+    ("length", 5, Label::Repeated, Type::Uint32),
+    ("data", 6, Label::Optional, Type::Bytes),
+];
+
+const SAMPLE_FIELDS: &[Field] = &[
+    ("t_s", 1, Label::Optional, Type::Double),
+    ("depth_mm", 2, Label::Optional, Type::Double),
+    ("force_N", 3, Label::Optional, Type::Double),
+    ("signal_V", 4, Label::Optional, Type::Double),
+    ("counts", 5, Label::Optional, Type::Sint32),
+    ("pulses", 6, Label::Optional, Type::Sint64),
+    ("phase", 7, Label::Optional, Type::String),
+    ("cycle", 8, Label::Optional, Type::Uint32),
+    ("sample", 9, Label::Optional, Type::Uint64),
+];
+
 fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
+    descriptor_set_with(message, fields, |_| false)
+}
+
+/// A field that may be absent is in a `oneof` of its own, as the language's `optional` is described.
+fn descriptor_set_with(
+    message: &str,
+    fields: &[Field],
+    may_be_absent: impl Fn(&str) -> bool,
+) -> Vec<u8> {
+    let absent: Vec<&str> = fields
+        .iter()
+        .map(|(name, ..)| *name)
+        .filter(|name| may_be_absent(name))
+        .collect();
+    let oneof_of = |name: &str| absent.iter().position(|one| *one == name);
     let field = |&(name, number, label, kind): &Field| FieldDescriptorProto {
         name: Some(name.into()),
+        oneof_index: oneof_of(name).map(|index| index as i32),
+        proto3_optional: oneof_of(name).map(|_| true),
         number: Some(number),
         label: Some(label.into()),
         r#type: Some(kind.into()),
@@ -183,6 +273,13 @@ fn descriptor_set(message: &str, fields: &[Field]) -> Vec<u8> {
         message_type: vec![DescriptorProto {
             name: Some(message.into()),
             field: fields.iter().map(field).collect(),
+            oneof_decl: absent
+                .iter()
+                .map(|name| OneofDescriptorProto {
+                    name: Some(format!("_{name}")),
+                    ..Default::default()
+                })
+                .collect(),
             ..Default::default()
         }],
         ..Default::default()
@@ -194,13 +291,16 @@ const MANIFEST_SCHEMA: &str = r#"{"type":"object","properties":{"record_version"
 
 const ENTRY_SCHEMA: &str = r#"{"type":"object","properties":{"order":{"type":"integer"},"after_sample":{"type":"integer"},"now_ns":{"type":"integer"},"body":{}},"required":["order","after_sample","now_ns","body"]}"#;
 
-const END_SCHEMA: &str = r#"{"type":"object","properties":{"outcome":{"type":"string"},"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"},"ended_at":{"type":"integer"},"time_use":{"type":"array","items":{"type":"array"}}},"required":["outcome","reason","samples","entries","ended_at"]}"#;
+const END_SCHEMA: &str = r#"{"type":"object","properties":{"outcome":{"type":"string"},"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"},"raw_bytes":{"type":"integer"},"ended_at":{"type":"integer"},"time_use":{"type":"array","items":{"type":"array"}}},"required":["outcome","reason","samples","entries","ended_at"]}"#;
 
 const REWRITE_SCHEMA: &str = r#"{"type":"object","properties":{"reason":{"type":"string"},"samples":{"type":"integer"},"entries":{"type":"integer"}},"required":["reason","samples","entries"]}"#;
+
+const HEALTH_SCHEMA: &str = r#"{"type":"object","properties":{"now_ns":{"type":"integer"},"kind":{"type":"string"},"lateness_s":{"type":"number"},"queue_share":{"type":"number"},"sync_s":{"type":"number"},"free_bytes":{"type":"integer"},"missed_readings":{"type":"integer"},"why":{"type":"string"},"wall":{"type":"string","format":"date-time"},"shift_s":{"type":"number"},"text":{"type":"string"}},"required":["now_ns","kind"]}"#;
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::raw::RawMessage;
     use crate::record::{DaqBlock, DerivedBlock};
     use prost::encoding::{WireType, decode_key, decode_varint};
 
@@ -222,8 +322,10 @@ mod tests {
     fn promised(fields: &[Field]) -> Vec<(u32, WireType)> {
         fields
             .iter()
-            .map(|&(_, number, label, _)| match label {
-                Label::Repeated => (number as u32, WireType::LengthDelimited),
+            .map(|&(_, number, label, kind)| match (label, kind) {
+                (Label::Repeated, _) | (_, Type::String | Type::Bytes) => {
+                    (number as u32, WireType::LengthDelimited)
+                }
                 _ => (number as u32, WireType::Varint),
             })
             .collect()
@@ -253,9 +355,19 @@ mod tests {
             wire_fields(&derived.encode_to_vec()),
             promised(DERIVED_FIELDS)
         );
+        let raw = RawMessage {
+            first_byte: 1,
+            device: "a".into(),
+            at_delta_ns: vec![1],
+            is_sent: vec![true],
+            length: vec![1],
+            data: vec![1],
+        };
+        assert_eq!(wire_fields(&raw.encode_to_vec()), promised(RAW_FIELDS));
         // The names of the fields, as the derive macro sees them, are the names described.
-        let shown = format!("{daq:?} {derived:?}");
-        for (name, ..) in DAQ_FIELDS.iter().chain(DERIVED_FIELDS) {
+        let shown = format!("{daq:?} {derived:?} {raw:?}");
+        let described = DAQ_FIELDS.iter().chain(DERIVED_FIELDS).chain(RAW_FIELDS);
+        for (name, ..) in described {
             assert!(shown.contains(&format!("{name}:")), "{name}");
         }
     }

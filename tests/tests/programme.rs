@@ -342,6 +342,7 @@ validates = "two"
 
 [simulated]
 softening = 40
+stifness = 3
 
 [specimen.7]
 name = "stomach"
@@ -362,11 +363,12 @@ name = "stomach"
         "line 26: a task needs 'protocol'; write protocol = \"ramp-hold\"",
         "line 27: there is a task 'three' already",
         "line 28: depth cannot be a table in braces; give a text in quotes",
+        "line 33: [simulated] has no setting 'stifness'; it has preconditioning, rate and softening",
     ] {
         assert!(text.contains(part), "{part}: {text}");
     }
     // None twice, none that follows from another alone.
-    assert_eq!(text.lines().count(), 13, "{text}");
+    assert_eq!(text.lines().count(), 14, "{text}");
     let told = |text: &str| {
         let refusal = Programme::read(text, &|_| Err(String::new())).unwrap_err();
         refusal.to_string()

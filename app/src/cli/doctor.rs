@@ -47,13 +47,25 @@ struct Recovered {
     recovered: PathBuf,
     session_id: String,
     samples: u64,
+    raw_bytes: u64,
     missing: Missing,
+    #[serde(skip)]
+    sentences: Vec<String>,
+}
+
+/// A session that was not recovered.
+#[derive(Serialize)]
+struct NotRecovered {
+    session: PathBuf,
+    error: String,
+    exit: u8,
 }
 
 #[derive(Serialize)]
 struct Recoveries {
     command: &'static str,
     sessions: Vec<Recovered>,
+    not_recovered: Vec<NotRecovered>,
 }
 
 pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
@@ -62,7 +74,7 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
     } else {
         args.sessions.clone()
     };
-    let sessions = each(&paths, output, |path| Ok(examine(path)))?;
+    let sessions = each(&paths, output, examine);
     let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
     let visit = Visit {
         command: "doctor",
@@ -88,11 +100,7 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
 }
 
 /// One session after the other, with progress.
-fn each<T>(
-    paths: &[PathBuf],
-    output: &Output,
-    work: impl Fn(&Path) -> Result<T, Failure>,
-) -> Result<Vec<T>, Failure> {
+fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec<T> {
     let bar = output.count_bar(paths.len() as u64);
     let done = paths
         .iter()
@@ -177,23 +185,42 @@ pub(super) fn run_recover(args: &RecoverArgs, output: &Output) -> Result<(), Fai
     } else {
         args.sessions.clone()
     };
-    let sessions = each(&paths, output, one)?;
-    let recoveries = Recoveries {
+    let mut recoveries = Recoveries {
         command: "recover",
-        sessions,
+        sessions: Vec::new(),
+        not_recovered: Vec::new(),
     };
-    output.result(&recoveries, || {
-        if recoveries.sessions.is_empty() {
-            return "nothing to recover".into();
+    let mut lines = Vec::new();
+    for (path, outcome) in paths.iter().zip(each(&paths, output, one)) {
+        match outcome {
+            Ok(one) => {
+                lines.extend(one.sentences.iter().cloned());
+                recoveries.sessions.push(one);
+            }
+            // With one session there is nothing to go on with, and the error is the answer.
+            Err(failure) if paths.len() == 1 => return Err(failure),
+            Err(failure) => {
+                lines.push(format!("not recovered: {}", failure.sentence()));
+                recoveries.not_recovered.push(NotRecovered {
+                    session: path.clone(),
+                    error: failure.sentence().into(),
+                    exit: failure.code(),
+                });
+            }
         }
-        recoveries
-            .sessions
-            .iter()
-            .map(recovered_text)
-            .collect::<Vec<_>>()
-            .join("\n")
+    }
+    output.result(&recoveries, || match lines.is_empty() {
+        true => "nothing to recover".into(),
+        false => lines.join("\n"),
     });
-    Ok(())
+    let failed = &recoveries.not_recovered;
+    let sentence = || format!("{} of {} were not recovered", failed.len(), paths.len());
+    // A failure weighs more than wrong use.
+    match failed.iter().map(|one| one.exit).min() {
+        None => Ok(()),
+        Some(1) => Err(Failure::failed(sentence())),
+        Some(_) => Err(Failure::usage(sentence())),
+    }
 }
 
 fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
@@ -214,24 +241,14 @@ fn one(path: &Path) -> Result<Recovered, Failure> {
         _ => Failure::failed(err),
     })?;
     Ok(Recovered {
+        sentences: recovery.sentences(path),
         session: path.into(),
         recovered: recovery.folder,
         session_id: recovery.session_id,
         samples: recovery.salvage.samples,
+        raw_bytes: recovery.salvage.raw_bytes,
         missing: recovery.salvage.missing,
     })
-}
-
-fn recovered_text(one: &Recovered) -> String {
-    let mut lines = vec![format!(
-        "{}: {} samples kept in {}",
-        one.session.display(),
-        one.samples,
-        one.recovered.display()
-    )];
-    let missing = one.missing.sentences();
-    lines.extend(missing.iter().map(|sentence| format!("  {sentence}")));
-    lines.join("\n")
 }
 
 /// Recovers what a crash left unfinished in a library, and says so; what fails is only told.

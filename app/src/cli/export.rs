@@ -19,12 +19,15 @@ pub struct ExportArgs {
     #[arg(required = true, value_name = "SESSION")]
     sessions: Vec<PathBuf>,
     /// Kind of table
-    #[arg(long, value_enum, required_unless_present = "lake")]
+    #[arg(long, value_enum, required_unless_present_any = ["lake", "mcap_full"])]
     format: Option<Kind>,
     /// Add the sessions to this lake, a folder of Parquet files that DuckDB, polars and 'palpate fit' read;
     /// it is made if there is none
     #[arg(long, value_name = "FOLDER", conflicts_with_all = ["format", "to", "delimiter", "phase", "cycle", "from", "until", "columns", "decimate", "analysis", "compliance"])]
     lake: Option<PathBuf>,
+    /// Write one message per sample to this new MCAP file instead, for Foxglove and PlotJuggler
+    #[arg(long, value_name = "OUT.mcap", conflicts_with_all = ["format", "lake", "to", "delimiter", "columns", "compliance"])]
+    mcap_full: Option<PathBuf>,
     /// Folder to write to; the file takes the session folder's name
     #[arg(long, value_name = "DIR", default_value = ".")]
     to: PathBuf,
@@ -166,9 +169,13 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
             passing.rows(session, visit)
         })?;
     }
+    let (format, dictionary) = match args.mcap_full {
+        Some(_) => ("mcap", None),
+        None => (args.format().ending(), Some(dictionary_path(&told.path))),
+    };
     let object = serde_json::json!({
-        "command": "export", "file": told.path, "rows": told.rows, "format": args.format().ending(),
-        "dictionary": dictionary_path(&told.path), "is_part": selection.is_part(),
+        "command": "export", "file": told.path, "rows": told.rows, "format": format,
+        "dictionary": dictionary, "is_part": selection.is_part(),
         "every": selection.every.unwrap_or(1), "compliance": told.compliance,
     });
     output.result(&object, || {
@@ -178,8 +185,9 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let every = selection.every.map_or(String::new(), |every| {
             format!(", every {every}th of those selected")
         });
+        let what = args.mcap_full.as_ref().map_or("rows", |_| "messages");
         format!(
-            "{} rows written to {}{every}{corrected}",
+            "{} {what} written to {}{every}{corrected}",
             told.rows,
             told.path.display()
         )
@@ -205,10 +213,12 @@ impl Told {
         feed: Feed,
     ) -> Result<(), Failure> {
         table.notes.iter().for_each(|note| output.note(note));
-        let name = table
-            .selection
-            .file_name(&stem(args, table), args.format().ending());
-        self.path = args.to.join(name);
+        let own_name = || {
+            let stem = stem(args, table);
+            let name = table.selection.file_name(&stem, args.format().ending());
+            args.to.join(name)
+        };
+        self.path = args.mcap_full.clone().unwrap_or_else(own_name);
         let bar = output.share_bar(samples);
         let mut done = 0u64;
         let mut feed = |visit: &mut dyn FnMut(&[_])| {
@@ -218,7 +228,10 @@ impl Told {
                 visit(rows);
             })
         };
-        let written = table.write(args.format(), &self.path, &mut feed);
+        let written = match args.mcap_full {
+            Some(_) => table.write_messages(&self.path, &mut feed),
+            None => table.write(args.format(), &self.path, &mut feed),
+        };
         bar.finish_and_clear();
         self.rows = written.map_err(failure)?;
         Ok(())

@@ -9,7 +9,7 @@ use palpate_protocols::base::FoundBase;
 use palpate_sessions::analyses::{Analysis, inputs_of};
 use palpate_sessions::edits::{Change, Edit, Review, Verdict};
 use palpate_sessions::log::Session;
-use palpate_sessions::{About, EDITS_FILE, Imported};
+use palpate_sessions::{About, EDITS_FILE, HealthSummary, Imported};
 use serde::Serialize;
 use std::path::PathBuf;
 
@@ -48,6 +48,8 @@ struct Info<'a> {
     ending: Option<&'a str>,
     reason: Option<&'a str>,
     time_use_s: Option<&'a [(String, f64)]>,
+    raw_bytes: u64,
+    health: Option<&'a HealthSummary>,
     #[serde(flatten)]
     base: FoundBase,
     verdict: Option<Verdict>,
@@ -91,6 +93,8 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         ending: session.end.as_ref().map(|end| end.outcome.as_str()),
         reason: session.end.as_ref().map(|end| end.reason.as_str()),
         time_use_s: session.end.as_ref().map(|end| end.time_use.as_slice()),
+        raw_bytes: session.beside.raw_bytes,
+        health: Some(&session.beside.health).filter(|health| health.messages > 0),
         base: FoundBase::of_session(&session),
         verdict: edits.verdict().map(|(verdict, _)| verdict),
         verdict_reason: edits.verdict().map(|(_, edit)| edit.reason.as_str()),
@@ -177,6 +181,13 @@ fn text(info: &Info<'_>) -> String {
             .collect();
         lines.push(format!("time use   {}", spent.join(", ")));
     }
+    if info.raw_bytes > 0 {
+        let count = info.raw_bytes;
+        lines.push(format!(
+            "raw        {count} bytes as exchanged with devices"
+        ));
+    }
+    lines.extend(info.health.map(health_text));
     let facts = info.base.facts();
     lines.extend(facts.map(|(name, mm, error)| format!("{name:<10} {mm:.3} ± {error:.3} mm")));
     lines.extend(info.edits.iter().map(edit_text));
@@ -186,6 +197,32 @@ fn text(info: &Info<'_>) -> String {
     lines.extend(info.review.as_ref().map(review_text));
     lines.extend(info.analyses.iter().map(analysis_text));
     lines.extend(info.notes.iter().map(|note| format!("note       {note}")));
+    lines.join("\n")
+}
+
+/// The worst that is told of the computer.
+fn health_text(health: &HealthSummary) -> String {
+    let mut lines = Vec::new();
+    if let Some(worst) = &health.worst {
+        let mut parts = vec![
+            format!("at most {:.1} ms late", worst.lateness_s * 1e3),
+            format!("queue at most {:.1} % full", worst.queue_share * 100.0),
+        ];
+        let sync = worst.sync_s.map(|secs| secs * 1e3);
+        parts.extend(sync.map(|millis| format!("synchronised in at most {millis:.1} ms")));
+        let free = worst.free_bytes.map(|bytes| bytes as f64 / 1e9);
+        parts.extend(free.map(|gigabytes| format!("{gigabytes:.1} GB of disk free at least")));
+        parts.push(format!("{} readings missing", worst.missed_readings));
+        lines.push(format!("computer   {}", parts.join(", ")));
+    }
+    if health.clock_jumps > 0 {
+        lines.push(format!(
+            "clock      the wall clock was set {} times during the run, by up to {:+.1} s; sample times do not depend on it",
+            health.clock_jumps, health.clock_jump_s
+        ));
+    }
+    let events = health.events.iter();
+    lines.extend(events.map(|(at_s, text)| format!("event      at {at_s:.1} s: {text}")));
     lines.join("\n")
 }
 

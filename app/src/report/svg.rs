@@ -166,8 +166,12 @@ impl Panel {
         let y = if low > high {
             [0.0, 1.0]
         } else {
-            // A flat line still needs some height to be drawn in.
-            let height = (high - low).max(1e-6 * high.abs()).max(1e-12);
+            // A flat line still needs some height to be drawn in, and one that the numbers beside it can tell.
+            let height = match high - low {
+                spread if spread > (1e-6 * high.abs()).max(1e-12) => spread,
+                _ if high.abs() > 1e-12 => 0.1 * high.abs(),
+                _ => 1.0,
+            };
             [low - MARGIN * height, high + MARGIN * height]
         };
         Self { place, x, y }
@@ -365,6 +369,18 @@ mod tests {
             ["-0.010", "-0.005", "0.000", "0.005", "0.010"]
         );
         assert!(texts([1.0, 1.0]).is_empty());
+    }
+
+    #[test]
+    fn a_flat_line_has_numbers_that_can_be_read() {
+        for value in [0.0, -0.0, 1e-14, 2.5, -1e6, 3e-4] {
+            let panel = Panel::around([0.0; 4], [0.0, 1.0], &[&[[0.0, value], [1.0, value]]]);
+            let texts = marks(panel.y, 5.0);
+            assert!(texts.len() >= 2, "{value}: {texts:?}");
+            for (_, text) in texts {
+                assert!(text.len() <= 9, "{value}: {text}");
+            }
+        }
     }
 
     #[test]

@@ -101,3 +101,49 @@ fn the_next_run_recovers_what_a_crash_left_in_the_library() {
     // Said once.
     assert!(!stderr(&short_run(at, "third", &[])).contains("recovered"));
 }
+
+/// What cannot be recovered does not keep the others from it; the worst gives the exit code.
+#[test]
+fn several_sessions_are_recovered_one_after_the_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "whole", &[]));
+    let bytes = fs::read(at.join("whole/000.mcap")).unwrap();
+    for name in ["first", "last"] {
+        fs::create_dir(at.join(name)).unwrap();
+        fs::write(at.join(name).join("000.mcap"), &bytes[..bytes.len() / 2]).unwrap();
+    }
+    fs::create_dir(at.join("lost")).unwrap();
+    fs::write(at.join("lost/000.mcap"), &bytes[..60]).unwrap();
+    let all = palpate(at, &["recover", "first", "whole", "nowhere", "last"]);
+    assert_eq!(all.status.code(), Some(2), "{}", stderr(&all));
+    let text = stdout(&all);
+    for part in [
+        "first.recovered",
+        "last.recovered",
+        "whole is whole",
+        "no session at nowhere",
+    ] {
+        assert!(text.contains(part), "{part} in {text}");
+    }
+    assert!(
+        stderr(&all).contains("2 of 4 were not recovered"),
+        "{}",
+        stderr(&all)
+    );
+    // Done before is wrong use, and a session of which nothing is left a failure.
+    let again = palpate(at, &["recover", "first", "lost", "--json"]);
+    assert_eq!(again.status.code(), Some(1), "{}", stderr(&again));
+    let first = stdout(&again).lines().next().unwrap().to_owned();
+    let told: serde_json::Value = serde_json::from_str(&first).unwrap();
+    let exits = told["not_recovered"].as_array().unwrap().iter();
+    let exits: Vec<_> = exits.map(|one| one["exit"].as_u64()).collect();
+    assert_eq!(exits, [Some(2), Some(1)]);
+    let visit = palpate(at, &["doctor", "nowhere", "first", "whole"]);
+    assert_eq!(visit.status.code(), Some(1));
+    let text = stdout(&visit);
+    assert!(
+        text.contains("whole: healthy") && text.contains("first: interrupted"),
+        "{text}"
+    );
+}

@@ -470,7 +470,7 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
         let sent = Command::new("sh").args(["-c", &command]).status();
         assert!(sent.unwrap().success(), "{command}");
     };
-    // As a laptop does whose lid is closed, twice.
+    // Twice. Its clock goes on meanwhile, unlike that of a laptop whose lid is closed, which ends the run.
     for _ in 0..2 {
         std::thread::sleep(std::time::Duration::from_millis(500));
         signal("STOP");
@@ -482,6 +482,10 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     assert!(session.end.is_some());
     let ticks: Vec<u64> = session.rows.iter().map(|row| row.tick).collect();
     assert!(ticks.windows(2).all(|pair| pair[1] == pair[0] + 1));
+    let worst = session.beside.health.worst.expect("a state");
+    assert!(worst.lateness_s > 0.6, "{worst:?}");
+    let info = stdout(&palpate(at, &["info", "slept"]));
+    assert!(info.contains("ms late, queue at most"), "{info}");
     succeeded(&palpate(at, &["replay", "--check", "slept"]));
 }
 

@@ -427,3 +427,57 @@ fn a_thickness_is_told_by_the_run_and_by_its_session() {
         assert!(text.contains(&line), "{text}");
     }
 }
+
+/// One message per sample, selected as tables are, in a new file that is no session.
+#[test]
+fn samples_are_exported_as_messages() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "run", &[]));
+    let session = palpate_sessions::Session::open(&at.join("run")).unwrap();
+    let all = json(&palpate(
+        at,
+        &["export", "run", "--mcap-full", "all.mcap", "--json"],
+    ));
+    assert_eq!(all["rows"].as_u64(), Some(session.rows.len() as u64));
+    assert_eq!(
+        (&all["format"], &all["dictionary"]),
+        (&"mcap".into(), &serde_json::Value::Null)
+    );
+    let hold = ["--phase", "hold", "--decimate", "10", "--json"];
+    let part = [&["export", "run", "--mcap-full", "hold.mcap"][..], &hold].concat();
+    let part = json(&palpate(at, &part));
+    let held = session.rows.iter();
+    let held = held
+        .filter(|row| row.phase == palpate_model::rig::Phase::Hold)
+        .count();
+    assert_eq!(part["rows"].as_u64(), Some(held.div_ceil(10) as u64));
+    for (args, code, word) in [
+        (
+            &["export", "run", "--mcap-full", "all.mcap"][..],
+            2,
+            "exists already",
+        ),
+        (
+            &["export", "run", "--mcap-full", "b.mcap", "--columns", "t_s"],
+            2,
+            "cannot be used with",
+        ),
+        (&["export", "run", "--mcap-full", "none/b.mcap"], 1, "none"),
+        (&["info", "all.mcap"], 2, "not a palpate session"),
+    ] {
+        let refused = palpate(at, args);
+        assert_eq!(
+            refused.status.code(),
+            Some(code),
+            "{args:?}: {}",
+            stderr(&refused)
+        );
+        assert!(
+            stderr(&refused).contains(word),
+            "{args:?}: {}",
+            stderr(&refused)
+        );
+    }
+    assert!(!at.join("b.mcap").exists());
+}

@@ -3,7 +3,9 @@
 use super::script::{FaultKind, Rail, ScriptedFault};
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use crate::sim::{Cause, Random, counts_from_volts, volts_from_counts};
-use palpate_model::rig::{AxisStatus, Fault, HandAction, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{
+    AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription,
+};
 use palpate_model::{Nanos, Volts};
 use std::collections::VecDeque;
 
@@ -338,5 +340,9 @@ impl<R: Rig> Rig for FaultyRig<R> {
 
     fn by_hand(&mut self, action: HandAction) {
         self.inner.by_hand(action);
+    }
+
+    fn take_raw(&mut self) -> Vec<RawBytes> {
+        self.inner.take_raw()
     }
 }

@@ -4,6 +4,8 @@
 
 mod faulty_rig;
 mod script;
+mod wired;
 
 pub use faulty_rig::FaultyRig;
 pub use script::{FaultKind, Rail, ScriptedFault};
+pub use wired::WiredRig;

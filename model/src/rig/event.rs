@@ -1,6 +1,7 @@
 //! What reaches the engine beside samples: acknowledgements and faults.
 
 use super::command::RigCommand;
+use crate::units::Seconds;
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -37,6 +38,11 @@ pub enum Fault {
         /// What the disk said.
         detail: String,
     },
+    /// The computer stood still, as when it is suspended, so that nobody watched the rig.
+    HostPaused {
+        /// For how long.
+        missed: Seconds,
+    },
 }
 
 impl fmt::Display for Fault {
@@ -52,6 +58,10 @@ impl fmt::Display for Fault {
                 )
             }
             Self::LogFailed { detail } => write!(f, "the session log cannot be written ({detail})"),
+            Self::HostPaused { missed } => write!(
+                f,
+                "the computer stood still for {missed:.1} and nobody watched the rig"
+            ),
         }
     }
 }

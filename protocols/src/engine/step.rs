@@ -337,7 +337,9 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
             }
             stop::begin(cx, EndingKind::Abort, reason);
         }
-        Fault::LogFailed { .. } => stop::begin(cx, EndingKind::Abort, reason),
+        Fault::LogFailed { .. } | Fault::HostPaused { .. } => {
+            stop::begin(cx, EndingKind::Abort, reason);
+        }
     }
 }
 

@@ -33,6 +33,9 @@ const KEYS: [&str; 10] = [
     "simulated",
 ];
 
+/// Settings of a simulated rig that a programme may say.
+const SIMULATED: [&str; 3] = ["preconditioning", "rate", "softening"];
+
 /// How many of [`KEYS`] a programme cannot do without, and how each is written.
 const NEEDED: [&str; 4] = [
     "palpate-programme = 1 on its first line",
@@ -109,7 +112,7 @@ impl Reader {
             purpose: self.text(root, "purpose").unwrap_or_default(),
             usual: Labels::default(),
             is_acknowledged: self.flag(root, "acknowledge").unwrap_or_default(),
-            simulated: self.values(root, "simulated"),
+            simulated: self.simulated(root),
             tasks: tasks.read,
             told,
         };
@@ -123,6 +126,21 @@ impl Reader {
             ));
         }
         whole
+    }
+
+    fn simulated(&mut self, root: &Table) -> BTreeMap<String, String> {
+        if let Some(Value::Table(table)) = root.get("simulated").map(|node| &node.value) {
+            for Entry { key, line, .. } in &table.entries {
+                if !SIMULATED.contains(&key.as_str()) {
+                    let [first, second, third] = SIMULATED;
+                    let message = format!(
+                        "[simulated] has no setting '{key}'; it has {first}, {second} and {third}"
+                    );
+                    self.problems.error(*line, message);
+                }
+            }
+        }
+        self.values(root, "simulated")
     }
 
     fn check_language(&mut self, root: &Table) {

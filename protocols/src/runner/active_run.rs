@@ -2,25 +2,24 @@
 
 use super::board::{Board, LogState};
 use super::clock::wall_now;
+use super::live_feed::LiveFeed;
 use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
+use super::watch::HostWatch;
 use crate::engine::{self, Config, Effect, Input, Operator, Outcome, PauseView, State};
 use crate::fidelity::{FidelityMeter, first_verdict};
-use crate::plans::Step;
 use crate::preview::Preview;
 use palpate_model::Nanos;
-use palpate_model::fit::LiveFit;
-use palpate_model::rig::{Fault, HandAction, Phase, Reading, RigCommand};
-use palpate_model::units::{Depth, Seconds};
+use palpate_model::rig::{Fault, HandAction, RawBytes, Reading, RigCommand};
+use palpate_model::units::Seconds;
 use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
+use palpate_sessions::health::Told;
 use palpate_sessions::record::{EndRecord, Entry, EntryKind, Row};
-use palpate_sessions::{LogError, SessionWriter};
+use palpate_sessions::{Health, LogError, SessionWriter};
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
-
-/// Milliseconds between two answers of the live fit.
-const LIVE_FIT_MS: u64 = 500;
+use std::time::Duration;
 
 /// How long a run that nobody watches waits for what paused it to pass: longer than any rest of a protocol.
 const PAUSE_ALONE_MAX: Seconds = Seconds(3600.0);
@@ -42,7 +41,9 @@ pub(super) struct ActiveRun {
     /// What was told of time given up.
     told_given_up: Seconds,
     order: u64,
-    live: LiveFeed,
+    pub(super) live: LiveFeed,
+    /// `None` at full pace, where the computer cannot be late.
+    watch: Option<HostWatch>,
     time_use: BTreeMap<&'static str, u64>,
     /// Why the log failed, and whether the engine knows.
     log_failure: Option<String>,
@@ -58,12 +59,14 @@ impl ActiveRun {
         folder: PathBuf,
         origin: Nanos,
         unattended: (AfterStop, Answers),
+        watch: Option<HostWatch>,
     ) -> Self {
         let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         let fidelity = FidelityMeter::new(&config.plan, &config.rig);
         let board = Board::new(&config, preview.steps, folder.clone());
-        Self {
+        let begin = watch.as_ref().map(HostWatch::begin);
+        let mut run = Self {
             engine: Some(State::new(Arc::new(config))),
             writer: Some(writer),
             folder,
@@ -79,11 +82,16 @@ impl ActiveRun {
             told_given_up: Seconds(0.0),
             order: 0,
             live,
+            watch,
             time_use: BTreeMap::new(),
             log_failure: None,
             is_log_failure_told: false,
             log_error: None,
+        };
+        if let Some(begin) = begin {
+            run.log_health(begin);
         }
+        run
     }
 
     /// The engine's state, except inside [`Self::feed`].
@@ -143,6 +151,11 @@ impl ActiveRun {
             self.log_row(now, &reading, &state);
         }
         let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
+        if let Some(text) = self.live.take_failure() {
+            self.board.note(text.clone(), true);
+            let told = Told::Event { text };
+            self.log_health(Health { now, told });
+        }
         self.engine = Some(state);
         for effect in effects {
             self.log(now, EntryKind::Decision, to_json(&effect));
@@ -204,6 +217,51 @@ impl ActiveRun {
         }
     }
 
+    /// Takes what went over the wires, at times of the rig's clock.
+    pub fn take_raw(&mut self, mut raw: Vec<RawBytes>) {
+        for piece in &mut raw {
+            piece.at = self.session_time(piece.at);
+        }
+        let now = self.board.now();
+        if let Some(writer) = &mut self.writer {
+            let result = writer.push_raw(now, raw);
+            self.note_log(result);
+        }
+    }
+
+    /// Looks at the computer once a turn of the loop, which is `lateness` late at session time `now`.
+    pub fn watch(&mut self, now: Nanos, lateness: Duration, send: &mut dyn FnMut(ToRig)) {
+        let Some(watch) = &mut self.watch else {
+            return;
+        };
+        let (jump, stood) = watch.turn(now, lateness);
+        if watch.is_due() {
+            self.log_state(now);
+        }
+        if let Some(jump) = jump {
+            self.log_health(jump);
+        }
+        if let Some(missed) = stood {
+            let fault = Fault::HostPaused { missed };
+            self.feed(now, Input::Fault(fault), send);
+        }
+    }
+
+    fn log_state(&mut self, now: Nanos) {
+        let missed = self.fidelity.found().dropped;
+        if let (Some(watch), Some(writer)) = (&mut self.watch, &self.writer) {
+            let state = watch.state(now, writer.disk_state(), missed);
+            self.log_health(state);
+        }
+    }
+
+    fn log_health(&mut self, health: Health) {
+        if let Some(writer) = &mut self.writer {
+            let result = writer.push_health(health);
+            self.note_log(result);
+        }
+    }
+
     /// Whether the run is paused, nobody is there, and it cannot go on by itself or has not for too long.
     fn is_left_alone(&mut self, now: Nanos) -> bool {
         let pause = self.engine.as_ref().map(State::pause);
@@ -262,11 +320,17 @@ impl ActiveRun {
 
     fn close(&mut self, outcome: Outcome) {
         self.board.end(&outcome);
+        let now = self.board.now();
+        self.log_state(now);
+        if let Some(end) = self.watch.as_ref().map(|watch| watch.end(now)) {
+            self.log_health(end);
+        }
         let end = EndRecord {
             outcome: outcome.ending.name().into(),
             reason: outcome.reason.clone(),
             samples: self.board.samples(),
             entries: self.order,
+            raw_bytes: 0,
             ended_at: self.board.now(),
             time_use: self
                 .time_use
@@ -345,73 +409,4 @@ fn kind_of(input: &Input) -> EntryKind {
 pub(crate) fn to_json<T: serde::Serialize>(value: &T) -> serde_json::Value {
     serde_json::to_value(value)
         .unwrap_or_else(|err| serde_json::json!({ "unwritable": err.to_string() }))
-}
-
-/// Feeds ramp and hold to the live fit and says when it has a new answer.
-pub(crate) struct LiveFeed {
-    fit: LiveFit,
-    first_tick: Option<u64>,
-    tick_secs: f64,
-    samples: u64,
-    /// Samples between two answers.
-    every: u64,
-    deepest: Depth,
-    cycle: u32,
-}
-
-impl LiveFeed {
-    pub fn new(config: &Config) -> Self {
-        Self {
-            fit: LiveFit::new(deepest(config)),
-            deepest: deepest(config),
-            cycle: 1,
-            first_tick: None,
-            tick_secs: config.rig.tick().0,
-            samples: 0,
-            every: LIVE_FIT_MS * u64::from(config.rig.samples_per_ms()),
-        }
-    }
-
-    /// Takes a sample after the engine did; every half second there is an answer.
-    pub fn push(
-        &mut self,
-        reading: &Reading,
-        state: &State,
-    ) -> Option<palpate_model::fit::LiveEstimate> {
-        let derived = state.derived();
-        if !matches!(state.phase(), Phase::Ramp | Phase::Hold) {
-            return None;
-        }
-        let (depth, force, sigma) = (derived.depth?, derived.force?, derived.force_sigma?);
-        // Every repeat is fitted by itself: the tissue has rested, or it has changed.
-        if state.cycle() != self.cycle {
-            self.cycle = state.cycle();
-            self.fit = LiveFit::new(self.deepest);
-            self.first_tick = None;
-            self.samples = 0;
-        }
-        let first_tick = *self.first_tick.get_or_insert(reading.tick);
-        let t = Seconds((reading.tick - first_tick) as f64 * self.tick_secs);
-        self.fit.push(t, depth, force, sigma);
-        self.samples += 1;
-        if self.samples.is_multiple_of(self.every) {
-            self.fit.estimate()
-        } else {
-            None
-        }
-    }
-}
-
-/// The deepest point of the plan: the scale of the fit's basis.
-fn deepest(config: &Config) -> Depth {
-    let deepest = config
-        .plan
-        .steps
-        .iter()
-        .fold(0.0f64, |deepest, planned| match planned.step {
-            Step::Ramp { depth, .. } => deepest.max(depth.0),
-            Step::LoadTo(load) => deepest.max(load.depth_max.0),
-            _ => deepest,
-        });
-    Depth(if deepest > 0.0 { deepest } else { 1.0 })
 }

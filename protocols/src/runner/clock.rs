@@ -5,8 +5,9 @@ use super::snapshot::Lateness;
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;
+use std::sync::Arc;
 use std::sync::mpsc::{Receiver, RecvTimeoutError, TryRecvError};
-use std::time::{Duration, Instant};
+use std::time::{Duration, Instant, SystemTime};
 
 /// How fast simulated time runs against the wall.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,6 +64,8 @@ pub(super) struct Pacer {
     wall_anchor: Instant,
     time_anchor: Nanos,
     lateness: Lateness,
+    /// How late the last wait was over.
+    behind: Duration,
 }
 
 impl Pacer {
@@ -72,6 +75,7 @@ impl Pacer {
             wall_anchor: Instant::now(),
             time_anchor: now,
             lateness: Lateness::default(),
+            behind: Duration::ZERO,
         }
     }
 
@@ -84,28 +88,26 @@ impl Pacer {
                 Err(TryRecvError::Disconnected) => Wake::Disconnected,
             };
         };
-        let mut due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
-        let elapsed = self.wall_anchor.elapsed();
-        let left = due.saturating_sub(elapsed);
-        if elapsed > due + BEHIND_MAX {
-            self.note_behind(elapsed - due);
-            self.lateness.given_up.0 += (elapsed - due).as_secs_f64();
-            (self.wall_anchor, self.time_anchor) = (Instant::now(), at);
-            due = Duration::ZERO;
-        }
-        match requests.recv_timeout(left) {
+        let due = Duration::from_secs_f64(at.since(self.time_anchor).seconds().0 / factor);
+        let left = due.saturating_sub(self.wall_anchor.elapsed());
+        let wake = match requests.recv_timeout(left) {
             Ok(request) => Wake::Request(request, self.now().min(at)),
-            Err(RecvTimeoutError::Timeout) => {
-                self.note_behind(self.wall_anchor.elapsed().saturating_sub(due));
-                Wake::Time
-            }
+            Err(RecvTimeoutError::Timeout) => Wake::Time,
             Err(RecvTimeoutError::Disconnected) => Wake::Disconnected,
+        };
+        self.behind = self.wall_anchor.elapsed().saturating_sub(due);
+        let behind_s = self.behind.as_secs_f64();
+        self.lateness.worst.0 = self.lateness.worst.0.max(behind_s);
+        if self.behind > BEHIND_MAX {
+            self.lateness.given_up.0 += behind_s;
+            (self.wall_anchor, self.time_anchor) = (Instant::now(), at);
         }
+        wake
     }
 
-    fn note_behind(&mut self, behind: Duration) {
-        let worst = &mut self.lateness.worst.0;
-        *worst = worst.max(behind.as_secs_f64());
+    /// How much later than asked the last wait was over, what happened before it included. Each delay is told once.
+    pub fn behind(&self) -> Duration {
+        self.behind
     }
 
     /// How far session time was behind the wall; `None` at full pace.
@@ -147,10 +149,42 @@ impl Throttle {
     }
 }
 
+/// The computer's clocks at one moment.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct HostTimes {
+    pub wall: SystemTime,
+    /// Since some moment, without the time in which the computer was suspended; nobody can set it.
+    pub awake: Duration,
+    /// Since the same moment, that time included.
+    pub all: Duration,
+}
+
+/// Reads the computer's clocks.
+pub(super) type HostClock = Arc<dyn Fn() -> HostTimes + Send + Sync>;
+
+/// The real ones (clock_gettime(2)). Where the system has no clock that goes on in suspense, none is seen.
+pub(super) fn host_times() -> HostTimes {
+    use rustix::time::{ClockId, clock_gettime};
+    let read = |id| {
+        let time = clock_gettime(id);
+        let secs = u64::try_from(time.tv_sec).unwrap_or(0);
+        Duration::new(secs, u32::try_from(time.tv_nsec).unwrap_or(0))
+    };
+    #[cfg(target_os = "linux")]
+    let all = ClockId::Boottime;
+    #[cfg(not(target_os = "linux"))]
+    let all = ClockId::Monotonic;
+    HostTimes {
+        wall: SystemTime::now(),
+        awake: read(ClockId::Monotonic),
+        all: read(all),
+    }
+}
+
 /// The wall clock, to date what is recorded.
 #[must_use]
-pub fn wall_now() -> std::time::SystemTime {
-    std::time::SystemTime::now()
+pub fn wall_now() -> SystemTime {
+    SystemTime::now()
 }
 
 /// Measures how long something took; decides nothing.

@@ -2,9 +2,10 @@
 //! decide, act, publish.
 
 use super::active_run::{ActiveRun, ToRig};
-use super::clock::{Pacer, Throttle, TimeScale, Wake};
+use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
 use super::snapshot::{RigView, Snapshot};
 use super::start::{Bench, RunRequest, StartError, start};
+use super::watch::HostWatch;
 use crate::engine::{Input, Operator};
 use arc_swap::ArcSwap;
 use palpate_drivers::{Rig, RigEventBody};
@@ -56,7 +57,7 @@ impl Runner {
         wake: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(REQUESTS_MAX);
-        let main_loop = MainLoop::new(rig, scale);
+        let main_loop = MainLoop::new(rig, scale, Arc::new(host_times));
         let snapshot = Arc::new(ArcSwap::from_pointee(main_loop.snapshot(0)));
         let shared = Arc::clone(&snapshot);
         let thread = std::thread::Builder::new()
@@ -114,8 +115,10 @@ impl Drop for Runner {
     }
 }
 
-struct MainLoop {
+pub(super) struct MainLoop {
     rig: Box<dyn Rig>,
+    /// Reads the computer's clocks.
+    clock: HostClock,
     description: Arc<RigDescription>,
     scale: TimeScale,
     now: Nanos,
@@ -124,13 +127,14 @@ struct MainLoop {
     reading: Option<Reading>,
     is_homed: bool,
     link_error: Option<String>,
-    run: Option<ActiveRun>,
+    pub(super) run: Option<ActiveRun>,
     refusal: Option<String>,
 }
 
 impl MainLoop {
-    fn new(rig: Box<dyn Rig>, scale: TimeScale) -> Self {
+    pub(super) fn new(rig: Box<dyn Rig>, scale: TimeScale, clock: HostClock) -> Self {
         Self {
+            clock,
             description: Arc::new(rig.description().clone()),
             rig,
             scale,
@@ -145,7 +149,7 @@ impl MainLoop {
         }
     }
 
-    fn run(
+    pub(super) fn run(
         mut self,
         first: Option<Request>,
         requests: &Receiver<Request>,
@@ -165,6 +169,7 @@ impl MainLoop {
             if let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) {
                 run.keep_lateness(pacer.lateness());
             }
+            self.watch(pacer.behind());
             let is_ending = match wake_up {
                 Wake::Time => {
                     self.advance(target);
@@ -198,6 +203,16 @@ impl MainLoop {
         }
     }
 
+    /// Looks at how the computer keeps up with the run in progress.
+    fn watch(&mut self, lateness: Duration) {
+        let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else {
+            return;
+        };
+        let now = run.session_time(self.now);
+        let rig = &mut self.rig;
+        run.watch(now, lateness, &mut |asked| act(rig.as_mut(), asked));
+    }
+
     fn is_running(&self) -> bool {
         self.run.as_ref().is_some_and(|run| !run.is_over())
     }
@@ -221,7 +236,7 @@ impl MainLoop {
     }
 
     /// Lets time pass until `until`, feeding every event in order and a tick where none came.
-    fn advance(&mut self, until: Nanos) {
+    pub(super) fn advance(&mut self, until: Nanos) {
         while self.now < until {
             let limit = self.next_tick.min(until);
             while let Some(event) = self.rig.next_event(limit) {
@@ -269,15 +284,15 @@ impl MainLoop {
 
     /// One input to the run in progress, if there is one, and its commands to the rig.
     fn feed(&mut self, input: Input) {
+        // Also between runs, so that nothing piles up.
+        let raw = self.rig.take_raw();
         let Some(run) = self.run.as_mut().filter(|run| !run.is_over()) else {
             return;
         };
+        run.take_raw(raw);
         let now = run.session_time(self.now);
         let rig = &mut self.rig;
-        run.feed(now, input, &mut |asked| match asked {
-            ToRig::Command(command) => rig.send(command),
-            ToRig::Hand(action) => rig.by_hand(action),
-        });
+        run.feed(now, input, &mut |asked| act(rig.as_mut(), asked));
         if let Some(state) = run.engine() {
             self.is_homed = state.is_homed();
         }
@@ -307,7 +322,14 @@ impl MainLoop {
         false
     }
 
-    fn start_run(&mut self, request: &RunRequest) -> Result<(), StartError> {
+    /// At full pace nothing is late, and a session must not depend on the computer.
+    fn host_watch(&self) -> Option<HostWatch> {
+        let is_wired = !self.rig.is_virtual();
+        matches!(self.scale, TimeScale::Factor(_))
+            .then(|| HostWatch::new(Arc::clone(&self.clock), is_wired))
+    }
+
+    pub(super) fn start_run(&mut self, request: &RunRequest) -> Result<(), StartError> {
         if self.is_running() {
             return Err(StartError::Refused(
                 "a run is in progress; stop it first".into(),
@@ -318,8 +340,11 @@ impl MainLoop {
             is_virtual: self.rig.is_virtual(),
             is_homed: self.is_homed,
             origin: self.now,
+            watch: self.host_watch(),
         };
-        self.run = Some(start(request, &bench)?);
+        self.run = Some(start(request, bench)?);
+        // What was exchanged before belongs to no run.
+        drop(self.rig.take_raw());
         self.feed(Input::Operator {
             choice: Operator::Start,
         });
@@ -355,7 +380,7 @@ impl MainLoop {
         }
     }
 
-    fn snapshot(&self, sequence: u64) -> Snapshot {
+    pub(super) fn snapshot(&self, sequence: u64) -> Snapshot {
         Snapshot {
             rig: RigView {
                 description: Arc::clone(&self.description),
@@ -367,6 +392,13 @@ impl MainLoop {
             refusal: self.refusal.clone(),
             sequence,
         }
+    }
+}
+
+fn act(rig: &mut dyn Rig, asked: ToRig) {
+    match asked {
+        ToRig::Command(command) => rig.send(command),
+        ToRig::Hand(action) => rig.by_hand(action),
     }
 }
 

@@ -7,13 +7,18 @@
 mod active_run;
 mod board;
 mod clock;
+mod live_feed;
 mod main_loop;
 mod snapshot;
 mod start;
+#[cfg(test)]
+mod tests;
+mod watch;
 
-pub(crate) use active_run::{LiveFeed, to_json};
+pub(crate) use active_run::to_json;
 pub(crate) use board::{Board, LogState};
 pub use clock::{Stopwatch, TimeScale, wall_now};
+pub(crate) use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;
 pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot};

@@ -2,6 +2,7 @@
 
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
+use super::watch::HostWatch;
 use crate::engine::{Config, ENGINE_VERSION};
 use crate::plans::Plan;
 use crate::preview::preview;
@@ -76,10 +77,12 @@ pub(super) struct Bench<'a> {
     pub is_homed: bool,
     /// The rig's clock now: session time zero.
     pub origin: Nanos,
+    /// Watches the computer; `None` at full pace.
+    pub watch: Option<HostWatch>,
 }
 
 /// Checks a request and opens its session.
-pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun, StartError> {
+pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun, StartError> {
     let refused = |reason: String| StartError::Refused(reason);
     let curve = request
         .calibration
@@ -172,5 +175,6 @@ pub(super) fn start(request: &RunRequest, bench: &Bench<'_>) -> Result<ActiveRun
         path,
         bench.origin,
         (request.after_stop, request.answers),
+        bench.watch,
     ))
 }

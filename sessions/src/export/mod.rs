@@ -5,6 +5,7 @@ mod columns;
 mod dictionary;
 mod encode;
 mod harmless;
+mod messages;
 mod parquet;
 mod row_group;
 mod select;

@@ -149,6 +149,8 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         entries,
         end: session.end.take(),
         notes: session.notes,
+        // A lake holds what was measured and decided, not what went over the wires.
+        beside: crate::log::Beside::default(),
     };
     Ok((session, rejection))
 }

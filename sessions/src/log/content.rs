@@ -2,12 +2,25 @@
 
 use super::frames::{Fields, frame_at};
 use super::segment::PROFILE;
+use crate::health::{Health, HealthSummary};
 use crate::manifest::{Manifest, RECORD_VERSION};
+use crate::raw::RawBlock;
 use crate::record::{Block, EndRecord, Entry, EntryKind, EntryMessage};
 use crate::schema::Channel;
 use mcap::records::op;
 use palpate_model::Nanos;
 use std::collections::BTreeMap;
+
+/// A verified part of a session, as it passes by.
+#[derive(Clone, Copy, Debug)]
+pub enum Part<'a> {
+    /// Samples.
+    Samples(&'a Block),
+    /// Bytes as exchanged with a device.
+    Raw(&'a RawBlock<'a>),
+    /// How the computer kept up.
+    Health(&'a Health),
+}
 
 /// Why a log is not for this program, however whole it is.
 pub(crate) enum Refusal {
@@ -26,8 +39,8 @@ pub(crate) struct Left {
 
 /// What has been read so far, over all segments.
 pub(crate) struct Content<'v> {
-    /// Gets every block of samples once it is verified.
-    visit: &'v mut dyn FnMut(&Block),
+    /// Gets every part once it is verified.
+    visit: &'v mut dyn FnMut(Part<'_>),
     block: Block,
     /// Whether a raw half waits for its derived one.
     has_raw: bool,
@@ -40,6 +53,12 @@ pub(crate) struct Content<'v> {
     sequences: [Option<u32>; Channel::ALL.len()],
     /// Number of the first sample; `None` until a lone later segment says.
     first_sample: Option<u64>,
+    /// Raw bytes visited, and missing ones before the newest.
+    pub raw_bytes: u64,
+    /// Number of the first of them, as of the first sample.
+    first_raw_byte: Option<u64>,
+    /// What is told of the computer.
+    pub health: HealthSummary,
     /// Whether the segment being read has shown its manifest.
     pub has_manifest: bool,
     /// Whether what came before the first segment read is missing.
@@ -54,11 +73,13 @@ pub(crate) struct Content<'v> {
     allows_gaps: bool,
     /// Messages with entries that are missing.
     pub lost_entries: u64,
+    /// Raw bytes that are missing between those that are there.
+    pub lost_raw_bytes: u64,
 }
 
 impl<'v> Content<'v> {
     /// Nothing read yet. A file that is read alone may be a later segment.
-    pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(&Block)) -> Self {
+    pub fn new(is_alone: bool, visit: &'v mut dyn FnMut(Part<'_>)) -> Self {
         let mut sequences = [Some(0); Channel::ALL.len()];
         if is_alone {
             sequences[Channel::Manifest as usize] = None;
@@ -72,6 +93,9 @@ impl<'v> Content<'v> {
             topics: BTreeMap::new(),
             sequences,
             first_sample: Some(0),
+            raw_bytes: 0,
+            first_raw_byte: Some(0),
+            health: HealthSummary::default(),
             has_manifest: false,
             is_later_part: false,
             is_rewrite: false,
@@ -81,6 +105,7 @@ impl<'v> Content<'v> {
             end: None,
             allows_gaps: false,
             lost_entries: 0,
+            lost_raw_bytes: 0,
         }
     }
 
@@ -120,6 +145,8 @@ impl<'v> Content<'v> {
         self.sequences = [None; Channel::ALL.len()];
         self.first_sample = None;
         self.samples = 0;
+        self.first_raw_byte = None;
+        self.raw_bytes = 0;
         self.has_raw = false;
     }
 
@@ -220,6 +247,8 @@ impl<'v> Content<'v> {
             Channel::Input => self.take_entry(EntryKind::Input, data),
             Channel::Decision => self.take_entry(EntryKind::Decision, data),
             Channel::Fit => self.take_entry(EntryKind::Fit, data),
+            Channel::Raw => self.take_raw_bytes(data),
+            Channel::Health => self.take_health(data),
             Channel::End => {
                 let end = serde_json::from_slice(data)
                     .map_err(|err| format!("the end record is unreadable: {err}"))?;
@@ -257,6 +286,7 @@ impl<'v> Content<'v> {
                 self.sequences = [None; Channel::ALL.len()];
                 self.sequences[Channel::Manifest as usize] = Some(sequence.wrapping_add(1));
                 self.first_sample = None;
+                self.first_raw_byte = None;
             }
             None => {}
         }
@@ -294,7 +324,33 @@ impl<'v> Content<'v> {
         self.block.take_derived(data)?;
         self.samples += self.block.len() as u64;
         self.last_sample = self.block.last_time().unwrap_or(self.last_sample);
-        (self.visit)(&self.block);
+        (self.visit)(Part::Samples(&self.block));
+        Ok(())
+    }
+
+    fn take_raw_bytes(&mut self, data: &[u8]) -> Result<(), String> {
+        let block = RawBlock::read(data)?;
+        let number = block.first_byte();
+        let first = *self.first_raw_byte.get_or_insert(number);
+        let expected = first.saturating_add(self.raw_bytes);
+        if number > expected && self.allows_gaps {
+            self.lost_raw_bytes += number - expected;
+            self.raw_bytes = number - first;
+        } else if number != expected {
+            return Err(format!(
+                "raw byte {expected} is missing: the next block begins with byte {number}"
+            ));
+        }
+        self.raw_bytes = self.raw_bytes.saturating_add(block.len() as u64);
+        (self.visit)(Part::Raw(&block));
+        Ok(())
+    }
+
+    fn take_health(&mut self, data: &[u8]) -> Result<(), String> {
+        let health: Health = serde_json::from_slice(data)
+            .map_err(|err| format!("a message of health is unreadable: {err}"))?;
+        self.health.take(&health);
+        (self.visit)(Part::Health(&health));
         Ok(())
     }
 
@@ -331,6 +387,16 @@ impl<'v> Content<'v> {
         let samples = first.saturating_add(self.samples);
         let entries = self.entries.len() as u64;
         let has_entries = end.entries == entries || (self.is_later_part && end.entries >= entries);
+        let before = self
+            .first_raw_byte
+            .unwrap_or_else(|| end.raw_bytes.saturating_sub(self.raw_bytes));
+        let raw_bytes = before.saturating_add(self.raw_bytes);
+        if end.raw_bytes != raw_bytes {
+            let recorded = end.raw_bytes;
+            return Err(format!(
+                "{recorded} raw bytes were recorded but {raw_bytes} are there"
+            ));
+        }
         if !self.has_raw && end.samples == samples && has_entries {
             return Ok(());
         }

@@ -12,8 +12,9 @@ pub mod thread;
 pub(crate) mod walk;
 pub mod writer;
 
-pub use reader::{Outline, ReadError, Session};
+pub use content::Part;
+pub use reader::{Beside, Outline, ReadError, Session};
 pub use sink::{FileSink, FolderSegments, SegmentSource, Sink};
 pub use summary::Summary;
 pub use thread::{Notice, Pace, SessionWriter};
-pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter};
+pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, Parts};

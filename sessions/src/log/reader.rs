@@ -7,11 +7,12 @@
 //! The segments of a long recording are read one after the other as if they were one file: sample
 //! numbers, message numbers and entries must go on where the segment before stopped.
 
-use super::content::{Content, Refusal};
+use super::content::{Content, Part, Refusal};
 use super::frames::ChunkReader;
 use super::source::Source;
 use super::walk::walk;
 use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
+use crate::health::HealthSummary;
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{Block, EndRecord, Entry, Row};
 use palpate_model::Nanos;
@@ -87,6 +88,17 @@ pub struct Session {
     pub end: Option<EndRecord>,
     /// What a user of the data must know, one sentence each.
     pub notes: Vec<String>,
+    /// What is recorded beside samples and entries.
+    pub beside: Beside,
+}
+
+/// What a log holds beside samples and entries, counted and summed up.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Beside {
+    /// Bytes as exchanged with devices; [`Session::scan_parts`] hands them out.
+    pub raw_bytes: u64,
+    /// How the computer kept up.
+    pub health: HealthSummary,
 }
 
 /// A recorded session without its samples.
@@ -104,6 +116,8 @@ pub struct Outline {
     pub end: Option<EndRecord>,
     /// What a user of the data must know, one sentence each.
     pub notes: Vec<String>,
+    /// What is recorded beside samples and entries.
+    pub beside: Beside,
 }
 
 impl Session {
@@ -122,6 +136,7 @@ impl Session {
             entries: outline.entries,
             end: outline.end,
             notes: outline.notes,
+            beside: outline.beside,
         })
     }
 
@@ -141,6 +156,15 @@ impl Session {
     /// Goes through the samples of a session block by block, so that no more than one block is in
     /// memory. Nothing of it counts before this has returned without an error.
     pub fn scan(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Outline, ReadError> {
+        Self::scan_parts(path, &mut |part| {
+            if let Part::Samples(block) = part {
+                visit(block);
+            }
+        })
+    }
+
+    /// As [`scan`](Self::scan), with raw bytes and health too, in the order in which they were written.
+    pub fn scan_parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Outline, ReadError> {
         Reader::new(path, visit)?.read()
     }
 
@@ -234,7 +258,7 @@ struct Reader<'v> {
 }
 
 impl<'v> Reader<'v> {
-    fn new(path: &Path, visit: &'v mut dyn FnMut(&Block)) -> Result<Self, ReadError> {
+    fn new(path: &Path, visit: &'v mut dyn FnMut(Part<'_>)) -> Result<Self, ReadError> {
         let files = find_files(path)?;
         let is_folder = path.is_dir();
         let first = &files[0];
@@ -346,6 +370,10 @@ impl<'v> Reader<'v> {
             entries,
             end,
             notes,
+            beside: Beside {
+                raw_bytes: self.content.raw_bytes,
+                health: self.content.health,
+            },
         })
     }
 

@@ -2,14 +2,15 @@
 
 use super::sink::Sink;
 use super::thread::{Batch, Notice, Shared};
-use super::writer::{LogError, LogWriter};
-use crate::record::{Entry, Row};
+use super::writer::{LogError, LogWriter, Parts};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
 
 /// Samples that are kept in memory at most to be written again if the disk fails: 23 MB.
 const ROWS_SINCE_SYNC_MAX: usize = 1 << 18;
+/// Raw bytes that are kept for the same.
+const RAW_SINCE_SYNC_MAX: usize = 8 << 20;
 /// New files begun at most because the disk failed. A disk that fails more often will not do.
 const MOVES_MAX: u32 = 4;
 /// Wall time from the beginning of a synchronisation with the disk to when the next is due. It begins when the
@@ -68,12 +69,14 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
                 Err(RecvTimeoutError::Disconnected) => return self.sync(),
             }
             let rows: usize = self.since_sync.iter().map(|batch| batch.rows.len()).sum();
+            let raw: usize = self.since_sync.iter().map(|batch| batch.raw_bytes).sum();
+            let is_much = rows >= ROWS_SINCE_SYNC_MAX || raw >= RAW_SINCE_SYNC_MAX;
             let is_due = self.patience().is_zero();
             if has_event {
                 // One sync does for all events that wait.
                 carried = receiver.try_recv().ok();
             }
-            if is_due || rows >= ROWS_SINCE_SYNC_MAX || (has_event && carried.is_none()) {
+            if is_due || is_much || (has_event && carried.is_none()) {
                 self.sync()?;
                 has_event = false;
             }
@@ -92,11 +95,13 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
     /// Writes a batch; whether it was the last.
     fn write(&mut self, mut batch: Batch) -> Result<bool, LogError> {
         let end = batch.end.take();
-        let (span, through) = (batch.span, batch.through);
-        let outcome = self.log.append(&batch.rows, &batch.entries);
+        let (span, through, raw_bytes) = (batch.span, batch.through, batch.raw_bytes);
+        let outcome = self.log.append_parts(&batch.parts());
         self.since_sync.push(batch);
         let outcome = outcome.or_else(|err| self.go_on_elsewhere(&err));
         self.shared.queued_ns.fetch_sub(span.0, Ordering::AcqRel);
+        let queued_raw = &self.shared.queued_raw;
+        queued_raw.fetch_sub(raw_bytes as u64, Ordering::AcqRel);
         outcome?;
         if let Some(end) = &end {
             while let Err(err) = self.log.finish(end.clone()) {
@@ -116,6 +121,8 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
                 self.go_on_elsewhere(&err)?;
             }
             self.since_sync.clear();
+            let took = (self.clock)().duration_since(began);
+            self.shared.note_sync(took, self.log.free_bytes());
         }
         self.last_sync = began;
         Ok(())
@@ -126,11 +133,7 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         let LogError::Disk { reason, .. } = err else {
             return Err(err.clone());
         };
-        let again: Vec<(&[Row], &[Entry])> = self
-            .since_sync
-            .iter()
-            .map(|batch| (&*batch.rows, &*batch.entries))
-            .collect();
+        let again: Vec<Parts<'_>> = self.since_sync.iter().map(Batch::parts).collect();
         let began = (self.clock)();
         let (path, is_elsewhere) = loop {
             if self.moves >= MOVES_MAX {
@@ -165,6 +168,7 @@ mod tests {
     use super::*;
     use crate::log::thread::BATCH;
     use crate::manifest::Manifest;
+    use crate::record::Row;
     use palpate_model::Nanos;
     use std::io;
     use std::sync::atomic::AtomicU64;

@@ -139,6 +139,11 @@ impl<S: Sink> Segment<S> {
         self.disk(outcome)
     }
 
+    /// Free room on the sink's disk in bytes, if that is known.
+    pub fn free_bytes(&self) -> Option<u64> {
+        self.sink.free_bytes()
+    }
+
     /// Writes the index and makes the whole file durable.
     pub fn finish(&mut self) -> Result<(), LogError> {
         self.container.finish().map_err(encode_error("index"))?;

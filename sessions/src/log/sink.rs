@@ -12,6 +12,11 @@ pub trait Sink: Send {
 
     /// Returns once everything appended survives a power cut.
     fn sync(&mut self) -> io::Result<()>;
+
+    /// Free room on its disk in bytes, if that is known. May wait for the disk.
+    fn free_bytes(&self) -> Option<u64> {
+        None
+    }
 }
 
 /// Makes the files of a session that is written in segments.
@@ -128,5 +133,10 @@ impl Sink for FileSink {
             self.folder = None;
         }
         Ok(())
+    }
+
+    fn free_bytes(&self) -> Option<u64> {
+        let disk = rustix::fs::fstatvfs(&self.file).ok()?;
+        Some(disk.f_bavail.saturating_mul(disk.f_frsize))
     }
 }

@@ -1,11 +1,11 @@
 //! What a session is, from its first and its last chunk alone: the same effort for any length.
 
-use super::content::Content;
+use super::content::{Content, Part};
 use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
 use super::reader::{NOT_BEGUN, ReadError, check_beginning, damaged, find_files, refused};
 use super::source::Source;
 use crate::manifest::Manifest;
-use crate::record::{Block, EndRecord};
+use crate::record::EndRecord;
 use mcap::records::op;
 use palpate_model::Nanos;
 use std::io;
@@ -82,9 +82,11 @@ fn read_ends(path: &Path, chunks: &mut ChunkReader) -> Result<(Manifest, Ends), 
     let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
     check_beginning(path, &source, is_ours)?;
     let (mut samples, mut last) = (0, Nanos::ZERO);
-    let mut visit = |block: &Block| {
-        samples = block.first_sample() + block.len() as u64;
-        last = block.last_time().unwrap_or(last);
+    let mut visit = |part: Part<'_>| {
+        if let Part::Samples(block) = part {
+            samples = block.first_sample() + block.len() as u64;
+            last = block.last_time().unwrap_or(last);
+        }
     };
     let mut content = Content::new(true, &mut visit);
     let mut bytes = Vec::new();

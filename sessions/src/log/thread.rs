@@ -7,16 +7,19 @@
 
 use super::scribe::{monotonic_now, write_batches};
 use super::sink::{FolderSegments, SegmentSource, Sink};
-use super::writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, check_order};
+use super::writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, Parts, check_order};
 use crate::folder::SessionFolder;
+use crate::health::{Health, MachineState};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, EntryKind, Row};
 use palpate_model::Nanos;
+use palpate_model::rig::RawBytes;
 use std::path::Path;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::mpsc::{SyncSender, TrySendError, sync_channel};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::thread::JoinHandle;
+use std::time::Duration;
 
 /// Session time in one batch.
 pub(super) const BATCH: Nanos = Nanos::from_millis(100);
@@ -27,6 +30,11 @@ const QUEUE_SECONDS: u64 = 30;
 const QUEUE: Nanos = Nanos::from_millis(QUEUE_SECONDS * 1000);
 /// Batches that fit in it: more than 30 s of batches, which slow samples make shorter.
 const QUEUE_BATCHES: usize = 4096;
+/// Raw bytes in one batch, however little time they take: a chunk of the log holds four times as many.
+const BATCH_RAW_MAX: usize = 1 << 20;
+/// Raw bytes that fit in the queue at real pace: 30 s at 1 MB/s, more than a rig on a serial line or a controller
+/// on Ethernet exchanges.
+const QUEUE_RAW: u64 = 32 << 20;
 /// How session time passes against wall time.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Pace {
@@ -40,6 +48,10 @@ pub enum Pace {
 pub(super) struct Batch {
     pub rows: Vec<Row>,
     pub entries: Vec<Entry>,
+    pub raw: Vec<RawBytes>,
+    /// Bytes in `raw`.
+    pub raw_bytes: usize,
+    pub health: Vec<Health>,
     /// Newest time in the batch.
     pub through: Nanos,
     /// Session time it covers, a pause before it not counted.
@@ -47,6 +59,17 @@ pub(super) struct Batch {
     pub end: Option<EndRecord>,
     /// Whether it holds an event, which must survive a power cut at once.
     pub has_event: bool,
+}
+
+impl Batch {
+    pub fn parts(&self) -> Parts<'_> {
+        Parts {
+            rows: &self.rows,
+            entries: &self.entries,
+            raw: &self.raw,
+            health: &self.health,
+        }
+    }
 }
 
 /// What became of the log while it was written, for the screen.
@@ -104,6 +127,12 @@ pub(super) struct Shared {
     pub saved_through_ns: AtomicU64,
     /// Session time in batches that are not written yet.
     pub queued_ns: AtomicU64,
+    /// Raw bytes in them.
+    pub queued_raw: AtomicU64,
+    /// The longest synchronisation since it was last asked for, in ns; 0 if there was none.
+    sync_ns: AtomicU64,
+    /// Free room on the disk at the last one, and one more, in bytes; 0 while it is not known.
+    free_bytes: AtomicU64,
     moves: Mutex<Vec<Notice>>,
 }
 
@@ -118,6 +147,21 @@ impl Shared {
     pub fn tell(&self, news: Notice) {
         let mut moves = self.moves.lock().unwrap_or_else(PoisonError::into_inner);
         moves.push(news);
+    }
+
+    /// How long a synchronisation took, and what room there is after it.
+    pub fn note_sync(&self, took: Duration, free_bytes: Option<u64>) {
+        let nanos = u64::try_from(took.as_nanos()).unwrap_or(u64::MAX);
+        self.sync_ns.fetch_max(nanos.max(1), Ordering::AcqRel);
+        let free = free_bytes.map_or(0, |free| free.saturating_add(1));
+        self.free_bytes.store(free, Ordering::Release);
+    }
+
+    /// Share of the queue that is in use.
+    fn queue_share(&self) -> f64 {
+        let time = self.queued_ns.load(Ordering::Acquire) as f64 / QUEUE.0 as f64;
+        let raw = self.queued_raw.load(Ordering::Acquire) as f64 / QUEUE_RAW as f64;
+        time.max(raw)
     }
 
     fn take_moves(&self) -> Vec<Notice> {
@@ -266,6 +310,39 @@ impl SessionWriter {
         Ok(())
     }
 
+    /// Records bytes as exchanged with devices, each at its session time; `now` is that of the newest input.
+    pub fn push_raw(&mut self, now: Nanos, raw: Vec<RawBytes>) -> Result<(), LogError> {
+        for piece in raw {
+            self.shared.check()?;
+            self.make_room(now)?;
+            self.batch.raw_bytes += piece.bytes.len();
+            self.batch.raw.push(piece);
+        }
+        Ok(())
+    }
+
+    /// Records how the computer keeps up.
+    pub fn push_health(&mut self, health: Health) -> Result<(), LogError> {
+        self.shared.check()?;
+        self.make_room(health.now)?;
+        self.batch.health.push(health);
+        Ok(())
+    }
+
+    /// How the disk keeps up: the log's part of a [`MachineState`], the longest synchronisation since this was
+    /// last asked.
+    #[must_use]
+    pub fn disk_state(&self) -> MachineState {
+        let sync_ns = self.shared.sync_ns.swap(0, Ordering::AcqRel);
+        let free = self.shared.free_bytes.load(Ordering::Acquire);
+        MachineState {
+            queue_share: self.shared.queue_share(),
+            sync_s: (sync_ns > 0).then(|| Nanos(sync_ns).seconds().0),
+            free_bytes: free.checked_sub(1),
+            ..MachineState::default()
+        }
+    }
+
     /// What becomes of the log after it was last asked, also once the writer is closed.
     #[must_use]
     pub fn news(&self) -> News {
@@ -275,10 +352,10 @@ impl SessionWriter {
     /// News of the log since this was last asked.
     pub fn take_notices(&mut self) -> Vec<Notice> {
         let mut news = self.shared.take_moves();
-        let queued = self.shared.queued_ns.load(Ordering::Acquire);
+        let share = self.shared.queue_share();
         let slow = match self.pace {
-            Pace::Real if queued >= QUEUE.0 / 10 * 9 => Some(Notice::TooSlow),
-            Pace::Real if queued >= QUEUE.0 / 2 => Some(Notice::Slow),
+            Pace::Real if share >= 0.9 => Some(Notice::TooSlow),
+            Pace::Real if share >= 0.5 => Some(Notice::Slow),
             _ => None,
         };
         if slow.is_some() && slow != self.told_slow && self.told_slow != Some(Notice::TooSlow) {
@@ -326,7 +403,11 @@ impl SessionWriter {
         let is_old = |start| now.since(start).0 >= BATCH.0;
         // With the wall clock, what belongs to one moment goes to the disk as soon as it is over.
         let is_event = self.batch.has_event && self.pace == Pace::Real && now > self.batch.through;
-        self.batch_start.is_some_and(is_old) || is_event || self.batch.rows.len() >= BATCH_ROWS_MAX
+        self.batch_start.is_some_and(is_old) || is_event || self.is_full()
+    }
+
+    fn is_full(&self) -> bool {
+        self.batch.rows.len() >= BATCH_ROWS_MAX || self.batch.raw_bytes >= BATCH_RAW_MAX
     }
 
     fn make_room(&mut self, now: Nanos) -> Result<(), LogError> {
@@ -339,7 +420,7 @@ impl SessionWriter {
     }
 
     fn hand_over(&mut self) -> Result<(), LogError> {
-        if self.batch.rows.is_empty() && self.batch.entries.is_empty() {
+        if self.batch.parts().is_empty() {
             self.batch_start = None;
             return Ok(());
         }
@@ -366,6 +447,8 @@ impl SessionWriter {
         self.shared
             .queued_ns
             .fetch_add(batch.span.0, Ordering::AcqRel);
+        let raw = batch.raw_bytes as u64;
+        self.shared.queued_raw.fetch_add(raw, Ordering::AcqRel);
         // The thread only goes away after it has failed, and then has said why.
         sender
             .send(batch)
@@ -378,7 +461,9 @@ impl SessionWriter {
         };
         let span = batch.span.0;
         let queued = self.shared.queued_ns.fetch_add(span, Ordering::AcqRel);
-        let outcome = if queued + span > QUEUE.0 {
+        let raw = batch.raw_bytes as u64;
+        let queued_raw = self.shared.queued_raw.fetch_add(raw, Ordering::AcqRel);
+        let outcome = if queued + span > QUEUE.0 || queued_raw + raw > QUEUE_RAW {
             Err(TrySendError::Full(batch))
         } else {
             sender.try_send(batch)
@@ -412,7 +497,7 @@ impl SessionWriter {
 
 impl Drop for SessionWriter {
     fn drop(&mut self) {
-        let has_rest = !self.batch.rows.is_empty() || !self.batch.entries.is_empty();
+        let has_rest = !self.batch.parts().is_empty();
         if self.thread.is_some() && has_rest && self.shared.check().is_ok() {
             let batch = std::mem::take(&mut self.batch);
             // There is nobody left to tell: the failure shows as a missing end record.

@@ -12,11 +12,14 @@
 
 use super::segment::Segment;
 use super::sink::{SegmentSource, Sink};
+use crate::health::Health;
 use crate::manifest::Manifest;
+use crate::raw::raw_blocks;
 use crate::record::{EndRecord, Entry, EntryMessageRef, Row, View, block_slices, blocks_from_rows};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use palpate_model::Nanos;
+use palpate_model::rig::RawBytes;
 use prost::Message;
 use std::io;
 use thiserror::Error;
@@ -96,6 +99,28 @@ impl LogError {
 /// of a log at 1 kHz.
 const VIEW_EVERY: Nanos = Nanos::from_millis(20);
 
+/// What is written together.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Parts<'a> {
+    /// Samples.
+    pub rows: &'a [Row],
+    /// Entries, by strictly increasing `order`.
+    pub entries: &'a [Entry],
+    /// Bytes as exchanged with devices, at session times.
+    pub raw: &'a [RawBytes],
+    /// How the computer keeps up.
+    pub health: &'a [Health],
+}
+
+impl Parts<'_> {
+    /// Whether there is nothing.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        let has_more = !self.raw.is_empty() || !self.health.is_empty();
+        self.rows.is_empty() && self.entries.is_empty() && !has_more
+    }
+}
+
 /// How far a log has come: what a segment that is written again begins with.
 #[derive(Clone, Default)]
 struct Counters {
@@ -103,6 +128,7 @@ struct Counters {
     controller_ns: u64,
     samples: u64,
     entries: u64,
+    raw_bytes: u64,
     last_order: Option<u64>,
     /// Session time from which the next sample is shown in the thinned channel.
     next_view: Nanos,
@@ -219,18 +245,33 @@ impl<S: Sink> LogWriter<S> {
     ///
     /// Entries are JSON and must come in strictly increasing `order`.
     pub fn append(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
+        self.append_parts(&Parts {
+            rows,
+            entries,
+            ..Parts::default()
+        })
+    }
+
+    /// As [`append`](Self::append), for everything that a log holds.
+    pub fn append_parts(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
         self.check_alive()?;
-        self.check_input(rows, entries)?;
-        if !rows.is_empty() || !entries.is_empty() {
+        self.check_input(parts)?;
+        if !parts.is_empty() {
             self.rotate_if_full()?;
         }
-        self.put_batch(rows, entries)?;
+        self.put_batch(parts)?;
         self.flush()
     }
 
-    fn put_batch(&mut self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
-        self.batches += u32::from(!rows.is_empty() || !entries.is_empty());
-        for slice in block_slices(rows) {
+    fn put_batch(&mut self, parts: &Parts<'_>) -> Result<(), LogError> {
+        self.batches += u32::from(!parts.is_empty());
+        // What was exchanged stands before what was made of it.
+        for block in raw_blocks(self.at.raw_bytes, parts.raw) {
+            let at = Nanos(block.at_delta_ns.first().map_or(0, |at| *at as u64));
+            self.put(Channel::Raw, at, &block.encode_to_vec())?;
+            self.at.raw_bytes += block.data.len() as u64;
+        }
+        for slice in block_slices(parts.rows) {
             let Some(last) = slice.last() else { continue };
             let (daq, derived) = blocks_from_rows(self.at.samples, slice);
             self.at.controller_ns = match self.tick_nanos {
@@ -242,11 +283,15 @@ impl<S: Sink> LogWriter<S> {
             self.put_view(slice)?;
             self.at.samples += slice.len() as u64;
         }
-        for entry in entries {
+        for entry in parts.entries {
             let json = entry_json(entry)?;
             self.put(Channel::of_entry(entry.kind), entry.now, &json)?;
             self.at.entries += 1;
             self.at.last_order = Some(entry.order);
+        }
+        for health in parts.health {
+            let json = readable_json("message of health", health)?;
+            self.put(Channel::Health, health.now, &json)?;
         }
         Ok(())
     }
@@ -266,10 +311,7 @@ impl<S: Sink> LogWriter<S> {
     ///
     /// When this returns, all of it survives a power cut. Returns the new segment's path, and
     /// whether it is in the other place.
-    pub fn write_again(
-        &mut self,
-        since_sync: &[(&[Row], &[Entry])],
-    ) -> Result<(String, bool), LogError> {
+    pub fn write_again(&mut self, since_sync: &[Parts<'_>]) -> Result<(String, bool), LogError> {
         let Some(cause) = self.failure.take() else {
             return Err(LogError::Closed);
         };
@@ -286,7 +328,7 @@ impl<S: Sink> LogWriter<S> {
     fn try_write_again(
         &mut self,
         cause: &LogError,
-        since_sync: &[(&[Row], &[Entry])],
+        since_sync: &[Parts<'_>],
         is_elsewhere: bool,
     ) -> Result<String, LogError> {
         let Some(rotation) = &mut self.rotation else {
@@ -319,8 +361,8 @@ impl<S: Sink> LogWriter<S> {
             Nanos::ZERO,
             rewrite.to_string().as_bytes(),
         )?;
-        for (rows, entries) in since_sync {
-            self.put_batch(rows, entries)?;
+        for parts in since_sync {
+            self.put_batch(parts)?;
         }
         self.flush()?;
         self.sync()?;
@@ -348,7 +390,7 @@ impl<S: Sink> LogWriter<S> {
 
     /// Writes the end record and the index and makes them durable.
     ///
-    /// `samples` and `entries` of the record are replaced by what was really written.
+    /// `samples`, `entries` and `raw_bytes` of the record are replaced by what was really written.
     pub fn finish(&mut self, end: EndRecord) -> Result<(), LogError> {
         self.check_alive()?;
         if let Some((name, _)) = end.time_use.iter().find(|(_, secs)| !secs.is_finite()) {
@@ -359,12 +401,19 @@ impl<S: Sink> LogWriter<S> {
         let end = EndRecord {
             samples: self.at.samples,
             entries: self.at.entries,
+            raw_bytes: self.at.raw_bytes,
             ..end
         };
         let json = readable_json("end record", &end)?;
         self.put(Channel::End, end.ended_at, &json)?;
         let outcome = self.segment.finish();
         self.noted(outcome)
+    }
+
+    /// Free room on the log's disk in bytes, if that is known.
+    #[must_use]
+    pub fn free_bytes(&self) -> Option<u64> {
+        self.segment.free_bytes()
     }
 
     /// Samples written so far.
@@ -378,10 +427,10 @@ impl<S: Sink> LogWriter<S> {
     }
 
     /// Refuses what a reader would refuse, before any of it is written.
-    fn check_input(&self, rows: &[Row], entries: &[Entry]) -> Result<(), LogError> {
-        check_rows(rows)?;
+    fn check_input(&self, parts: &Parts<'_>) -> Result<(), LogError> {
+        check_rows(parts.rows)?;
         let mut previous = self.at.last_order;
-        for entry in entries {
+        for entry in parts.entries {
             check_order(entry.order, previous)?;
             previous = Some(entry.order);
         }

@@ -12,6 +12,7 @@ pub use doctor::{Health, Patient, examine, examine_library, recover_library};
 pub use salvage::{Salvage, salvage};
 pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder};
 
+use crate::record::is_zero;
 use serde::{Deserialize, Serialize};
 
 /// Samples that are not there any more.
@@ -45,6 +46,9 @@ pub struct Missing {
     pub gaps: Vec<Gap>,
     /// Inputs, decisions and fits that are known to be missing.
     pub entries: u64,
+    /// Raw bytes of devices that are known to be missing.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub raw_bytes: u64,
     /// Whether the end is missing: what came after the last sample is not known.
     pub is_end_lost: bool,
     /// The damage itself.
@@ -55,7 +59,8 @@ impl Missing {
     /// Whether something is known to be missing, the end apart.
     #[must_use]
     pub fn is_lossy(&self) -> bool {
-        !self.gaps.is_empty() || self.entries > 0 || !self.wounds.is_empty()
+        let has_gaps = !self.gaps.is_empty() || self.entries > 0 || self.raw_bytes > 0;
+        has_gaps || !self.wounds.is_empty()
     }
 
     /// One sentence for every loss.
@@ -76,6 +81,10 @@ impl Missing {
         if self.entries > 0 {
             let entries = self.entries;
             told.push(format!("{entries} inputs, decisions or fits are missing"));
+        }
+        if self.raw_bytes > 0 {
+            let raw_bytes = self.raw_bytes;
+            told.push(format!("{raw_bytes} raw bytes of devices are missing"));
         }
         for Wound {
             file,

@@ -1,7 +1,7 @@
 //! Goes through a session's files and keeps everything that is whole.
 
 use super::{Gap, Missing, Wound};
-use crate::log::content::Content;
+use crate::log::content::{Content, Part};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
 use crate::log::reader::{NOT_BEGUN, check_beginning, damaged, find_files, name_of, refused};
 use crate::log::source::Source;
@@ -22,6 +22,8 @@ pub struct Salvage {
     pub samples: u64,
     /// Entries that are left, by `order`. Their `after_sample` counts the samples that were recorded.
     pub entries: Vec<Entry>,
+    /// Raw bytes of devices that are left.
+    pub raw_bytes: u64,
     /// How the session ended, if that is left.
     pub end: Option<EndRecord>,
     /// What is not.
@@ -30,7 +32,11 @@ pub struct Salvage {
 
 /// Hands out every block of samples that is whole, in order, and tells what is missing.
 pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
-    let mut left = blocks(path, visit)?;
+    let mut left = parts(path, &mut |part| {
+        if let Part::Samples(block) = part {
+            visit(block);
+        }
+    })?;
     // All that is kept may be whole and the file still be damaged where none of it is, as in its index.
     if !left.missing.is_lossy()
         && let Err(ReadError::Damaged {
@@ -48,8 +54,8 @@ pub fn salvage(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, Re
     Ok(left)
 }
 
-/// As [`salvage`], and only what lies where samples are is looked at.
-pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salvage, ReadError> {
+/// As [`salvage`] for everything a log holds, and only what lies where samples are is looked at.
+pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salvage, ReadError> {
     let files = find_files(path)?;
     let failed = |source| ReadError::Io {
         path: path.into(),
@@ -59,7 +65,9 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
     let mut last_s = 0.0;
     let mut gaps = Vec::new();
     let mut expected = 0;
-    let mut note = |block: &Block| {
+    let mut note = |part: Part<'_>| {
+        visit(part);
+        let Part::Samples(block) = part else { return };
         let from = block
             .rows()
             .next()
@@ -75,7 +83,6 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
         expected = block.first_sample() + block.len() as u64;
         kept += block.len() as u64;
         last_s = block.last_time().map_or(last_s, |time| time.seconds().0);
-        visit(block);
     };
     let mut content = Content::new(!path.is_dir(), &mut note);
     content.allow_gaps();
@@ -95,6 +102,8 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
         ..
     } = search;
     let (lost_entries, later) = (content.lost_entries, content.is_later_part);
+    let (raw_bytes, mut lost_raw_bytes) = (content.raw_bytes, content.lost_raw_bytes);
+    let raw_bytes_left = raw_bytes - lost_raw_bytes;
     let entries = std::mem::take(&mut content.entries);
     let (manifest, end) = (content.manifest.take(), content.end.take());
     drop(content);
@@ -111,6 +120,11 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
             to_s: None,
         });
     }
+    if let Some(end) = &end
+        && (!later || path.is_dir())
+    {
+        lost_raw_bytes += end.raw_bytes.saturating_sub(raw_bytes);
+    }
     // The first sample of a later part that is read alone is not its first.
     if later && !path.is_dir() {
         gaps.retain(|gap| gap.after_sample > 0);
@@ -119,11 +133,13 @@ pub(super) fn blocks(path: &Path, visit: &mut dyn FnMut(&Block)) -> Result<Salva
         missing: Missing {
             gaps,
             entries: lost_entries,
+            raw_bytes: lost_raw_bytes,
             is_end_lost: end.is_none(),
             wounds,
         },
         manifest,
         samples: kept,
+        raw_bytes: raw_bytes_left,
         entries,
         end,
     })
@@ -264,7 +280,7 @@ fn kind_of(file: &Path, chunks: &mut ChunkReader) -> io::Result<Kind> {
         return Ok(Kind::Next);
     }
     let source = Source::open(file)?;
-    let mut ignore = |_: &Block| {};
+    let mut ignore = |_: Part<'_>| {};
     let mut content = Content::new(true, &mut ignore);
     content.allow_gaps();
     let mut bytes = Vec::new();

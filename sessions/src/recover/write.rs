@@ -1,11 +1,11 @@
 //! Writes what is left of a session as a session of its own, beside the original.
 
-use super::salvage::blocks;
+use super::salvage::parts;
 use super::{Missing, Salvage, salvage};
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
-use crate::log::{FileSink, LogError, LogWriter, ReadError};
+use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
-use crate::record::{Block, EndRecord, Entry, Row};
+use crate::record::{EndRecord, Entry, Row};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
 use serde::{Deserialize, Serialize};
@@ -75,8 +75,12 @@ impl Recovery {
     /// What was kept of the session at `from` and, after it, what is missing.
     #[must_use]
     pub fn sentences(&self, from: &Path) -> Vec<String> {
+        let raw = match self.salvage.raw_bytes {
+            0 => String::new(),
+            count => format!(" and {count} raw bytes"),
+        };
         let kept = format!(
-            "{}: {} samples kept in {}",
+            "{}: {} samples{raw} kept in {}",
             from.display(),
             self.salvage.samples,
             self.folder.display()
@@ -185,10 +189,29 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
     let mut pending = left.entries.iter().peekable();
     let mut outcome = Ok(());
     let (mut kept, mut last) = (0u64, Nanos::ZERO);
-    let mut visit = |block: &Block| {
+    let mut visit = |part: Part<'_>| {
         if outcome.is_err() {
             return;
         }
+        let block = match part {
+            Part::Samples(block) => block,
+            Part::Raw(block) => {
+                let raw = &block.to_pieces();
+                outcome = log.append_parts(&Parts {
+                    raw,
+                    ..Parts::default()
+                });
+                return;
+            }
+            Part::Health(health) => {
+                let health = std::slice::from_ref(health);
+                outcome = log.append_parts(&Parts {
+                    health,
+                    ..Parts::default()
+                });
+                return;
+            }
+        };
         let rows: Vec<Row> = block.rows().collect();
         let end = block.first_sample() + rows.len() as u64;
         let mut entries = Vec::new();
@@ -204,7 +227,7 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         last = block.last_time().unwrap_or(last);
         outcome = log.append(&rows, &entries);
     };
-    blocks(path, &mut visit)?;
+    parts(path, &mut visit)?;
     outcome?;
     let rest: Vec<Entry> = pending
         .map(|entry| Entry {
@@ -219,6 +242,7 @@ fn copy(path: &Path, left: &Salvage, log: &mut LogWriter<FileSink>) -> Result<()
         reason: "the recording was interrupted; this is what was left of it".into(),
         samples: 0,
         entries: 0,
+        raw_bytes: 0,
         ended_at,
         time_use: Vec::new(),
     });

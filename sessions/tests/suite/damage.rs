@@ -1,9 +1,10 @@
 use crate::support::{
-    Random, count_from, end, entries, log_bytes, manifest, put, quick_folder, rows, same_bits,
+    MemorySink, Random, check_raw, count_from, end, entries, log_bytes, manifest, put,
+    quick_folder, raw_of, read_raw, rows, same_bits,
 };
 use palpate_model::Nanos;
-use palpate_sessions::recover::salvage;
-use palpate_sessions::{Block, Entry, ReadError, Row, Session};
+use palpate_sessions::recover::{recover, salvage};
+use palpate_sessions::{Block, Entry, LogWriter, Parts, ReadError, Row, Session};
 use std::path::Path;
 
 /// What a session held, and its file.
@@ -239,4 +240,55 @@ fn absurd_lengths_are_refused() {
     put(&path, &bytes);
     let refusal = Session::open(&path).unwrap_err().to_string();
     assert!(refusal.contains("larger than any chunk"), "{refusal}");
+}
+
+/// Of a damaged log the raw bytes that are left are kept, and those that are not are counted to the byte.
+#[test]
+fn raw_bytes_that_are_lost_are_counted() {
+    let rows = rows(1000, 31);
+    let sink = MemorySink::default();
+    let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
+    let mut places = Vec::new();
+    for batch in rows.chunks(100) {
+        places.push(sink.bytes().len());
+        let parts = Parts {
+            rows: batch,
+            raw: &raw_of(batch),
+            ..Parts::default()
+        };
+        log.append_parts(&parts).unwrap();
+    }
+    log.finish(end(Nanos::from_millis(1000))).unwrap();
+    let bytes_of = |rows: &[Row]| -> u64 {
+        let raw = raw_of(rows);
+        raw.iter().map(|piece| piece.bytes.len() as u64).sum()
+    };
+    let whole = sink.bytes();
+    // The fourth batch, and the last: behind that one only the end tells.
+    for (lost, batch) in [(300..400, 3), (900..1000, 9)] {
+        let mut bytes = whole.clone();
+        bytes[places[batch] + 100] ^= 1;
+        let folder = quick_folder();
+        let session = folder.path().join("one");
+        put(&session.join("000.mcap"), &bytes);
+        let left = salvage(&session, &mut |_| {}).unwrap();
+        let missing = bytes_of(&rows[lost.clone()]);
+        assert_eq!(left.missing.raw_bytes, missing);
+        assert_eq!(left.raw_bytes, bytes_of(&rows) - missing);
+        let told = left.missing.sentences().join("; ");
+        assert!(
+            told.contains(&format!("{missing} raw bytes of devices are missing")),
+            "{told}"
+        );
+        let copy = recover(&session, "1", chrono::DateTime::UNIX_EPOCH).unwrap();
+        let kept: Vec<Row> = [&rows[..lost.start], &rows[lost.end..]].concat();
+        check_raw(
+            &read_raw(&copy.folder).unwrap(),
+            &kept,
+            kept.len(),
+            "a copy",
+        );
+        let copied = Session::open(&copy.folder).unwrap();
+        assert_eq!(copied.beside.raw_bytes, left.raw_bytes);
+    }
 }

@@ -1,5 +1,8 @@
 //! Foreign files that are made to ask for more memory than they deserve.
 
+use crate::hostile::limit_memory;
+use crate::support::{put, quick_folder};
+use crate::worker::{command, told};
 use palpate_sessions::import::{Told, parse_foreign};
 use std::fs;
 use std::io::{Cursor, Write};
@@ -85,4 +88,97 @@ fn a_sheet_that_claims_the_whole_world_is_refused() {
     wide[place + 4..place + 8].copy_from_slice(&[0xff, 0xff, 0xff, 0]);
     let reason = reason_of(wide);
     assert!(reason.contains("span more than"), "{reason}");
+}
+
+/// A sound workbook: time, depth and force in so many rows.
+fn workbook(rows: usize) -> Vec<u8> {
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
+    let options = zip::write::SimpleFileOptions::default();
+    let space = "http://schemas.openxmlformats.org";
+    let relation = format!("{space}/officeDocument/2006/relationships");
+    let parts = [
+        (
+            "[Content_Types].xml",
+            format!("<Types xmlns=\"{space}/package/2006/content-types\"/>"),
+        ),
+        (
+            "_rels/.rels",
+            format!(
+                "<Relationships xmlns=\"{space}/package/2006/relationships\"><Relationship Id=\"r1\" \
+                 Type=\"{relation}/officeDocument\" Target=\"xl/workbook.xml\"/></Relationships>"
+            ),
+        ),
+        (
+            "xl/workbook.xml",
+            format!(
+                "<workbook xmlns=\"{space}/spreadsheetml/2006/main\" xmlns:r=\"{relation}\"><sheets>\
+                 <sheet name=\"A\" sheetId=\"1\" r:id=\"r1\"/></sheets></workbook>"
+            ),
+        ),
+        (
+            "xl/_rels/workbook.xml.rels",
+            format!(
+                "<Relationships xmlns=\"{space}/package/2006/relationships\"><Relationship Id=\"r1\" \
+                 Type=\"{relation}/worksheet\" Target=\"worksheets/sheet1.xml\"/></Relationships>"
+            ),
+        ),
+    ];
+    for (name, text) in parts {
+        archive.start_file(name, options).unwrap();
+        archive.write_all(text.as_bytes()).unwrap();
+    }
+    archive
+        .start_file("xl/worksheets/sheet1.xml", options)
+        .unwrap();
+    let mut sheet =
+        format!("<worksheet xmlns=\"{space}/spreadsheetml/2006/main\"><sheetData><row r=\"1\">");
+    for (column, name) in [("A", "t_s"), ("B", "depth_mm"), ("C", "force_N")] {
+        sheet += &format!("<c r=\"{column}1\" t=\"inlineStr\"><is><t>{name}</t></is></c>");
+    }
+    sheet += "</row>";
+    for row in 0..rows {
+        let (t, number) = (row as f64 * 1e-3, row + 2);
+        let (depth, force) = ((t * 0.7).sin() + 2.0, (t * 1.3).cos() + 3.0);
+        sheet += &format!(
+            "<row r=\"{number}\"><c r=\"A{number}\"><v>{t:.3}</v></c><c r=\"B{number}\"><v>{depth:.5}</v></c>\
+             <c r=\"C{number}\"><v>{force:.5}</v></c></row>"
+        );
+    }
+    sheet += "</sheetData></worksheet>";
+    archive.write_all(sheet.as_bytes()).unwrap();
+    archive.finish().unwrap().into_inner()
+}
+
+/// Rows of three cells that a workbook may have at most, its head not counted.
+const WORKBOOK_ROWS: usize = (1 << 19) / 3 - 1;
+
+/// The work of a process: reads a workbook in no more than 64 MiB.
+pub fn read_workbook(folder: &Path) {
+    let path = folder.join("book.xlsx");
+    limit_memory(64 << 20);
+    let bytes = fs::read(&path).unwrap();
+    let read = parse_foreign("book.xlsx", bytes, &Told::default()).unwrap();
+    eprintln!("rows {}", read.parts[0].samples.len());
+}
+
+#[test]
+fn the_largest_workbook_is_read_in_little_memory_and_a_larger_one_is_refused() {
+    let folder = quick_folder();
+    put(&folder.path().join("book.xlsx"), &workbook(WORKBOOK_ROWS));
+    let output = command(&[], "workbook", folder.path()).output().unwrap();
+    assert!(output.status.success(), "{output:?}");
+    assert_eq!(told(&output, "rows"), [WORKBOOK_ROWS as u64]);
+    let reason = reason_of(workbook(WORKBOOK_ROWS + 1));
+    assert!(
+        reason.contains("more than 524288 cells; export the measurement as text"),
+        "{reason}"
+    );
+    let texts = xlsx_with("xl/sharedStrings.xml", &mut |file| {
+        file.write_all(&vec![b' '; (4 << 20) + 1]).unwrap();
+    });
+    let reason = reason_of(texts);
+    assert!(
+        reason.contains("a list in the workbook unpacks to more than 4194304"),
+        "{reason}"
+    );
 }

@@ -3,7 +3,7 @@
 //! `strace` does the killing: it counts the calls on the files of the test alone, thread by thread, and sends
 //! SIGKILL at the one that is asked for.
 
-use crate::support::{count_from, log_bytes, manifest, same_bits};
+use crate::support::{check_raw, count_from, log_bytes, manifest, read_raw, same_bits};
 use crate::worker::{Work, command, edit, told};
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{recover, recovered_folder, salvage};
@@ -127,6 +127,8 @@ fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u
     let count = session.rows.len();
     assert!(count >= saved, "{context}: {count} of {saved}");
     assert!(same_bits(&session.rows, &work.rows[..count]), "{context}");
+    let raw = read_raw(folder).expect(context);
+    check_raw(&raw, &work.rows, count, context);
     let entries = &work.entries[..session.entries.len()];
     assert_eq!(session.entries, entries, "{context}");
     let due = work
@@ -139,6 +141,7 @@ fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u
         let copy = recover(folder, "1", chrono::DateTime::UNIX_EPOCH);
         let copy = Session::open(&copy.expect(context).folder).expect(context);
         assert!(same_bits(&copy.rows, &session.rows), "{context}");
+        assert_eq!(copy.beside, session.beside, "{context}");
     }
     let taken = left.taken.max(count as u64);
     (count as u64 - left.saved, taken - count as u64)

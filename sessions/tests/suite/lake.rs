@@ -44,6 +44,7 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
         entries: session.entries.clone(),
         end: session.end.clone(),
         notes: session.notes.clone(),
+        beside: session.beside.clone(),
     };
     add(lake, &outline, told, &mut |visit| {
         visit(&session.rows);

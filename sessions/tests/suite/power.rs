@@ -2,11 +2,14 @@
 //! synchronised dropped, reordered, zeroed, torn or replaced by what the disk held before.
 
 use crate::disk::{Disk, FATES, Fate, Step, Traced, cut};
-use crate::support::{Random, count_from, end, entries, manifest, quick_folder, rows, same_bits};
+use crate::support::{
+    Random, check_raw, check_raw_begins, count_from, end, entries, manifest, quick_folder, raw_of,
+    read_raw, rows, same_bits,
+};
 use palpate_model::Nanos;
 use palpate_sessions::recover::{Salvage, recover, salvage};
 use palpate_sessions::{
-    Entry, EntryKind, LogError, LogWriter, Pace, ReadError, Row, Session, SessionWriter,
+    Entry, EntryKind, LogError, LogWriter, Pace, Parts, ReadError, Row, Session, SessionWriter,
 };
 use std::path::Path;
 
@@ -48,11 +51,11 @@ impl Recording {
     }
 
     fn write(&self, disk: &Disk, batches_per_segment: u32) -> Result<(), LogError> {
-        type Batch<'a> = (&'a [Row], &'a [Entry]);
         let source = Box::new(disk.clone());
         let mut log = LogWriter::begin_in_segments(source, batches_per_segment, &manifest())?;
         disk.tell(0);
-        let mut since_sync: Vec<Batch> = Vec::new();
+        let raw: Vec<_> = self.rows.chunks(BATCH).map(raw_of).collect();
+        let mut since_sync: Vec<Parts<'_>> = Vec::new();
         let mut rest = &self.entries[..];
         for (number, batch) in self.rows.chunks(BATCH).enumerate() {
             // While this one is written, the next is taken.
@@ -61,9 +64,15 @@ impl Recording {
             let (due, later) =
                 rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
             rest = later;
-            since_sync.push((batch, due));
+            let parts = Parts {
+                rows: batch,
+                entries: due,
+                raw: &raw[number],
+                health: &[],
+            };
+            since_sync.push(parts);
             let is_event = due.iter().any(|entry| entry.kind != EntryKind::Fit);
-            let mut outcome = log.append(batch, due);
+            let mut outcome = log.append_parts(&parts);
             if outcome.is_ok() && (is_event || since_sync.len() >= BATCHES_PER_SYNC) {
                 outcome = log.sync();
                 if outcome.is_err() {
@@ -109,6 +118,10 @@ impl Recording {
                 };
                 writer.push_entry(entry).expect("it goes on elsewhere");
             }
+            let raw = raw_of(std::slice::from_ref(row));
+            writer
+                .push_raw(row.host, raw)
+                .expect("it goes on elsewhere");
             writer.push_row(*row).expect("it goes on elsewhere");
         }
         writer
@@ -158,6 +171,8 @@ impl Recording {
                 assert!(same_bits(&session.rows, &self.rows[..count]), "{context}");
                 let entries = &self.entries[..session.entries.len()];
                 assert_eq!(session.entries, entries, "{context}");
+                let raw = read_raw(folder).expect("it opened before");
+                check_raw(&raw, &self.rows, count, context);
                 let is_whole = count == self.rows.len() && entries.len() == self.entries.len();
                 assert!(is_whole || session.end.is_none(), "{context}");
                 assert!(is_whole || !session.notes.is_empty(), "{context}");
@@ -213,6 +228,8 @@ impl Recording {
                 let unbroken = copy.rows.iter().zip(&self.rows);
                 let same = unbroken.take_while(|(a, b)| same_bits(&[**a], &[**b]));
                 let same = same.count();
+                let raw = read_raw(&recovery.folder).expect("a copy is whole");
+                check_raw_begins(&raw, &self.rows[..kept], &context);
                 assert!(same >= kept, "{context}: {same} of {kept} in the copy");
             }
         }

@@ -1,7 +1,13 @@
-use crate::support::{MemorySink, end, entries, log_bytes, manifest, open_bytes, rows, same_bits};
+use crate::support::{
+    MemorySink, check_raw, end, entries, log_bytes, manifest, open_bytes, raw_of, read_raw, rows,
+    same_bits,
+};
 use palpate_model::Nanos;
+use palpate_model::rig::RawBytes;
+use palpate_sessions::health::Told;
 use palpate_sessions::{
-    LogError, LogWriter, Pace, ReadError, Session, SessionFolder, SessionWriter,
+    FolderSegments, Health, LogError, LogWriter, MachineState, Pace, Part, ReadError, Session,
+    SessionFolder, SessionWriter,
 };
 
 #[test]
@@ -170,4 +176,105 @@ fn what_could_not_be_read_back_is_not_written() {
     manifest.limits.as_mut().unwrap().travel_max.0 = f64::INFINITY;
     let refusal = LogWriter::begin(MemorySink::default(), "memory", &manifest);
     assert!(refusal.is_err());
+}
+
+/// A log with raw bytes and health: at either pace, over several segments, by folder and by file.
+#[test]
+fn raw_bytes_and_health_come_back_at_either_pace() {
+    let health = |now: Nanos, lateness_s: f64| Health {
+        now,
+        told: Told::State(MachineState {
+            lateness_s,
+            queue_share: 0.25,
+            sync_s: Some(0.004),
+            free_bytes: Some(1 << 40),
+            missed_readings: 1,
+        }),
+    };
+    for pace in [Pace::Virtual, Pace::Real] {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("one");
+        let _held = SessionFolder::create(&path).unwrap();
+        let rows = rows(3000, 21);
+        let source = FolderSegments::new(&path);
+        let mut writer = SessionWriter::start_in_segments(source, 9, &manifest(), pace).unwrap();
+        let mut told = Vec::new();
+        for (number, row) in rows.iter().enumerate() {
+            let raw = raw_of(std::slice::from_ref(row));
+            writer.push_raw(row.host, raw).unwrap();
+            writer.push_row(*row).unwrap();
+            if number % 1000 == 999 {
+                told.push(health(row.host, number as f64 * 1e-6));
+                writer.push_health(told[told.len() - 1].clone()).unwrap();
+            }
+        }
+        writer.close(end(Nanos::from_millis(3000))).unwrap();
+        assert!(path.join("002.mcap").is_file(), "it has several segments");
+
+        let session = Session::open(&path).unwrap();
+        assert!(same_bits(&session.rows, &rows));
+        assert_eq!(session.notes, Vec::<String>::new());
+        check_raw(&read_raw(&path).unwrap(), &rows, 3000, "whole");
+        let bytes: usize = raw_of(&rows).iter().map(|piece| piece.bytes.len()).sum();
+        assert_eq!(session.beside.raw_bytes, bytes as u64);
+        assert_eq!(session.end.unwrap().raw_bytes, bytes as u64);
+        let mut found = Vec::new();
+        Session::scan_parts(&path, &mut |part| {
+            if let Part::Health(one) = part {
+                found.push(one.clone());
+            }
+        })
+        .unwrap();
+        assert_eq!(found, told);
+        let worst = session.beside.health.worst.unwrap();
+        assert_eq!((worst.lateness_s, worst.missed_readings), (2999e-6, 3));
+        // A later segment alone knows what it holds.
+        let part = Session::open(&path.join("001.mcap")).unwrap();
+        assert!(part.beside.raw_bytes > 0 && part.beside.raw_bytes < bytes as u64);
+    }
+}
+
+/// A disk that hangs cannot make raw bytes fill the memory.
+#[test]
+fn raw_bytes_count_in_the_bounded_queue() {
+    let (go, gate) = std::sync::mpsc::sync_channel::<()>(1);
+    struct Stuck(Option<std::sync::mpsc::Receiver<()>>, usize);
+    impl palpate_sessions::Sink for Stuck {
+        fn append(&mut self, _: &[u8]) -> std::io::Result<()> {
+            self.1 += 1;
+            // The manifest still gets through.
+            if self.1 > 1
+                && let Some(gate) = self.0.take()
+            {
+                let _ = gate.recv();
+            }
+            Ok(())
+        }
+
+        fn sync(&mut self) -> std::io::Result<()> {
+            Ok(())
+        }
+    }
+    let sink = Stuck(Some(gate), 0);
+    let mut writer = SessionWriter::start_on(sink, "memory", &manifest(), Pace::Real).unwrap();
+    let piece = |millis| RawBytes {
+        at: Nanos::from_millis(millis),
+        device: "controller".into(),
+        is_sent: false,
+        bytes: vec![7; 1 << 20],
+    };
+    let mut taken = 0;
+    let refusal = loop {
+        assert!(taken < 100, "100 MB wait in memory");
+        // All within a second, so that it is not time that fills the queue.
+        match writer.push_raw(Nanos::from_millis(taken), vec![piece(taken)]) {
+            Ok(()) => taken += 1,
+            Err(refusal) => break refusal,
+        }
+    };
+    assert!(matches!(refusal, LogError::TooSlow { .. }), "{refusal}");
+    assert!((30..40).contains(&taken), "{taken}");
+    let notices = writer.take_notices();
+    assert!(notices.iter().any(palpate_sessions::Notice::ends_the_run));
+    go.send(()).unwrap();
 }

@@ -1,11 +1,11 @@
 //! Sessions to test with, and sinks that remember or fail.
 
 use chrono::{TimeZone, Utc};
-use palpate_model::rig::{AdcDescription, Limits, Phase, RigDescription, SignalFacts};
+use palpate_model::rig::{AdcDescription, Limits, Phase, RawBytes, RigDescription, SignalFacts};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, RECORD_VERSION, Row, Session,
-    Sink,
+    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, Part, Parts, RECORD_VERSION,
+    ReadError, Row, Session, Sink,
 };
 use std::io;
 use std::sync::{Arc, Mutex};
@@ -111,6 +111,73 @@ pub fn rows(count: usize, seed: u64) -> Vec<Row> {
         .collect()
 }
 
+/// What went over the wires for rows: a question and its answer for each, and a second device now and then.
+pub fn raw_of(rows: &[Row]) -> Vec<RawBytes> {
+    let piece = |at, device: &str, is_sent, bytes: Vec<u8>| RawBytes {
+        at,
+        device: device.into(),
+        is_sent,
+        bytes,
+    };
+    rows.iter()
+        .flat_map(|row| {
+            let answer = format!(": {}\r\n", row.pulses.unwrap_or_default());
+            let mut pieces = vec![
+                piece(row.host, "controller", true, b"TP\r".into()),
+                piece(row.host + Nanos(400), "controller", false, answer.into()),
+            ];
+            if row.tick % 7 == 0 {
+                let noise = row.volts.unwrap_or_default().to_le_bytes();
+                pieces.push(piece(row.host, "cell", false, noise.into()));
+            }
+            pieces
+        })
+        .collect()
+}
+
+/// The raw bytes of a session that opens.
+pub fn read_raw(path: &std::path::Path) -> Result<Vec<RawBytes>, ReadError> {
+    let mut found = Vec::new();
+    Session::scan_parts(path, &mut |part| {
+        if let Part::Raw(block) = part {
+            found.extend(block.pieces().map(|piece| RawBytes {
+                at: piece.at,
+                device: block.device().into(),
+                is_sent: piece.is_sent,
+                bytes: piece.bytes.into(),
+            }));
+        }
+    })?;
+    Ok(found)
+}
+
+/// Raw bytes that were read are those that were recorded, from the first on, and those of `count` rows are there.
+/// Blocks are of one device each, so only the order within a device is that of the recording.
+pub fn check_raw(found: &[RawBytes], rows: &[Row], count: usize, context: &str) {
+    let all = raw_of(rows);
+    for device in DEVICES {
+        let is_right = own(&all, device).starts_with(&own(found, device));
+        assert!(is_right, "{context}: wrong raw bytes of {device}");
+    }
+    check_raw_begins(found, &rows[..count], context);
+}
+
+/// Raw bytes that were read begin with those of rows.
+pub fn check_raw_begins(found: &[RawBytes], rows: &[Row], context: &str) {
+    let due = raw_of(rows);
+    for device in DEVICES {
+        let is_there = own(found, device).starts_with(&own(&due, device));
+        assert!(is_there, "{context}: raw bytes of {device} are missing");
+    }
+}
+
+const DEVICES: [&str; 2] = ["controller", "cell"];
+
+fn own<'p>(pieces: &'p [RawBytes], device: &str) -> Vec<&'p RawBytes> {
+    let own = pieces.iter().filter(|piece| &*piece.device == device);
+    own.collect()
+}
+
 /// One entry after every `every` rows, kinds in turn.
 pub fn entries(rows: &[Row], every: usize) -> Vec<Entry> {
     let kinds = [EntryKind::Input, EntryKind::Decision, EntryKind::Fit];
@@ -135,6 +202,7 @@ pub fn end(ended_at: Nanos) -> EndRecord {
         reason: "the plan is complete".into(),
         samples: 0,
         entries: 0,
+        raw_bytes: 0,
         ended_at,
         time_use: vec![("motion".into(), 40.049), ("hold".into(), 0.1)],
     }
@@ -196,6 +264,20 @@ impl Sink for MemorySink {
 
 /// A log as bytes: batches of 100 rows, entries with the batch they follow.
 pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+    log_bytes_with(rows, entries, end, |_| Vec::new())
+}
+
+/// The same with raw bytes for each row.
+pub fn wired_log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec<u8> {
+    log_bytes_with(rows, entries, end, raw_of)
+}
+
+fn log_bytes_with(
+    rows: &[Row],
+    entries: &[Entry],
+    end: Option<EndRecord>,
+    raw_of: impl Fn(&[Row]) -> Vec<RawBytes>,
+) -> Vec<u8> {
     let sink = MemorySink::default();
     let mut log = LogWriter::begin(sink.clone(), "memory", &manifest()).unwrap();
     let mut entries = entries.iter().peekable();
@@ -204,7 +286,13 @@ pub fn log_bytes(rows: &[Row], entries: &[Entry], end: Option<EndRecord>) -> Vec
         while let Some(entry) = entries.next_if(|entry| entry.after_sample < (i as u64 + 1) * 100) {
             due.push(entry.clone());
         }
-        log.append(batch, &due).unwrap();
+        let parts = Parts {
+            rows: batch,
+            entries: &due,
+            raw: &raw_of(batch),
+            health: &[],
+        };
+        log.append_parts(&parts).unwrap();
     }
     if let Some(end) = end {
         log.finish(end).unwrap();

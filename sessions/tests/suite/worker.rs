@@ -1,14 +1,14 @@
 //! What other tests do in a process of its own, which is this program started again: to kill it, to limit it, or to let
 //! two do something at the same time.
 
-use crate::support::{end, entries, manifest, rows};
-use crate::{hostile, limits};
+use crate::support::{end, entries, manifest, raw_of, rows};
+use crate::{foreign_damage, hostile, limits};
 use chrono::DateTime;
 use palpate_model::Nanos;
 use palpate_sessions::journal::Journal;
 use palpate_sessions::recover::recover;
 use palpate_sessions::{
-    Change, Edit, Entry, FolderSegments, LogWriter, Pace, Row, SessionFolder, SessionWriter,
+    Change, Edit, Entry, FolderSegments, LogWriter, Pace, Parts, Row, SessionFolder, SessionWriter,
     add_edit,
 };
 use std::path::{Path, PathBuf};
@@ -79,6 +79,7 @@ fn does_its_task() {
         "little" => limits::record_in_little_memory(&folder, number),
         "catalog" => limits::update_catalog(&folder),
         "hold" => hold(&folder),
+        "workbook" => foreign_damage::read_workbook(&folder),
         "damage" => hostile::damage(&folder, name.unwrap(), number),
         "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
         "greed" => hostile::be_greedy(number),
@@ -98,7 +99,13 @@ fn write_log(folder: &Path, samples: usize) {
         let (due, later) = rest.split_at(rest.partition_point(|entry| entry.after_sample < stop));
         rest = later;
         eprintln!("taken {stop}");
-        log.append(batch, due).unwrap();
+        let parts = Parts {
+            rows: batch,
+            entries: due,
+            raw: &raw_of(batch),
+            health: &[],
+        };
+        log.append_parts(&parts).unwrap();
         eprintln!("saved {stop}");
         if number % 9 == 8 {
             log.sync().unwrap();
@@ -119,6 +126,8 @@ fn write_session(folder: &Path, samples: usize) {
         while let Some(entry) = pending.next_if(|entry| entry.after_sample == number as u64) {
             writer.push_entry(entry.clone()).unwrap();
         }
+        let raw = raw_of(std::slice::from_ref(row));
+        writer.push_raw(row.host, raw).unwrap();
         writer.push_row(*row).unwrap();
         if number % 10 == 9 {
             let saved = writer.saved_through();

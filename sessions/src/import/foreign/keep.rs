@@ -112,6 +112,7 @@ pub fn keep(part: &ForeignPart, kept: Kept<'_>) -> Result<(), KeepError> {
         reason,
         samples: 0,
         entries: 0,
+        raw_bytes: 0,
         ended_at,
         time_use: Vec::new(),
     })?;

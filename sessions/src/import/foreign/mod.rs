@@ -35,8 +35,8 @@ use thiserror::Error;
 /// Largest text read, in bytes: with what is made of it, about four times as much memory.
 const TEXT_BYTES_MAX: u64 = 256 << 20;
 
-/// Largest workbook read, in bytes; its cells are counted beside.
-const WORKBOOK_BYTES_MAX: u64 = 64 << 20;
+/// Largest workbook read, in bytes: packed, as many cells as are read take about half of it. It is kept in memory.
+const WORKBOOK_BYTES_MAX: u64 = 8 << 20;
 
 /// A foreign file could not be read.
 #[derive(Debug, Error)]

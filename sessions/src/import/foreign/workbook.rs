@@ -6,8 +6,9 @@ use super::{legacy, unzipped};
 use calamine::{Data, DataRef, Reader, Xls, Xlsx};
 use std::io::Cursor;
 
-/// Most cells kept of all sheets: a million rows of four columns, 128 MB.
-const CELLS_MAX: usize = 4 << 20;
+/// Most cells kept of all sheets, so that the whole import takes less than 64 MiB: 17 MB here, and as much again
+/// for the samples made of them.
+const CELLS_MAX: usize = 1 << 19;
 /// Columns of a sheet of measurements; more is not one.
 const COLUMNS_MAX: u32 = 256;
 

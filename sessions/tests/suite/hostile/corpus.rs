@@ -2,7 +2,7 @@
 
 use super::kinds::{WEIGHTS, analysis, check, compliance};
 use crate::foreign_damage::seeds;
-use crate::support::{MemorySink, end, entries, log_bytes, manifest, put, rows};
+use crate::support::{MemorySink, end, entries, log_bytes, manifest, put, rows, wired_log_bytes};
 use crate::worker::edit;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
@@ -239,6 +239,23 @@ pub fn make(folder: &Path) -> Vec<String> {
     }
     add("block", "pair", &blocks.concat());
     add("block", "empty", &[]);
+    let wired = wired_log_bytes(&short_rows, &[], None);
+    let mut padded = vec![0; 8];
+    padded.extend(records(&wired).swap_remove(1));
+    let found = frames(&padded).into_iter();
+    let found = found.filter(|(opcode, _)| *opcode == 5).take(2);
+    for ((_, body), name) in found.zip(["controller", "cell"]) {
+        // Raw bytes are the first messages, a device each.
+        add("raw-block", name, &body[22..]);
+    }
+    add("mcap-records", "raw", &records(&wired).swap_remove(1));
+    add("health", "state", br#"{"now_ns":5,"kind":"state","lateness_s":0.001,"queue_share":0.5,"sync_s":1e-3,"free_bytes":7,"missed_readings":0}"#);
+    add("health", "anchor", br#"{"now_ns":5,"kind":"anchor","why":"jump","wall":"2026-03-05T14:15:07.5Z","shift_s":-1.5}"#);
+    add(
+        "health",
+        "event",
+        br#"{"now_ns":5,"kind":"event","text":"so"}"#,
+    );
     let told = serde_json::to_vec(&manifest()).expect("JSON");
     add("manifest", "manifest.json", &told);
     let thesis = serde_json::to_vec(&Calibration::thesis()).expect("JSON");

@@ -4,7 +4,10 @@ use crate::damage;
 use crate::disk::{Fate, cut};
 use crate::foreign_damage::seeds;
 use crate::power::Recording;
-use crate::support::{Random, end, entries, log_bytes, manifest, quick_folder, rows, same_bits};
+use crate::support::{
+    Random, check_raw, end, entries, log_bytes, manifest, quick_folder, read_raw, rows, same_bits,
+    wired_log_bytes,
+};
 use crate::worker::edit;
 use chrono::DateTime;
 use palpate_model::Nanos;
@@ -19,7 +22,7 @@ use palpate_sessions::lake;
 use palpate_sessions::shelf::{self, Document};
 use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
-    Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
+    Beside, Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
 };
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -138,6 +141,8 @@ impl Original {
         match Session::open(path) {
             Ok(session) => {
                 self.held.check(&session, "damaged");
+                let raw = read_raw(path).expect("it opened before");
+                check_raw(&raw, &self.held.rows, session.rows.len(), "damaged");
                 let is_whole = session.rows.len() == self.held.rows.len();
                 match is_whole && session.end.is_some() == self.is_finished {
                     true => Outcome::Whole,
@@ -171,7 +176,7 @@ fn session(name: &'static str, is_finished: bool) -> Kind {
     let rows = rows(1500, 11);
     let entries = entries(&rows, 40);
     let ending = is_finished.then(|| end(Nanos::from_millis(1500)));
-    let bytes = log_bytes(&rows, &entries, ending);
+    let bytes = wired_log_bytes(&rows, &entries, ending);
     let held = damage::Original {
         rows,
         entries,
@@ -390,6 +395,7 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         rows,
         end: Some(end(Nanos(5_000_000_000))),
         notes: vec!["a note".into()],
+        beside: Beside::default(),
     };
     let outline = Outline {
         path: session.path.clone(),
@@ -398,6 +404,7 @@ pub fn lake_of(folder: &Path, samples: usize) -> Session {
         entries: session.entries.clone(),
         end: session.end.clone(),
         notes: session.notes.clone(),
+        beside: Beside::default(),
     };
     lake::add(folder, &outline, lake::Told::default(), &mut |visit| {
         visit(&session.rows);

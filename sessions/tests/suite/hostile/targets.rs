@@ -12,7 +12,9 @@ use palpate_sessions::lake;
 use palpate_sessions::recover::{examine, salvage};
 use palpate_sessions::shelf;
 use palpate_sessions::trade::read_trade;
-use palpate_sessions::{ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, Session, Summary};
+use palpate_sessions::{
+    ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, Part, Session, Summary,
+};
 use std::path::Path;
 
 pub struct Target {
@@ -65,6 +67,28 @@ pub const ALL: &[Target] = &[
             let mut records = message("/daq/block", 0, raw);
             records.extend(message("/derived/block", 0, derived));
             put(&folder.join(LOG_FILE), &file_with_chunk(&records));
+            read_log(&folder.join(LOG_FILE));
+        },
+    },
+    Target {
+        name: "raw-block",
+        words: &[&[0x12], &[0x2a, 0x80, 0x80, 0x04], &[0xff; 10], &[0x32]],
+        run: |bytes, folder| {
+            put(
+                &folder.join(LOG_FILE),
+                &file_with_chunk(&message("/raw", 0, bytes)),
+            );
+            read_log(&folder.join(LOG_FILE));
+        },
+    },
+    Target {
+        name: "health",
+        words: JSON_WORDS,
+        run: |bytes, folder| {
+            put(
+                &folder.join(LOG_FILE),
+                &file_with_chunk(&message("/health", 0, bytes)),
+            );
             read_log(&folder.join(LOG_FILE));
         },
     },
@@ -213,6 +237,15 @@ fn read_log(path: &Path) {
             .iter()
             .flat_map(|row| [row.volts, row.force, row.depth]);
         assert!(numbers.flatten().all(f64::is_finite));
+    }
+    let mut raw = 0;
+    let scanned = Session::scan_parts(path, &mut |part| {
+        if let Part::Raw(block) = part {
+            raw += block.pieces().map(|piece| piece.bytes.len()).sum::<usize>();
+        }
+    });
+    if let Ok(outline) = scanned {
+        assert_eq!(outline.beside.raw_bytes, raw as u64);
     }
     if let Ok(left) = salvage(path, &mut |block| {
         assert_eq!(block.rows().count(), block.len())

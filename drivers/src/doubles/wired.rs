@@ -1,0 +1,93 @@
+//! A rig as if on wires: it tells the bytes it exchanges.
+
+use crate::rig::{Rig, RigEvent, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
+use std::sync::Arc;
+
+/// Any rig, whose commands and reports are told as bytes too: a line of text each, commands and answers with the
+/// device `controller`, readings with the device `cell`.
+#[derive(Clone, Debug)]
+pub struct WiredRig<R> {
+    inner: R,
+    now: Nanos,
+    raw: Vec<RawBytes>,
+    controller: Arc<str>,
+    cell: Arc<str>,
+}
+
+impl<R: Rig> WiredRig<R> {
+    /// `inner` on wires.
+    #[must_use]
+    pub fn new(inner: R) -> Self {
+        Self {
+            inner,
+            now: Nanos::ZERO,
+            raw: Vec::new(),
+            controller: "controller".into(),
+            cell: "cell".into(),
+        }
+    }
+
+    /// The line that stands for a command.
+    #[must_use]
+    pub fn command_line(command: &RigCommand) -> String {
+        format!("{command:?}\r")
+    }
+
+    /// The line that stands for a report.
+    #[must_use]
+    pub fn report_line(body: &RigEventBody) -> String {
+        match body {
+            RigEventBody::Reading(reading) => {
+                let counts = reading.counts.unwrap_or_default();
+                format!("{} {counts} {}\r\n", reading.tick, reading.pulses)
+            }
+            other => format!("{other:?}\r\n"),
+        }
+    }
+
+    fn note(&mut self, device: &Arc<str>, is_sent: bool, line: String) {
+        self.raw.push(RawBytes {
+            at: self.now,
+            device: Arc::clone(device),
+            is_sent,
+            bytes: line.into(),
+        });
+    }
+}
+
+impl<R: Rig> Rig for WiredRig<R> {
+    fn description(&self) -> &RigDescription {
+        self.inner.description()
+    }
+
+    fn send(&mut self, command: RigCommand) {
+        let device = Arc::clone(&self.controller);
+        self.note(&device, true, Self::command_line(&command));
+        self.inner.send(command);
+    }
+
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
+        let event = self.inner.next_event(until)?;
+        self.now = event.at;
+        let device = match &event.body {
+            RigEventBody::Reading(_) => Arc::clone(&self.cell),
+            _ => Arc::clone(&self.controller),
+        };
+        self.note(&device, false, Self::report_line(&event.body));
+        Some(event)
+    }
+
+    fn is_virtual(&self) -> bool {
+        self.inner.is_virtual()
+    }
+
+    fn by_hand(&mut self, action: HandAction) {
+        self.inner.by_hand(action);
+    }
+
+    fn take_raw(&mut self) -> Vec<RawBytes> {
+        std::mem::take(&mut self.raw)
+    }
+}

@@ -1,0 +1,217 @@
+//! The runner with clocks that jump and a live fit that panics.
+
+use super::clock::{HostTimes, TimeScale, host_times};
+use super::live_feed::{Estimator, LiveFeed};
+use super::main_loop::MainLoop;
+use super::snapshot::Snapshot;
+use super::start::{AfterStop, Answers, RunRequest};
+use crate::plans::RampHold;
+use crate::replay::replay;
+use arc_swap::ArcSwap;
+use palpate_drivers::Rig;
+use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_model::Nanos;
+use palpate_model::fit::LiveEstimate;
+use palpate_model::rig::Limits;
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_sessions::health::{Told, Why};
+use palpate_sessions::{Health, Labels, Part, Session};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::mpsc::sync_channel;
+use std::time::Duration;
+
+fn request(out: &Path) -> RunRequest {
+    let rig = SimRig::new(SimSettings::default());
+    let plan = RampHold {
+        speed: MmPerS(3.0),
+        depth: Depth(6.0),
+        hold: Seconds(2.0),
+        ..RampHold::default()
+    };
+    RunRequest {
+        plan: plan.plan(),
+        calibration: rig.calibration(),
+        limits: Limits::for_travel(rig.description().travel),
+        out: Some(out.to_path_buf()),
+        labels: Labels::default(),
+        is_acknowledged: true,
+        to_acknowledge: Vec::new(),
+        after_stop: AfterStop::Close,
+        answers: Answers::Confirm,
+    }
+}
+
+/// A loop on a rig with a run that was just started.
+fn started(rig: Box<dyn Rig>, scale: TimeScale, clock: Clock, out: &Path) -> MainLoop {
+    let mut main_loop = MainLoop::new(rig, scale, Arc::new(clock));
+    main_loop.start_run(&request(out)).unwrap();
+    main_loop
+}
+
+type Clock = Box<dyn Fn() -> HostTimes + Send + Sync>;
+
+/// Lets the loop turn until its run is over.
+fn run(main_loop: MainLoop) {
+    let (sender, requests) = sync_channel(1);
+    let shared = ArcSwap::from_pointee(main_loop.snapshot(0));
+    let sender = std::sync::Mutex::new(Some(sender));
+    let shared = Arc::new(shared);
+    let seen = Arc::clone(&shared);
+    let wake = move || {
+        let snapshot: Arc<Snapshot> = seen.load_full();
+        let is_over = snapshot
+            .run
+            .as_ref()
+            .is_some_and(|run| run.outcome.is_some());
+        if is_over {
+            sender.lock().unwrap().take();
+        }
+    };
+    main_loop.run(None, &requests, &shared, &wake);
+}
+
+/// Everything that a session tells of the computer.
+fn health_of(path: &Path) -> Vec<Health> {
+    let mut found = Vec::new();
+    Session::scan_parts(path, &mut |part| {
+        if let Part::Health(one) = part {
+            found.push(one.clone());
+        }
+    })
+    .unwrap();
+    found
+}
+
+fn sim() -> SimRig {
+    SimRig::new(SimSettings::default())
+}
+
+#[test]
+fn a_wall_clock_that_jumps_changes_no_sample_and_is_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let fast = TimeScale::Factor(40.0);
+    let mut rows = Vec::new();
+    for name in ["calm", "jumping"] {
+        let began = host_times().awake;
+        let is_calm = name == "calm";
+        // An hour back after half a second: somebody set the clock.
+        let clock: Clock = Box::new(move || {
+            let mut times = host_times();
+            if !is_calm && times.awake > began + Duration::from_millis(500) {
+                times.wall -= Duration::from_secs(3600);
+            }
+            times
+        });
+        let out = folder.path().join(name);
+        run(started(Box::new(sim()), fast, clock, &out));
+        let session = Session::open(&out).unwrap();
+        assert_eq!(session.end.as_ref().unwrap().outcome, "finish");
+        rows.push(session.rows);
+        let found = health_of(&out);
+        let anchors: Vec<(Why, f64)> = found
+            .iter()
+            .filter_map(|one| match &one.told {
+                Told::Anchor { why, shift_s, .. } => Some((*why, *shift_s)),
+                _ => None,
+            })
+            .collect();
+        assert_eq!(anchors.first().unwrap().0, Why::Start);
+        assert_eq!(anchors.last().unwrap().0, Why::End);
+        let jumps: Vec<f64> = anchors[1..anchors.len() - 1]
+            .iter()
+            .map(|one| one.1)
+            .collect();
+        match name {
+            "calm" => assert_eq!(jumps, Vec::<f64>::new()),
+            _ => {
+                assert_eq!(jumps.len(), 1, "{jumps:?}");
+                assert!((jumps[0] + 3600.0).abs() < 0.5, "{jumps:?}");
+            }
+        }
+        assert_eq!(session.beside.health.clock_jumps, jumps.len() as u64);
+        let worst = session.beside.health.worst.unwrap();
+        assert!(worst.free_bytes.is_some_and(|free| free > 0), "{worst:?}");
+        assert!(worst.sync_s.is_some_and(|sync_s| sync_s > 0.0), "{worst:?}");
+        assert_eq!(worst.missed_readings, 0);
+        let times: Vec<Nanos> = found.iter().map(|one| one.now).collect();
+        assert!(times.is_sorted(), "{times:?}");
+    }
+    assert_eq!(rows[0], rows[1]);
+}
+
+#[test]
+fn a_computer_that_was_suspended_ends_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("session");
+    let began = host_times().awake;
+    let suspended: Clock = Box::new(move || {
+        let mut times = host_times();
+        if times.awake > began + Duration::from_millis(500) {
+            times.all += Duration::from_secs(20);
+            times.wall += Duration::from_secs(20);
+        }
+        times
+    });
+    run(started(
+        Box::new(sim()),
+        TimeScale::Factor(20.0),
+        suspended,
+        &out,
+    ));
+    let session = Session::open(&out).unwrap();
+    let end = session.end.as_ref().unwrap();
+    assert_eq!(end.outcome, "abort");
+    assert!(
+        end.reason.contains("stood still for 20.0 s"),
+        "{}",
+        end.reason
+    );
+    assert_eq!(session.beside.health.clock_jumps, 1);
+    assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
+}
+
+struct Panicking(u32);
+
+impl Estimator for Panicking {
+    fn push(&mut self, _: Seconds, _: Depth, _: Newtons, _: Newtons) {
+        self.0 += 1;
+        assert!(self.0 < 700, "as if a matrix had no inverse");
+    }
+
+    fn estimate(&self) -> Option<LiveEstimate> {
+        None
+    }
+}
+
+#[test]
+fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut sessions = Vec::new();
+    for name in ["sound", "panicking"] {
+        let out = folder.path().join(name);
+        let mut main_loop = started(Box::new(sim()), TimeScale::Max, Box::new(host_times), &out);
+        let active = main_loop.run.as_mut().unwrap();
+        if name == "panicking" {
+            let config = active.engine().unwrap().config().clone();
+            active.live = LiveFeed::with(&config, |_| Box::new(Panicking(0)));
+        }
+        run(main_loop);
+        sessions.push(Session::open(&out).unwrap());
+    }
+    let [sound, panicking] = &sessions[..] else {
+        panic!("two sessions");
+    };
+    assert_eq!(panicking.end.as_ref().unwrap().outcome, "finish");
+    assert_eq!(panicking.rows, sound.rows);
+    let events = &panicking.beside.health.events;
+    assert_eq!(events.len(), 1, "{events:?}");
+    let text = &events[0].1;
+    assert!(
+        text.contains("as if a matrix had no inverse") && text.contains("is off"),
+        "{text}"
+    );
+    // At full pace nothing else is told: what is in the log does not depend on the computer.
+    assert_eq!(panicking.beside.health.messages, 1);
+    assert_eq!(sound.beside.health.messages, 0);
+}

@@ -1,0 +1,163 @@
+//! A session's samples as an MCAP file of one message each, for programs that draw messages, such as Foxglove and
+//! PlotJuggler. It is no session: its samples are all there, and nothing of what was decided.
+
+use super::{ExportError, Feed, Table, atomic};
+use crate::record::Row;
+use crate::schema::{SAMPLE_TOPIC, sample_metadata, sample_schema};
+use mcap::records::{MessageHeader, Metadata};
+use prost::Message;
+use std::io::{self, Seek, Write};
+use std::path::Path;
+
+/// A chunk is cut when it grows beyond this: what a viewer unpacks at once, about 50 000 samples.
+const CHUNK_BYTES: u64 = 4 << 20;
+
+/// One sample; what is not known is left out.
+#[derive(Clone, PartialEq, prost::Message)]
+struct Sample {
+    #[prost(double, tag = "1")]
+    t_s: f64,
+    #[prost(double, optional, tag = "2")]
+    depth_mm: Option<f64>,
+    #[prost(double, optional, tag = "3")]
+    force_n: Option<f64>,
+    #[prost(double, optional, tag = "4")]
+    signal_v: Option<f64>,
+    #[prost(sint32, optional, tag = "5")]
+    counts: Option<i32>,
+    #[prost(sint64, optional, tag = "6")]
+    pulses: Option<i64>,
+    #[prost(string, tag = "7")]
+    phase: String,
+    #[prost(uint32, tag = "8")]
+    cycle: u32,
+    #[prost(uint64, tag = "9")]
+    sample: u64,
+}
+
+impl Table<'_> {
+    /// Writes the selected samples as messages, and tells how many. The file is new. Samples pass by: no more than
+    /// a chunk of them is in memory. Columns are not chosen, and those beside are left out.
+    pub fn write_messages(&self, path: &Path, feed: Feed) -> Result<u64, ExportError> {
+        atomic::write(path, |file| {
+            let mut writing = Writing::begin(self, file).map_err(failed(path))?;
+            feed(&mut |rows| rows.iter().for_each(|row| writing.take(row)))?;
+            writing.finish().map_err(failed(path))
+        })
+    }
+}
+
+fn failed(path: &Path) -> impl Fn(mcap::McapError) -> ExportError {
+    move |err| {
+        let source = match err {
+            mcap::McapError::Io(source) => source,
+            other => io::Error::other(other),
+        };
+        atomic::io_error(path)(source)
+    }
+}
+
+/// A file that is being written.
+struct Writing<'a, W: Write + Seek> {
+    table: &'a Table<'a>,
+    container: mcap::Writer<W>,
+    channel_id: u16,
+    started_ns: u64,
+    first_tick: Option<u64>,
+    /// Samples seen so far, those selected of them, and those written.
+    seen: u64,
+    selected: u64,
+    written: u64,
+    /// The first failure; nothing is written after it.
+    failure: Option<mcap::McapError>,
+}
+
+impl<'a, W: Write + Seek> Writing<'a, W> {
+    fn begin(table: &'a Table<'a>, file: W) -> mcap::McapResult<Self> {
+        let manifest = table.manifest;
+        let mut container = mcap::WriteOptions::new()
+            .library(format!("palpate {}", manifest.software_version))
+            .compression(Some(mcap::Compression::Zstd))
+            .compression_level(1)
+            .compression_threads(0)
+            .chunk_size(Some(CHUNK_BYTES))
+            .disable_seeking(true)
+            .create(file)?;
+        let schema_id = container.add_schema("palpate.Sample", "protobuf", &sample_schema())?;
+        let channel_id =
+            container.add_channel(schema_id, SAMPLE_TOPIC, "protobuf", &sample_metadata())?;
+        let told = [
+            ("session", manifest.session_id.clone()),
+            ("specimen", manifest.specimen.clone()),
+            ("selection", table.selection.told()),
+            ("notes", serde_json::json!(table.notes).to_string()),
+            ("manifest", serde_json::json!(manifest).to_string()),
+        ];
+        container.write_metadata(&Metadata {
+            name: "palpate".into(),
+            metadata: told.map(|(key, text)| (key.to_owned(), text)).into(),
+        })?;
+        let started_ns = manifest.started_at.timestamp_nanos_opt().unwrap_or(0);
+        Ok(Self {
+            table,
+            container,
+            channel_id,
+            started_ns: u64::try_from(started_ns).unwrap_or(0),
+            first_tick: None,
+            seen: 0,
+            selected: 0,
+            written: 0,
+            failure: None,
+        })
+    }
+
+    fn take(&mut self, row: &Row) {
+        let first_tick = *self.first_tick.get_or_insert(row.tick);
+        // As in a table: a controller that restarted counts from zero again.
+        let ticks = row.tick.wrapping_sub(first_tick) as i64;
+        let (number, t_s) = (self.seen, self.table.manifest.time_of(ticks).0);
+        self.seen += 1;
+        if self.failure.is_some() || !self.table.selection.takes(t_s, row) {
+            return;
+        }
+        if self.selected.is_multiple_of(self.table.selection.step()) {
+            self.failure = self.put(number, t_s, row).err();
+        }
+        self.selected += 1;
+    }
+
+    fn put(&mut self, sample: u64, t_s: f64, row: &Row) -> mcap::McapResult<()> {
+        let message = Sample {
+            t_s,
+            depth_mm: row.depth,
+            force_n: row.force,
+            signal_v: row.volts,
+            counts: row.counts,
+            pulses: row.pulses,
+            phase: row.phase.name().into(),
+            cycle: row.cycle,
+            sample,
+        };
+        let time = self.started_ns.saturating_add(row.host.0);
+        let header = MessageHeader {
+            channel_id: self.channel_id,
+            // A plain count, which begins again after 2^32 messages.
+            sequence: self.written as u32,
+            log_time: time,
+            publish_time: time,
+        };
+        self.written += 1;
+        self.container
+            .write_to_known_channel(&header, &message.encode_to_vec())
+    }
+
+    fn finish(mut self) -> mcap::McapResult<u64> {
+        match self.failure.take() {
+            Some(failure) => Err(failure),
+            None => {
+                self.container.finish()?;
+                Ok(self.written)
+            }
+        }
+    }
+}
