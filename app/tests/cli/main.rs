@@ -6,6 +6,7 @@ mod catalog;
 mod compliance;
 mod disk;
 mod doctor;
+mod emulate;
 mod extremes;
 mod fit;
 mod import;

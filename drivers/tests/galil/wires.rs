@@ -64,6 +64,17 @@ impl Drop for Served {
     }
 }
 
+/// What comes about within ten seconds.
+fn soon<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
+    for _ in 0..1000 {
+        if let Some(got) = attempt() {
+            return got;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("it did not come about");
+}
+
 /// Reads until so many prompts have come.
 fn read_prompts(port: &mut impl Read, prompts: usize) -> String {
     let mut all = Vec::new();
@@ -96,10 +107,12 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     let served = start(Place::Pty(Some(link.clone())), true);
     assert_eq!(served.address, link.display().to_string());
     let open = || {
-        serialport::new(link.display().to_string(), 115_200)
-            .timeout(Duration::from_secs(10))
-            .open()
-            .unwrap()
+        soon(|| {
+            serialport::new(link.display().to_string(), 115_200)
+                .timeout(Duration::from_secs(10))
+                .open()
+                .ok()
+        })
     };
     let mut port = open();
     port.write_all(b"EO 0\r").unwrap();
@@ -109,7 +122,6 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     // The last words of a client that goes away are heard.
     port.write_all(b"STA\r").unwrap();
     drop(port);
-    std::thread::sleep(Duration::from_millis(300));
     let mut port = open();
     port.write_all(b"MG _SCA\r").unwrap();
     let answer = read_prompts(&mut port, 2);
@@ -117,10 +129,8 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     assert!(answer.ends_with(" 4.0000\r\n:"), "{answer:?}");
     // Pulled out and put back: the old port is dead, a new one answers.
     served.orders.send("disconnect:0.3".into()).unwrap();
-    std::thread::sleep(Duration::from_millis(100));
     let mut byte = [0_u8; 1];
     assert!(port.read_exact(&mut byte).is_err());
-    std::thread::sleep(Duration::from_millis(600));
     drop(port);
     let mut port = open();
     port.write_all(b"MG 2\r").unwrap();
@@ -161,10 +171,15 @@ fn eight_clients_connect_and_the_ninth_is_reset() {
     let count = clients[3].read(&mut once).unwrap();
     assert!(once[..count].ends_with(b"\r\n:"));
     drop(clients.pop());
-    std::thread::sleep(Duration::from_millis(100));
-    let mut again = connect();
-    again.write_all(b"WH\r").unwrap();
-    assert_eq!(read_prompts(&mut again, 1), "IHH\r\n:");
+    // The handle is free once the controller has seen its client go.
+    let mut again = soon(|| {
+        let mut again = connect();
+        again.write_all(b"WH\r").ok()?;
+        let mut answer = [0_u8; 6];
+        again.read_exact(&mut answer).ok()?;
+        assert_eq!(&answer, b"IHH\r\n:");
+        Some(again)
+    });
     again.write_all(b"RS\r").unwrap();
     assert_eq!(again.read(&mut once).unwrap(), 0);
 }

@@ -1,0 +1,100 @@
+//! `palpate emulate`.
+
+use super::{palpate, stderr};
+use serde_json::Value;
+use std::io::{BufRead, BufReader, Read, Write};
+use std::net::TcpStream;
+use std::process::{Child, Command, Stdio};
+use std::time::Duration;
+
+/// Ends with the test, whatever happens.
+struct Emulator(Child);
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        // It may have ended by itself.
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
+    let child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["emulate", "galil", "--tcp", "127.0.0.1:0", "--json"])
+        .stdin(Stdio::piped())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let mut emulator = Emulator(child);
+    let mut line = String::new();
+    let mut out = BufReader::new(emulator.0.stdout.take().unwrap());
+    out.read_line(&mut line).unwrap();
+    let ready: Value = serde_json::from_str(&line).unwrap();
+    assert_eq!(
+        (&ready["device"], &ready["model"]),
+        (&"galil".into(), &"dmc4143".into())
+    );
+    assert_eq!(ready["is_serial"], false);
+    let mut port = TcpStream::connect(ready["at"].as_str().unwrap()).unwrap();
+    port.set_read_timeout(Some(Duration::from_secs(10)))
+        .unwrap();
+    let mut ask = |text: &str| {
+        port.write_all(text.as_bytes()).unwrap();
+        let mut answer = String::new();
+        let mut byte = [0_u8];
+        while !answer.ends_with(':') {
+            port.read_exact(&mut byte).unwrap();
+            answer.push(char::from(byte[0]));
+        }
+        answer.trim_end_matches(':').trim().to_owned()
+    };
+    assert_eq!(ask("QZ\r"), "4, 52, 26, 36");
+    let free: f64 = ask("MG @AN[1]\r").parse().unwrap();
+    let mut notes = BufReader::new(emulator.0.stderr.take().unwrap());
+    let mut order = |text: &str| {
+        let stdin = emulator.0.stdin.as_mut().unwrap();
+        stdin.write_all(text.as_bytes()).unwrap();
+        let mut note = String::new();
+        notes.read_line(&mut note).unwrap();
+        note
+    };
+    assert_eq!(order("load 840\n"), "note: 840 g are on the load cell\n");
+    assert!(order("load much\n").contains("give load and a mass in g"));
+    // A sample later the cell feels it.
+    std::thread::sleep(Duration::from_millis(20));
+    let loaded: f64 = ask("MG @AN[1]\r").parse().unwrap();
+    assert!(loaded > free + 0.1, "{free} {loaded}");
+}
+
+#[test]
+fn wrong_use_is_one_sentence() {
+    let folder = tempfile::tempdir().unwrap();
+    for (args, code, part) in [
+        (&["--model", "dmc1820"][..], 2, "choose dmc4143"),
+        (&["--fault", "melt@1"], 2, "garbage, drop"),
+        (
+            &["--pty", "a", "--tcp", "127.0.0.1:0"],
+            2,
+            "cannot be used with",
+        ),
+        (&["--adc", "8"], 2, "12, 16 or none"),
+        // An address of documentation, which no computer has.
+        (
+            &["--tcp", "192.0.2.1:5023"],
+            1,
+            "choose another --pty or --tcp",
+        ),
+        (
+            &["--pty", "no/such/folder"],
+            1,
+            "choose another --pty or --tcp",
+        ),
+    ] {
+        let output = palpate(folder.path(), &[&["emulate", "galil"], args].concat());
+        assert_eq!(output.status.code(), Some(code), "{args:?}");
+        let told = stderr(&output);
+        assert!(told.contains(part) && told.lines().count() == 1, "{told}");
+    }
+}
