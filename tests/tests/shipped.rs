@@ -10,7 +10,7 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::cycles::{CycleSource, of_session};
 use palpate_protocols::engine::{EndingKind, Outcome};
 use palpate_protocols::fidelity::{self, first_verdict};
-use palpate_protocols::file::{Protocol, built_in};
+use palpate_protocols::file::Protocol;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
 use palpate_sessions::Session;
