@@ -16,7 +16,6 @@ use palpate_sessions::{
 use palpate_tests::recorded;
 use std::error::Error;
 use std::path::{Path, PathBuf};
-use std::time::Duration;
 
 /// Batches in a segment of the second session: enough for more than ten segments.
 const BATCHES_PER_SEGMENT: u32 = 150;
@@ -25,7 +24,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let folder = std::env::args().nth(1).ok_or("where to? name a folder")?;
     let folder = PathBuf::from(folder);
     let (wired, rotated) = (folder.join("wired"), folder.join("rotated"));
-    record(&wired)?;
+    record(&wired);
     rewrite(&wired, &rotated)?;
     Session::scan_parts(&rotated, &mut |part| {
         if let Part::Raw(block) = part {
@@ -35,7 +34,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn record(out: &Path) -> Result<(), Box<dyn Error>> {
+fn record(out: &Path) {
     let rig = SimRig::new(SimSettings::default());
     let calibration = rig.calibration();
     let plan = RampHold {
@@ -46,16 +45,7 @@ fn record(out: &Path) -> Result<(), Box<dyn Error>> {
     };
     let rig = Box::new(WiredRig::new(rig));
     let scale = TimeScale::Factor(60.0);
-    let (runner, woken) = recorded::start(rig, calibration, plan.plan(), scale, out);
-    let has_ended = || {
-        let snapshot = runner.snapshot();
-        let run = snapshot.run.as_ref();
-        run.is_some_and(|run| run.outcome.is_some())
-    };
-    while !has_ended() {
-        woken.recv_timeout(Duration::from_secs(60))?;
-    }
-    Ok(())
+    recorded::to_its_end(recorded::start(rig, calibration, plan.plan(), scale, out));
 }
 
 /// The same session in many segments.

@@ -6,7 +6,27 @@ pub mod recorded;
 pub mod searching;
 pub mod simulated;
 
+use palpate_protocols::file::built_in;
+use palpate_protocols::plans::Plan;
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+
+/// The plan of a built-in protocol with some of its parameters set.
+///
+/// # Panics
+/// If there is no such protocol, or it does not take these values.
+#[must_use]
+pub fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
+    let values = values
+        .iter()
+        .map(|(key, value)| ((*key).into(), (*value).into()));
+    let protocol = built_in(name)
+        .expect("a sound protocol")
+        .expect("a built-in protocol");
+    protocol
+        .plan(&values.collect::<BTreeMap<String, String>>())
+        .expect("values that it takes")
+}
 
 /// The root of the source tree.
 #[must_use]

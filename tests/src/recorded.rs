@@ -44,19 +44,26 @@ pub fn of_any_plan(
 ) -> Result<Session, StartError> {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    let (runner, woken) = ask(rig, calibration, plan, TimeScale::Max, &out)?;
-    let has_ended = |runner: &Runner| {
+    let started = ask(rig, calibration, plan, TimeScale::Max, &out)?;
+    to_its_end(started);
+    Ok(Session::open(&out).expect("the session"))
+}
+
+/// Waits until a run that has started is over and its session closed.
+///
+/// # Panics
+/// If the run says nothing for a minute.
+pub fn to_its_end((runner, woken): (Runner, Receiver<()>)) {
+    let has_ended = || {
         let snapshot = runner.snapshot();
         let run = snapshot.run.as_ref();
         run.is_some_and(|run| run.outcome.is_some())
     };
-    while !has_ended(&runner) {
+    while !has_ended() {
         woken
             .recv_timeout(Duration::from_secs(60))
             .expect("the run does not end");
     }
-    drop(runner);
-    Ok(Session::open(&out).expect("the session"))
 }
 
 /// A run that has started, and what says that there is something new of it.

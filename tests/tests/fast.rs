@@ -7,16 +7,15 @@ use palpate_model::fit::{FitOptions, fit};
 use palpate_model::rig::{Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Record};
-use palpate_protocols::file::built_in;
-use palpate_protocols::plans::{Plan, RampHold};
+use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::preview;
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::{EntryKind, Session};
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
+use palpate_tests::shipped;
 use palpate_tests::simulated::run;
-use std::collections::BTreeMap;
 use std::time::Duration;
 
 fn settings(profile: SimProfile, rate: &str, seed: u64) -> SimSettings {
@@ -81,16 +80,6 @@ fn a_fast_rig_finds_contact_and_body_as_well_as_its_samples_allow() {
             }
         }
     }
-}
-
-fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
-    let values = values
-        .iter()
-        .map(|(key, value)| ((*key).into(), (*value).into()));
-    let protocol = built_in(name).unwrap().unwrap();
-    protocol
-        .plan(&values.collect::<BTreeMap<String, String>>())
-        .unwrap()
 }
 
 #[test]

@@ -10,24 +10,15 @@ use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::cycles::{CycleSource, of_session};
 use palpate_protocols::engine::{EndingKind, Outcome};
 use palpate_protocols::fidelity::{self, first_verdict};
-use palpate_protocols::file::{Protocol, built_in};
+use palpate_protocols::file::Protocol;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
 use palpate_sessions::Session;
 use palpate_sessions::edits::Verdict;
 use palpate_tests::recorded::of_plan;
+use palpate_tests::shipped;
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
-
-fn shipped(name: &str, values: &[(&str, &str)]) -> Plan {
-    let values = values
-        .iter()
-        .map(|(key, value)| ((*key).into(), (*value).into()));
-    let protocol = built_in(name).unwrap().unwrap();
-    protocol
-        .plan(&values.collect::<BTreeMap<String, String>>())
-        .unwrap()
-}
 
 fn rig(profile: SimProfile) -> SimRig {
     SimRig::new(SimSettings {

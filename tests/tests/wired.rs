@@ -23,18 +23,7 @@ fn run(rig: Box<dyn Rig>, scale: TimeScale, out: &Path) -> Session {
         hold: Seconds(2.0),
         ..RampHold::default()
     };
-    let (runner, woken) = recorded::start(rig, calibration, plan.plan(), scale, out);
-    let has_ended = || {
-        let snapshot = runner.snapshot();
-        let run = snapshot.run.as_ref();
-        run.is_some_and(|run| run.outcome.is_some())
-    };
-    while !has_ended() {
-        woken
-            .recv_timeout(Duration::from_secs(60))
-            .expect("the run does not end");
-    }
-    drop(runner);
+    recorded::to_its_end(recorded::start(rig, calibration, plan.plan(), scale, out));
     Session::open(out).expect("the session")
 }
 

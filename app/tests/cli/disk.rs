@@ -13,6 +13,15 @@ fn has_no_namespace(done: &std::io::Result<Output>) -> bool {
     }
 }
 
+/// Runs a script as root of a mount namespace of its own; `$0` is palpate.
+fn in_own_namespace(at: &Path, script: &str) -> std::io::Result<Output> {
+    Command::new("unshare")
+        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
+        .current_dir(at)
+        .stdin(Stdio::null())
+        .output()
+}
+
 /// Runs with `variables` on a 24 MB file system of its own, in a mount namespace, that fills up in mid-run: what the
 /// run said, on stdout as JSON and on stderr. The session is copied to `saved`. Why not, where this machine has
 /// no such namespace.
@@ -29,11 +38,7 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Result<(Value, Str
         cp -r disk/session saved
     "#;
     let script = format!("{variables}\n{script}");
-    let done = Command::new("unshare")
-        .args(["-Urm", "sh", "-c", &script, env!("CARGO_BIN_EXE_palpate")])
-        .current_dir(at)
-        .stdin(Stdio::null())
-        .output();
+    let done = in_own_namespace(at, &script);
     match done {
         Ok(output) if output.status.code() == Some(0) => {}
         other if has_no_namespace(&other) => {
@@ -110,11 +115,7 @@ fn a_disk_without_room_is_refused_before_the_start() {
     std::fs::create_dir(at.join("disk")).unwrap();
     let script = r#"mount -t tmpfs -o size=4m none disk || exit 77
         exec "$0" run ramp-hold --time-scale max --out disk/session"#;
-    let output = Command::new("unshare")
-        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
-        .current_dir(at)
-        .stdin(Stdio::null())
-        .output();
+    let output = in_own_namespace(at, script);
     match output {
         Ok(output) if output.status.code() == Some(2) => {
             assert!(
@@ -137,11 +138,7 @@ fn a_library_that_may_not_be_written_is_searched() {
     succeeded(&short_run(at, "library/sessions/one", &[]));
     let script = r#"mount --bind library library && mount -o remount,ro,bind library || exit 77
         PALPATE_HOME=$PWD/library exec "$0" find --json"#;
-    let output = Command::new("unshare")
-        .args(["-Urm", "sh", "-c", script, env!("CARGO_BIN_EXE_palpate")])
-        .current_dir(at)
-        .stdin(Stdio::null())
-        .output();
+    let output = in_own_namespace(at, script);
     match output {
         other if has_no_namespace(&other) => {
             println!("skipped: no mount namespace here ({other:?})");

@@ -14,7 +14,7 @@ use palpate_model::signal::MovingMean;
 use palpate_model::units::{Newtons, Position};
 
 /// Milliseconds averaged before a force is compared: late by 5 ms only, a few micrometres at these speeds.
-const FILTER_SAMPLES: usize = 10;
+const FILTER_MS: usize = 10;
 
 /// How far past the first touch the second may go, in mm.
 const PASS_OVERRUN_MM: f64 = 0.5;
@@ -50,7 +50,7 @@ pub(crate) struct BaseSearch {
 impl BaseSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindBase) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let samples = FILTER_SAMPLES * cx.state.config.rig.samples_per_ms() as usize;
+        let samples = FILTER_MS * cx.state.config.rig.samples_per_ms() as usize;
         let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if plan.approach_speed > FindBase::SPEED_MAX || plan.pass_speed > FindBase::SPEED_MAX {
             return Err(format!(
@@ -71,7 +71,7 @@ impl BaseSearch {
             criterion,
             stage: Stage::Approach,
             millisecond: Millisecond::of(&cx.state.config.rig),
-            filter: MovingMean::new(FILTER_SAMPLES),
+            filter: MovingMean::new(FILTER_MS),
             first: Position(0.0),
             samples: Vec::new(),
         })

@@ -19,13 +19,13 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use std::collections::VecDeque;
 
 /// Milliseconds averaged before a force is compared with a criterion: two to three mains cycles.
-const FILTER_SAMPLES: usize = 50;
+const FILTER_MS: usize = 50;
 
 /// Consecutive milliseconds that must be above the criterion: filtered, and raw where the plan presses.
 const CONSECUTIVE: u32 = 10;
 
 /// A mean of so few milliseconds is late by 5 ms only: what is hard is noticed by it.
-const FAST_SAMPLES: usize = 10;
+const FAST_MS: usize = 10;
 
 /// A press ends early where the fast mean is above this: filter and brake need what is left to [`FORCE_MAX`].
 const FORCE_FAST_MAX: Newtons = Newtons(0.45);
@@ -51,7 +51,7 @@ const FORCE_MAX: Newtons = Newtons(0.5);
 const PASS_OVERRUN_MM: f64 = 4.0;
 
 /// Milliseconds averaged into one point of the fit of a second pass alone: 100 points a second.
-const POINT_SAMPLES: u32 = 10;
+const POINT_MS: u32 = 10;
 
 /// Distance from contact at which the tissue recovers untouched, in mm.
 const CLEARANCE_MM: f64 = 1.0;
@@ -113,7 +113,7 @@ struct Bin {
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let samples = FILTER_SAMPLES * cx.state.config.rig.samples_per_ms() as usize;
+        let samples = FILTER_MS * cx.state.config.rig.samples_per_ms() as usize;
         let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if criterion > CRITERION_MAX {
             return Err(format!(
@@ -134,8 +134,8 @@ impl ContactSearch {
             criterion,
             stage: Stage::Approach,
             millisecond: Millisecond::of(&cx.state.config.rig),
-            filter: MovingMean::new(FILTER_SAMPLES),
-            fast: MovingMean::new(FAST_SAMPLES),
+            filter: MovingMean::new(FILTER_MS),
+            fast: MovingMean::new(FAST_MS),
             seen: 0,
             above: 0,
             raw: VecDeque::with_capacity(CONSECUTIVE as usize),
@@ -284,7 +284,7 @@ impl ContactSearch {
 
     /// Refuses a load before the approach and a force that contact finding must not exert.
     fn check_force(&self, filtered: Newtons, fast: Newtons) -> Result<(), String> {
-        if self.seen == FILTER_SAMPLES && filtered.abs() >= self.criterion {
+        if self.seen == FILTER_MS && filtered.abs() >= self.criterion {
             return Err(format!(
                 "the load cell reads {filtered:.3} before the tissue is met; free the probe and tare again"
             ));
@@ -385,8 +385,8 @@ impl ContactSearch {
         bin.t += (reading.tick - self.pass_start_tick) as f64 * cx.state.config.rig.tick().0;
         bin.position += position.0;
         bin.force += force.0;
-        if bin.count == POINT_SAMPLES {
-            let count = f64::from(POINT_SAMPLES);
+        if bin.count == POINT_MS {
+            let count = f64::from(POINT_MS);
             self.points.push(ContactPoint {
                 t: Seconds(bin.t / count),
                 position: Position(bin.position / count),

@@ -4,7 +4,7 @@ use palpate_model::signal::TouchPoint;
 use palpate_model::units::{Newtons, Position, Seconds};
 
 /// Milliseconds averaged into one point: 50 points a second, in which the fastest approach goes 0.03 mm.
-const POINT_SAMPLES: u32 = 20;
+const POINT_MS: u32 = 20;
 
 /// Points kept of the way to the tissue, 5 s: they tell offset and drift.
 const LEAD_POINTS: usize = 250;
@@ -56,7 +56,7 @@ impl TouchLog {
         bin.position += position.0;
         bin.force += force.0;
         bin.is_uncounted |= counts == Counts::No;
-        if bin.count < POINT_SAMPLES {
+        if bin.count < POINT_MS {
             return;
         }
         let count = f64::from(bin.count);

@@ -17,7 +17,7 @@ use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{Block, EndRecord, Entry, Row};
 use palpate_model::Nanos;
 use std::collections::BTreeMap;
-use std::io;
+use std::io::{self, Read};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -215,12 +215,9 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         Ok(())
     };
     add(path).map_err(failed)?;
-    if let Ok(spare) = std::fs::read_to_string(path.join(SPARE_FILE)) {
-        let spare = PathBuf::from(spare);
-        // It is only made when it is needed.
-        if spare.is_dir() {
-            add(&spare).map_err(failed)?;
-        }
+    // If it is not there, neither is its disk: see `absent_spare`.
+    if let Some(spare) = spare_of(path).filter(|spare| spare.is_dir()) {
+        add(&spare).map_err(failed)?;
     }
     // A missing one is listed too: it will be looked for and not found.
     let last = found.last_key_value().map_or(0, |(number, _)| *number);
@@ -234,12 +231,26 @@ pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
         .collect())
 }
 
+/// The other folder that segments of a session may be in.
+fn spare_of(path: &Path) -> Option<PathBuf> {
+    let pointer = path.join(SPARE_FILE);
+    // Whatever somebody put there in place of the file is neither waited for nor read without end.
+    if !std::fs::symlink_metadata(&pointer).ok()?.is_file() {
+        return None;
+    }
+    let mut spare = String::new();
+    let mut file = std::fs::File::open(pointer).ok()?.take(SPARE_BYTES_MAX);
+    file.read_to_string(&mut spare).ok()?;
+    (!spare.is_empty()).then(|| spare.into())
+}
+
+/// The longest path that Linux takes (`PATH_MAX`).
+const SPARE_BYTES_MAX: u64 = 4096;
+
 /// The folder that segments may be in and that is not there, as on a disk that is not connected. The writer makes
 /// it before the log.
 pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
-    let spare = std::fs::read_to_string(path.join(SPARE_FILE)).ok()?;
-    let is_absent = !spare.is_empty() && !Path::new(&spare).is_dir();
-    is_absent.then(|| spare.into())
+    spare_of(path).filter(|spare| !spare.is_dir())
 }
 
 /// What to say of such a folder.

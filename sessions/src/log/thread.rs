@@ -222,10 +222,10 @@ impl SessionWriter {
     ) -> Result<Self, LogError> {
         let source = match spare {
             None => FolderSegments::new(folder.path()),
-            Some(spare) => {
-                FolderSegments::with_spare(folder.path(), spare, &manifest.session_id)
-                    .map_err(|err| LogError::disk(&err, &folder.path().display().to_string()))?
-            }
+            Some(spare) => FolderSegments::with_spare(folder.path(), spare, &manifest.session_id)
+                .map_err(|err| {
+                LogError::disk(&err, &format!("in the spare folder {}", spare.display()))
+            })?,
         };
         let mut writer = Self::start_in_segments(source, BATCHES_PER_SEGMENT, manifest, pace)?;
         writer._folder = Some(folder);
