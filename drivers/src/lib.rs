@@ -5,6 +5,7 @@
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
 //! no hardware. [`doubles`] is for tests only, [`emulate`] answers like a device on a wire.
 
+pub mod cell;
 pub mod doubles;
 pub mod emulate;
 pub mod galil;
