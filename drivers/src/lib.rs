@@ -6,6 +6,7 @@
 //! no hardware. [`doubles`] is for tests only, [`emulate`] answers like a device on a wire.
 
 pub mod cell;
+pub mod detect;
 pub mod doubles;
 pub mod emulate;
 pub mod galil;

@@ -23,6 +23,8 @@ pub struct Row {
     pub tick: u64,
     /// Arrival on the host's clock.
     pub host: Nanos,
+    /// The sample was taken at most so long before it arrived; `None` where the link does not tell.
+    pub age_max: Option<Nanos>,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
     /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
@@ -144,6 +146,8 @@ pub(crate) struct DaqBlock {
     pub pulses_delta: Vec<i64>,
     #[prost(uint32, repeated, tag = "7")]
     pub status: Vec<u32>,
+    #[prost(uint64, repeated, tag = "8")]
+    pub age_max_ns: Vec<u64>,
 }
 
 /// Derived values of the same samples; where `validity` lacks a value's bit, it is 0.
@@ -178,16 +182,17 @@ pub(crate) struct View {
     pub cycle: u32,
 }
 
-/// Which of its optional values a row has: counts, volts and pulses.
-fn held(row: &Row) -> [bool; 3] {
+/// Which of its optional values a row has: age, counts, volts and pulses.
+fn held(row: &Row) -> [bool; 4] {
     [
+        row.age_max.is_some(),
         row.counts.is_some(),
         row.volts.is_some(),
         row.pulses.is_some(),
     ]
 }
 
-/// Cuts rows where a block must end: at its size limit, and where counts, volts or pulses appear or vanish.
+/// Cuts rows where a block must end: at its size limit, and where optional values appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
     rows.chunk_by(|a, b| held(a) == held(b))
         .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
@@ -212,6 +217,7 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
             pulses = to;
         }
         (tick, host) = (row.tick, row.host.0);
+        daq.age_max_ns.extend(row.age_max.map(|age| age.0));
         daq.counts.extend(row.counts);
         daq.volts.extend(row.volts);
         daq.status.push(row.status);
@@ -227,7 +233,7 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
 }
 
 /// Bytes of the largest block: every value of a sample in its longest form.
-const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 48;
+const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 58;
 
 /// A verified block of samples, column by column. Its memory is used again for the next one.
 #[derive(Debug, Default)]
@@ -288,6 +294,7 @@ impl Block {
         Row {
             tick: daq.tick_delta[index] as u64,
             host: Nanos(daq.host_delta_ns[index] as u64),
+            age_max: daq.age_max_ns.get(index).map(|ns| Nanos(*ns)),
             counts: daq.counts.get(index).copied(),
             volts: daq.volts.get(index).copied(),
             pulses: daq.pulses_delta.get(index).copied(),
@@ -322,6 +329,7 @@ impl Block {
             (5, Field::Bytes(bytes)) => extend_doubles(&mut daq.volts, bytes),
             (6, Field::Bytes(bytes)) => extend_numbers(&mut daq.pulses_delta, bytes, zigzag),
             (7, Field::Bytes(bytes)) => extend_numbers(&mut daq.status, bytes, |it| it as u32),
+            (8, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_max_ns, bytes, |it| it),
             _ => Ok(()),
         })
     }
@@ -365,7 +373,12 @@ impl Block {
             derived.phase.len(),
             derived.cycle.len(),
         ];
-        let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
+        let optional = [
+            daq.counts.len(),
+            daq.volts.len(),
+            daq.pulses_delta.len(),
+            daq.age_max_ns.len(),
+        ];
         let is_odd = |length: &usize| *length > 0 && *length != count;
         if lengths.iter().any(|&length| length != count) || optional.iter().any(is_odd) {
             return Err("the columns of a sample block differ in length".into());
@@ -439,6 +452,7 @@ mod tests {
         Row {
             tick,
             host: Nanos(u64::MAX - tick),
+            age_max: None,
             counts,
             volts: Some(0.1 + tick as f64 * 1e-17),
             pulses: Some(i64::MIN.wrapping_add(tick as i64)),
@@ -464,7 +478,14 @@ mod tests {
                 pulses: None,
                 ..row(13, Some(1))
             },
-            row(14, Some(2)),
+            Row {
+                age_max: Some(Nanos(u64::MAX)),
+                ..row(14, Some(2))
+            },
+            Row {
+                age_max: Some(Nanos(0)),
+                ..row(15, Some(2))
+            },
         ];
         let mut back = Vec::new();
         let mut first = 0;

@@ -128,6 +128,7 @@ impl Channel {
                 ("volts", "V"),
                 ("pulses_delta", "pulses"),
                 ("status", "bits"),
+                ("age_max_ns", "ns"),
             ],
             Self::Derived => &[
                 ("force_newtons", "N"),
@@ -200,6 +201,7 @@ const DAQ_FIELDS: &[Field] = &[
     ("volts", 5, Label::Repeated, Type::Double),
     ("pulses_delta", 6, Label::Repeated, Type::Sint64),
     ("status", 7, Label::Repeated, Type::Uint32),
+    ("age_max_ns", 8, Label::Repeated, Type::Uint64),
 ];
 
 const DERIVED_FIELDS: &[Field] = &[
@@ -341,6 +343,7 @@ mod tests {
             volts: vec![1.0],
             pulses_delta: vec![1],
             status: vec![1],
+            age_max_ns: vec![1],
         };
         assert_eq!(wire_fields(&daq.encode_to_vec()), promised(DAQ_FIELDS));
         let derived = DerivedBlock {

@@ -192,17 +192,7 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         ));
     }
     let source = Source::find(calibration)?;
-    let file = palpate_drivers::read_rig_file(&args.rig).map_err(Failure::usage)?;
-    // Two programs may be connected to one controller on a network; only one may drive it.
-    let place: String = file
-        .place
-        .to_string()
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-        .collect();
-    let lock = rig_lock(&place)?;
-    let rig = palpate_drivers::open_wired(&args.rig, &driver_clock())
-        .map_err(|err| Failure::Failed(err.to_string()))?;
+    let (rig, lock) = open_rig_file(&args.rig)?;
     let limits = Limits::for_travel(travel(args, rig.description().travel)?);
     let doubts = source.doubts(&rig.description().name);
     Ok(OpenRig {
@@ -212,6 +202,22 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         limits,
         _lock: Some(lock),
     })
+}
+
+/// Opens the rig of a file and keeps other programs off it.
+pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, HolderLock), Failure> {
+    let file = palpate_drivers::read_rig_file(file_name).map_err(Failure::usage)?;
+    // Two programs may be connected to one controller on a network; only one may drive it.
+    let place: String = file
+        .place
+        .to_string()
+        .chars()
+        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
+        .collect();
+    let lock = rig_lock(&place)?;
+    let rig = palpate_drivers::open_wired(file_name, &driver_clock())
+        .map_err(|err| Failure::Failed(err.to_string()))?;
+    Ok((rig, lock))
 }
 
 /// The end of the travel: the rig's, or one before it.

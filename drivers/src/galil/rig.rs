@@ -139,6 +139,10 @@ impl Rig for GalilRig {
         false
     }
 
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        vec![("galil".to_owned(), self.stats())]
+    }
+
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.first_raw);
         raw.extend(self.line.take_raw());

@@ -1,5 +1,6 @@
 //! What a rig reports with every sample.
 
+use crate::Nanos;
 use crate::units::Volts;
 use serde::{Deserialize, Serialize};
 use std::ops::BitOr;
@@ -50,4 +51,8 @@ pub struct Reading {
     pub pulses: i64,
     /// State of the axis.
     pub status: AxisStatus,
+    /// The sample was taken at most so long before it reached the host, as far as the link tells: controller time and
+    /// host time belong together within this.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub age_max: Option<Nanos>,
 }

@@ -19,6 +19,9 @@ use std::time::Duration;
 /// Grid of the watchdog: silence is judged this often in session time.
 const TICK: Nanos = Nanos::from_millis(10);
 
+/// How often a rig on wires is asked what has come: an interlock decides so late at most.
+const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
+
 /// How far time runs between looks at the requests, at full pace.
 const STRIDE_MAX: Nanos = Nanos::from_millis(100);
 
@@ -229,6 +232,7 @@ impl MainLoop {
     fn stride(&self) -> Nanos {
         match self.pace() {
             TimeScale::Max => STRIDE_MAX,
+            _ if !self.rig.is_virtual() => STRIDE_WIRED,
             TimeScale::Factor(factor) => {
                 Nanos(((TICK.0 as f64 * factor) as u64).clamp(1_000_000, STRIDE_MAX.0))
             }

@@ -23,6 +23,7 @@ enum Field {
     Tick,
     Host,
     Status,
+    AgeMax,
     /// One of [`Beside`], by number.
     Beside(usize),
     /// The number of the sample, in a table that holds every so many only.
@@ -61,13 +62,14 @@ const USUAL: [Field; 8] = [
 ];
 
 /// Columns that can be asked for by name.
-const MORE: [Field; 6] = [
+const MORE: [Field; 7] = [
     Field::SessionId,
     Field::Specimen,
     Field::Sample,
     Field::Tick,
     Field::Host,
     Field::Status,
+    Field::AgeMax,
 ];
 
 /// Columns that stand beside the session's own, such as corrected depths.
@@ -179,6 +181,13 @@ impl Field {
                 "whole number",
                 "bits of the axis' status",
                 "as received",
+            ),
+            Self::AgeMax => (
+                "age_max_ns",
+                "ns",
+                "whole number",
+                "the sample was taken at most so long before it arrived; empty where the link does not tell",
+                "measured by the driver, sample by sample",
             ),
             // Named by those who make them.
             Self::Beside(_) | Self::EveryNth => ("", "", "", "", ""),
@@ -328,7 +337,9 @@ impl Cells {
             Field::Depth | Field::Force | Field::Signal | Field::Beside(_) => {
                 Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
             }
-            Field::Pulses => Self::MaybeWide(MutablePrimitiveArray::with_capacity(room)),
+            Field::Pulses | Field::AgeMax => {
+                Self::MaybeWide(MutablePrimitiveArray::with_capacity(room))
+            }
             Field::Counts => Self::MaybeWhole(MutablePrimitiveArray::with_capacity(room)),
         }
     }
@@ -360,7 +371,11 @@ impl Cells {
                 }
                 _ => cells.extend(rows.map(|row| row.volts)),
             },
-            Self::MaybeWide(cells) => cells.extend(rows.map(|row| row.pulses)),
+            Self::MaybeWide(cells) => match field {
+                // Longer than a session lasts, and so is i64::MAX nanoseconds.
+                Field::AgeMax => cells.extend(rows.map(|row| row.age_max.map(|age| age.0 as i64))),
+                _ => cells.extend(rows.map(|row| row.pulses)),
+            },
             Self::MaybeWhole(cells) => cells.extend(rows.map(|row| row.counts)),
         }
     }
