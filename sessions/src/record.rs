@@ -7,7 +7,7 @@
 
 use crate::packed::{Field, extend_doubles, extend_numbers, next_field, zigzag};
 use palpate_model::Nanos;
-use palpate_model::rig::Phase;
+use palpate_model::rig::{Age, Phase};
 use serde::{Deserialize, Serialize};
 
 /// Most samples in one block, so that a block and its decoded form stay small.
@@ -23,8 +23,8 @@ pub struct Row {
     pub tick: u64,
     /// Arrival on the host's clock.
     pub host: Nanos,
-    /// The sample was taken at most so long before it arrived; `None` where the link does not tell.
-    pub age_max: Option<Nanos>,
+    /// How long before it arrived it was taken; `None` where the link does not tell.
+    pub age: Option<Age>,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
     /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
@@ -147,7 +147,9 @@ pub(crate) struct DaqBlock {
     #[prost(uint32, repeated, tag = "7")]
     pub status: Vec<u32>,
     #[prost(uint64, repeated, tag = "8")]
-    pub age_max_ns: Vec<u64>,
+    pub age_ns: Vec<u64>,
+    #[prost(uint64, repeated, tag = "9")]
+    pub age_within_ns: Vec<u64>,
 }
 
 /// Derived values of the same samples; where `validity` lacks a value's bit, it is 0.
@@ -185,7 +187,7 @@ pub(crate) struct View {
 /// Which of its optional values a row has: age, counts, volts and pulses.
 fn held(row: &Row) -> [bool; 4] {
     [
-        row.age_max.is_some(),
+        row.age.is_some(),
         row.counts.is_some(),
         row.volts.is_some(),
         row.pulses.is_some(),
@@ -217,7 +219,8 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
             pulses = to;
         }
         (tick, host) = (row.tick, row.host.0);
-        daq.age_max_ns.extend(row.age_max.map(|age| age.0));
+        daq.age_ns.extend(row.age.map(|age| age.by.0));
+        daq.age_within_ns.extend(row.age.map(|age| age.within.0));
         daq.counts.extend(row.counts);
         daq.volts.extend(row.volts);
         daq.status.push(row.status);
@@ -232,8 +235,15 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     (daq, derived)
 }
 
+fn age(daq: &DaqBlock, index: usize) -> Option<Age> {
+    Some(Age {
+        by: Nanos(*daq.age_ns.get(index)?),
+        within: Nanos(*daq.age_within_ns.get(index)?),
+    })
+}
+
 /// Bytes of the largest block: every value of a sample in its longest form.
-const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 58;
+const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 68;
 
 /// A verified block of samples, column by column. Its memory is used again for the next one.
 #[derive(Debug, Default)]
@@ -294,7 +304,7 @@ impl Block {
         Row {
             tick: daq.tick_delta[index] as u64,
             host: Nanos(daq.host_delta_ns[index] as u64),
-            age_max: daq.age_max_ns.get(index).map(|ns| Nanos(*ns)),
+            age: age(daq, index),
             counts: daq.counts.get(index).copied(),
             volts: daq.volts.get(index).copied(),
             pulses: daq.pulses_delta.get(index).copied(),
@@ -329,7 +339,8 @@ impl Block {
             (5, Field::Bytes(bytes)) => extend_doubles(&mut daq.volts, bytes),
             (6, Field::Bytes(bytes)) => extend_numbers(&mut daq.pulses_delta, bytes, zigzag),
             (7, Field::Bytes(bytes)) => extend_numbers(&mut daq.status, bytes, |it| it as u32),
-            (8, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_max_ns, bytes, |it| it),
+            (8, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_ns, bytes, |it| it),
+            (9, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_within_ns, bytes, |it| it),
             _ => Ok(()),
         })
     }
@@ -377,7 +388,8 @@ impl Block {
             daq.counts.len(),
             daq.volts.len(),
             daq.pulses_delta.len(),
-            daq.age_max_ns.len(),
+            daq.age_ns.len(),
+            daq.age_within_ns.len(),
         ];
         let is_odd = |length: &usize| *length > 0 && *length != count;
         if lengths.iter().any(|&length| length != count) || optional.iter().any(is_odd) {
@@ -452,7 +464,7 @@ mod tests {
         Row {
             tick,
             host: Nanos(u64::MAX - tick),
-            age_max: None,
+            age: None,
             counts,
             volts: Some(0.1 + tick as f64 * 1e-17),
             pulses: Some(i64::MIN.wrapping_add(tick as i64)),
@@ -479,11 +491,17 @@ mod tests {
                 ..row(13, Some(1))
             },
             Row {
-                age_max: Some(Nanos(u64::MAX)),
+                age: Some(Age {
+                    by: Nanos(u64::MAX),
+                    within: Nanos(1),
+                }),
                 ..row(14, Some(2))
             },
             Row {
-                age_max: Some(Nanos(0)),
+                age: Some(Age {
+                    by: Nanos(0),
+                    within: Nanos(u64::MAX),
+                }),
                 ..row(15, Some(2))
             },
         ];

@@ -100,7 +100,7 @@ impl Sampler {
             volts: Volts(volts),
             pulses: self.settings.sign() * given,
             status,
-            age_max: None,
+            age: None,
         }))
     }
 

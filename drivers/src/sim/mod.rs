@@ -204,7 +204,7 @@ impl SimRig {
             volts,
             pulses: axis.pulses,
             status: axis.status,
-            age_max: None,
+            age: None,
         };
         self.report(at, RigEventBody::Reading(reading));
     }

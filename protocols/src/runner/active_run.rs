@@ -282,7 +282,7 @@ impl ActiveRun {
         let row = Row {
             tick: reading.tick,
             host: now,
-            age_max: reading.age_max,
+            age: reading.age,
             counts: reading.counts,
             volts: Some(reading.volts.0),
             pulses: Some(reading.pulses),

@@ -23,7 +23,8 @@ enum Field {
     Tick,
     Host,
     Status,
-    AgeMax,
+    Age,
+    AgeWithin,
     /// One of [`Beside`], by number.
     Beside(usize),
     /// The number of the sample, in a table that holds every so many only.
@@ -62,14 +63,15 @@ const USUAL: [Field; 8] = [
 ];
 
 /// Columns that can be asked for by name.
-const MORE: [Field; 7] = [
+const MORE: [Field; 8] = [
     Field::SessionId,
     Field::Specimen,
     Field::Sample,
     Field::Tick,
     Field::Host,
     Field::Status,
-    Field::AgeMax,
+    Field::Age,
+    Field::AgeWithin,
 ];
 
 /// Columns that stand beside the session's own, such as corrected depths.
@@ -182,11 +184,18 @@ impl Field {
                 "bits of the axis' status",
                 "as received",
             ),
-            Self::AgeMax => (
-                "age_max_ns",
+            Self::Age => (
+                "age_ns",
                 "ns",
                 "whole number",
-                "the sample was taken at most so long before it arrived; empty where the link does not tell",
+                "the sample was taken so long before it arrived; empty where the link does not tell",
+                "measured by the driver, sample by sample",
+            ),
+            Self::AgeWithin => (
+                "age_within_ns",
+                "ns",
+                "whole number",
+                "how far age_ns may be wrong either way; empty where the link does not tell",
                 "measured by the driver, sample by sample",
             ),
             // Named by those who make them.
@@ -337,7 +346,7 @@ impl Cells {
             Field::Depth | Field::Force | Field::Signal | Field::Beside(_) => {
                 Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
             }
-            Field::Pulses | Field::AgeMax => {
+            Field::Pulses | Field::Age | Field::AgeWithin => {
                 Self::MaybeWide(MutablePrimitiveArray::with_capacity(room))
             }
             Field::Counts => Self::MaybeWhole(MutablePrimitiveArray::with_capacity(room)),
@@ -372,8 +381,9 @@ impl Cells {
                 _ => cells.extend(rows.map(|row| row.volts)),
             },
             Self::MaybeWide(cells) => match field {
-                // Longer than a session lasts, and so is i64::MAX nanoseconds.
-                Field::AgeMax => cells.extend(rows.map(|row| row.age_max.map(|age| age.0 as i64))),
+                // No link is as slow as i64::MAX nanoseconds.
+                Field::Age => cells.extend(rows.map(|row| row.age.map(|age| age.by.0 as i64))),
+                Field::AgeWithin => cells.extend(rows.map(|row| row.age.map(|age| age.within.0 as i64))),
                 _ => cells.extend(rows.map(|row| row.pulses)),
             },
             Self::MaybeWhole(cells) => cells.extend(rows.map(|row| row.counts)),

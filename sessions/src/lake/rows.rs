@@ -47,7 +47,7 @@ pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
         rows.push(Row {
             tick: tick.ok_or_else(|| missing("tick"))?,
             host: Nanos(host.ok_or_else(|| missing("host_ns"))?),
-            age_max: None,
+            age: None,
             counts,
             volts,
             pulses,
