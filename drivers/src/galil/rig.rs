@@ -40,16 +40,15 @@ impl GalilRig {
         clock: HostClock,
     ) -> Result<Self, GalilOpenError> {
         let device: Arc<str> = "galil".into();
+        let connected = connect(link.as_mut(), &clock, settings, &device)?;
+        let session = Session::new(settings.clone(), &connected, clock());
         let Connected {
             board,
             description,
-            pace,
-            stats,
-            has_watchdog,
             worst_case_mm,
             raw,
-        } = connect(link.as_mut(), &clock, settings, &device)?;
-        let session = Session::new(settings.clone(), pace, has_watchdog, stats, clock());
+            ..
+        } = connected;
         let line_settings = LineSettings {
             device,
             farewell: format!("ST{}\r", settings.axis).into_bytes(),

@@ -4,7 +4,8 @@ use palpate_drivers::RigEventBody;
 use palpate_drivers::emulate::Device;
 use palpate_drivers::emulate::galil::{self, GalilEmulator};
 use palpate_drivers::galil::{
-    AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Session, connect,
+    AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Sampling, Session,
+    connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_model::Nanos;
@@ -113,6 +114,8 @@ pub fn thesis() -> GalilSettings {
         filter: None,
         serial_number: None,
         has_watchdog: true,
+        sampling: Sampling::Poll,
+        sample_us: None,
     }
 }
 
@@ -160,13 +163,7 @@ impl Host {
     pub fn on(wire: Shared, settings: &GalilSettings) -> Self {
         let connected = try_connect(&wire, settings).expect("it connects");
         let now = wire.lock().now;
-        let session = Session::new(
-            settings.clone(),
-            connected.pace,
-            connected.has_watchdog,
-            connected.stats,
-            now,
-        );
+        let session = Session::new(settings.clone(), &connected, now);
         Self {
             wire,
             session,
