@@ -8,5 +8,7 @@ mod faults;
 mod moves;
 #[path = "galil_driver/opening.rs"]
 mod opening;
+#[path = "galil_driver/recording.rs"]
+mod recording;
 #[path = "galil_driver/wires.rs"]
 mod wires;

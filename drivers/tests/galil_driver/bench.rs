@@ -153,6 +153,8 @@ pub struct Host {
     pub acks: Vec<RigCommand>,
     pub faults: Vec<Fault>,
     pub is_attended: bool,
+    /// Readings that had come before the newest acknowledgement.
+    pub acked_behind: usize,
 }
 
 impl Host {
@@ -172,6 +174,7 @@ impl Host {
             acks: Vec::new(),
             faults: Vec::new(),
             is_attended: true,
+            acked_behind: 0,
         }
     }
 
@@ -195,7 +198,10 @@ impl Host {
         while let Some((_, body)) = self.session.take_event() {
             match body {
                 RigEventBody::Reading(reading) => self.readings.push(reading),
-                RigEventBody::Ack(ack) => self.acks.push(ack.command),
+                RigEventBody::Ack(ack) => {
+                    self.acked_behind = self.readings.len();
+                    self.acks.push(ack.command);
+                }
                 RigEventBody::Fault(fault) => self.faults.push(fault),
             }
         }
