@@ -10,5 +10,7 @@ mod moves;
 mod opening;
 #[path = "galil_driver/recording.rs"]
 mod recording;
+#[path = "galil_driver/sines.rs"]
+mod sines;
 #[path = "galil_driver/wires.rs"]
 mod wires;

@@ -360,7 +360,8 @@ impl Session {
         match recording.look(look, marked) {
             Ok(()) => {
                 self.stats.lost = recording.lost;
-                self.timing.push(look.time as u64, sent, now);
+                self.timing
+                    .push(look.time as u64, self.pace.tick, sent, now);
                 self.fetch(now);
             }
             Err(_) => {
@@ -435,7 +436,7 @@ impl Session {
             Some(Sampled::Reading(reading)) => {
                 self.is_motion_begun = false;
                 if let Some(sent) = sent {
-                    self.timing.push(reading.tick, sent, now);
+                    self.timing.push(reading.tick, self.pace.tick, sent, now);
                 }
                 self.report(now, RigEventBody::Reading(reading));
             }
@@ -677,6 +678,9 @@ impl Dialogue for Session {
     }
 
     fn stats(&self) -> LinkStats {
-        self.stats
+        LinkStats {
+            deviation_max: self.timing.deviation_max,
+            ..self.stats
+        }
     }
 }

@@ -12,6 +12,8 @@ const DRIFT: f64 = 2e-4;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Timing {
     best: Option<Span>,
+    /// How far the middle of a question was from where the controller's clock said, at most.
+    pub deviation_max: Nanos,
 }
 
 #[derive(Clone, Copy, Debug)]
@@ -34,13 +36,17 @@ impl Span {
 }
 
 impl Timing {
-    /// Takes a question's times and the tick that it told.
-    pub fn push(&mut self, tick: u64, asked: Nanos, answered: Nanos) {
+    /// Takes a question's times and the tick that it told, for ticks of a length.
+    pub fn push(&mut self, tick: u64, length: Nanos, asked: Nanos, answered: Nanos) {
         let span = Span {
             tick,
             asked,
             answered,
         };
+        if let Some(at) = self.host_time(tick, length) {
+            let off = (span.middle() - at.0 as f64).abs();
+            self.deviation_max = self.deviation_max.max(Nanos(off.round() as u64));
+        }
         let is_better = |best: Span| span.uncertainty(answered) <= best.uncertainty(answered);
         if self.best.is_none_or(is_better) {
             self.best = Some(span);
@@ -75,15 +81,17 @@ mod tests {
     fn the_narrowest_span_counts_until_drift_has_made_it_wider() {
         let tick = Nanos(1_000_000);
         let mut timing = Timing::default();
-        timing.push(10, Nanos(10_000_000), Nanos(10_400_000));
-        timing.push(20, Nanos(19_000_000), Nanos(22_000_000));
+        timing.push(10, tick, Nanos(10_000_000), Nanos(10_400_000));
+        timing.push(20, tick, Nanos(19_000_000), Nanos(22_000_000));
         assert_eq!(timing.host_time(20, tick), Some(Nanos(20_200_000)));
         assert_eq!(
             timing.uncertainty(Nanos(10_400_000), tick),
             Some(Nanos(1_200_000))
         );
+        // The middle of the second one is 0.3 ms late.
+        assert_eq!(timing.deviation_max, Nanos(300_000));
         // 5 s later the first one is uncertain by 0.2 and 1 ms.
-        timing.push(5_010, Nanos(5_010_000_000), Nanos(5_012_000_000));
+        timing.push(5_010, tick, Nanos(5_010_000_000), Nanos(5_012_000_000));
         assert_eq!(timing.host_time(5_010, tick), Some(Nanos(5_011_000_000)));
     }
 }

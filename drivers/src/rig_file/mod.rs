@@ -73,8 +73,7 @@ impl RigFile {
 
     /// Opens the devices and checks them against the file. Nothing moves.
     pub fn open(&self, clock: &HostClock) -> Result<GalilRig, GalilOpenError> {
-        let link = self.place.open()?;
-        GalilRig::open(link, &self.galil, clock.clone())
+        GalilRig::open(&self.place, &self.galil, clock.clone())
     }
 }
 

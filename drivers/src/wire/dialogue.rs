@@ -17,6 +17,9 @@ pub struct LinkStats {
     pub round_trip_max: Nanos,
     /// Questions that may wait for their answers at once.
     pub in_flight: usize,
+    /// How far the middle of a question was at most from the time at which a device's clock, as it was known before, said
+    /// that it was answered.
+    pub deviation_max: Nanos,
     /// Samples that a device took and overwrote before they were fetched.
     pub lost: u64,
     /// How often the order of questions and answers was lost and found again.

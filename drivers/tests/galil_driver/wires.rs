@@ -86,8 +86,7 @@ struct Runner {
 
 impl Runner {
     fn open(place: &Place) -> Self {
-        let link = place.open().expect("the emulator is there");
-        let rig = GalilRig::open(link, &thesis(), clock()).expect("it is a Galil controller");
+        let rig = GalilRig::open(place, &thesis(), clock()).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
         Self {
             rig,
