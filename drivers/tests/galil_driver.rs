@@ -8,6 +8,8 @@ mod faults;
 mod moves;
 #[path = "galil_driver/opening.rs"]
 mod opening;
+#[path = "galil_driver/pace.rs"]
+mod pace;
 #[path = "galil_driver/recording.rs"]
 mod recording;
 #[path = "galil_driver/sines.rs"]

@@ -72,6 +72,12 @@ impl GalilRig {
         self.connected.worst_case_mm
     }
 
+    /// The time that [`Rig::take_raw`] tells, now.
+    #[must_use]
+    pub fn now(&self) -> Nanos {
+        (self.clock)().since(self.origin.unwrap_or(Nanos::ZERO))
+    }
+
     /// How the link behaves.
     #[must_use]
     pub fn stats(&self) -> LinkStats {
