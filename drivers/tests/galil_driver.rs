@@ -2,6 +2,8 @@
 
 #[path = "galil_driver/bench.rs"]
 mod bench;
+#[path = "galil_driver/fault_runs.rs"]
+mod fault_runs;
 #[path = "galil_driver/faults.rs"]
 mod faults;
 #[path = "galil_driver/moves.rs"]
