@@ -18,4 +18,4 @@ pub mod sim;
 pub mod wire;
 
 pub use open::{is_rig_file, open, open_wired, read_rig_file};
-pub use rig::{Rig, RigError, RigEvent, RigEventBody};
+pub use rig::{Rig, RigError, RigEvent, RigEventBody, Taken};

@@ -77,6 +77,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).next_event(until)
     }
 
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        (**self).reconnect()
+    }
+
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
     }

@@ -7,7 +7,9 @@ mod fields;
 
 pub use fields::Mistake;
 
-use crate::galil::{AnalogRange, GalilOpenError, GalilRig, GalilSettings, Levels, MotorType};
+use crate::galil::{
+    AnalogRange, GalilOpenError, GalilRig, GalilSettings, Levels, MotorType, Sampling,
+};
 use crate::wire::{HostClock, Place};
 use fields::Fields;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
@@ -71,8 +73,7 @@ impl RigFile {
 
     /// Opens the devices and checks them against the file. Nothing moves.
     pub fn open(&self, clock: &HostClock) -> Result<GalilRig, GalilOpenError> {
-        let link = self.place.open()?;
-        GalilRig::open(link, &self.galil, clock.clone())
+        GalilRig::open(&self.place, &self.galil, clock.clone())
     }
 }
 
@@ -127,6 +128,9 @@ fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
     let noise = fields.number("noise_v", 1e-9, 1.0);
     let filter = fields.text("filter");
     let has_watchdog = fields.flag("watchdog").unwrap_or(true);
+    let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
+    // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
+    let sample_us = fields.number("sample_us", 500.0, 1000.0);
     let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
     // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
     if acceleration / mm_per_pulse < 1024.0 {
@@ -161,9 +165,17 @@ fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
             serial_number: serial_number.map(|number| number as u64),
             has_watchdog,
             filter,
+            sampling: sampling?,
+            sample_us: sample_us.map(|us| us as u16),
         },
     })
 }
+
+const SAMPLINGS: [(&str, Sampling); 3] = [
+    ("auto", Sampling::Auto),
+    ("poll", Sampling::Poll),
+    ("record", Sampling::Record),
+];
 
 fn place(fields: &mut Fields) -> Option<Place> {
     let (port, address) = (fields.text("port"), fields.text("address"));
