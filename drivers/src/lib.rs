@@ -9,6 +9,7 @@ pub mod cell;
 pub mod doubles;
 pub mod emulate;
 pub mod galil;
+pub mod grbl;
 pub mod open;
 pub mod rig;
 pub mod rig_file;
