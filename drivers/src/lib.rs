@@ -11,6 +11,7 @@ pub mod emulate;
 pub mod galil;
 pub mod grbl;
 pub mod open;
+pub mod parts;
 pub mod rig;
 pub mod rig_file;
 pub mod serial;
