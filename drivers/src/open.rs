@@ -55,13 +55,12 @@ pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
 
 /// Opens the rig that a file describes and checks its devices against it. Nothing moves.
 pub fn open_wired(file: &str, clock: &HostClock) -> Result<Box<dyn Rig>, RigError> {
-    let rig = read_rig_file(file)?
+    read_rig_file(file)?
         .open(clock)
-        .map_err(|error| RigError::Galil {
+        .map_err(|error| RigError::Device {
             file: file.to_owned(),
             error,
-        })?;
-    Ok(Box::new(rig))
+        })
 }
 
 impl<R: Rig + ?Sized> Rig for Box<R> {

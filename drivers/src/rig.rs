@@ -1,7 +1,6 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
-use crate::galil::GalilOpenError;
-use crate::rig_file::RigFileError;
+use crate::rig_file::{DeviceError, RigFileError};
 use crate::wire::LinkStats;
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
@@ -78,11 +77,11 @@ pub enum RigError {
     NotAgain,
     /// What the rig file describes cannot be used.
     #[error("rig {file}: {error}")]
-    Galil {
+    Device {
         /// The rig file.
         file: String,
         /// Why.
-        error: GalilOpenError,
+        error: DeviceError,
     },
 }
 

@@ -383,7 +383,9 @@ impl Cells {
             Self::MaybeWide(cells) => match field {
                 // No link is as slow as i64::MAX nanoseconds.
                 Field::Age => cells.extend(rows.map(|row| row.age.map(|age| age.by.0 as i64))),
-                Field::AgeWithin => cells.extend(rows.map(|row| row.age.map(|age| age.within.0 as i64))),
+                Field::AgeWithin => {
+                    cells.extend(rows.map(|row| row.age.map(|age| age.within.0 as i64)))
+                }
                 _ => cells.extend(rows.map(|row| row.pulses)),
             },
             Self::MaybeWhole(cells) => cells.extend(rows.map(|row| row.counts)),
