@@ -7,6 +7,8 @@
 pub mod cell;
 pub mod faults;
 pub mod galil;
+pub mod hx711;
+pub mod mark10;
 pub mod orders;
 mod plant;
 mod pty;
