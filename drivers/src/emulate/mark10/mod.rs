@@ -1,1 +1,5 @@
-//! Mark-10
+//! A Mark-10 gauge as it answers.
+
+mod gauge;
+
+pub use gauge::{EmulatedGauge, EmulatedGaugeSettings};
