@@ -35,7 +35,7 @@ impl GaugeScale {
     pub fn new(like: Reading, capacity: Newtons) -> Self {
         let per_count = like.unit.newtons() * like.number.step();
         // Saturates for a capacity beyond all counts.
-        let counts_max = (RANGE * capacity.0 / per_count).ceil() as i32;
+        let counts_max = (RANGE * capacity.0 / per_count).round() as i32;
         Self {
             unit: like.unit,
             decimals: like.number.decimals,
