@@ -6,5 +6,7 @@ mod bench;
 mod gauge;
 #[path = "cells/hx711.rs"]
 mod hx711;
+#[path = "cells/sketch.rs"]
+mod sketch;
 #[path = "cells/streams.rs"]
 mod streams;

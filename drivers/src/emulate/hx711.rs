@@ -58,8 +58,10 @@ pub struct EmulatedHx711 {
     started: Option<(Nanos, u32)>,
     /// When the boot loader ends.
     boot_end: Nanos,
-    /// Conversions since the start.
+    /// Conversions since the start, or since the chip came back.
     conversions: u32,
+    /// Whether the sketch has said that it started.
+    has_begun: bool,
     next: Nanos,
     sum: f64,
     steps: u32,
@@ -82,6 +84,7 @@ impl EmulatedHx711 {
             started: Some((Nanos::ZERO, micros)),
             boot_end: Nanos::ZERO,
             conversions: SETTLING,
+            has_begun: true,
             next: Nanos::ZERO,
             sum: 0.0,
             steps: 0,
@@ -141,6 +144,7 @@ impl EmulatedHx711 {
         self.started = None;
         self.boot_end = now + BOOT;
         self.conversions = 0;
+        self.has_begun = false;
         self.missing_since = None;
         self.output.clear();
     }
@@ -165,7 +169,8 @@ impl EmulatedHx711 {
         };
         self.conversions = self.conversions.saturating_add(1);
         let micros = self.micros(at);
-        if self.conversions == SETTLING {
+        if self.conversions == SETTLING && !self.has_begun {
+            self.has_begun = true;
             let header = self.header();
             self.say(&Message::Started { micros, header });
         } else if self.conversions > SETTLING {
@@ -178,6 +183,7 @@ impl EmulatedHx711 {
         let since = *self.missing_since.get_or_insert(now);
         if now.since(since) >= MISSING_AFTER {
             self.missing_since = Some(now);
+            self.conversions = 0;
             let micros = self.micros(now);
             self.say(&Message::Missing { micros });
         }
