@@ -1,7 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
-use crate::galil::GalilOpenError;
-use crate::rig_file::RigFileError;
+use crate::rig_file::{DeviceError, RigFileError};
+use crate::wire::LinkStats;
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
 use thiserror::Error;
@@ -77,11 +77,11 @@ pub enum RigError {
     NotAgain,
     /// What the rig file describes cannot be used.
     #[error("rig {file}: {error}")]
-    Galil {
+    Device {
         /// The rig file.
         file: String,
         /// Why.
-        error: GalilOpenError,
+        error: DeviceError,
     },
 }
 
@@ -117,6 +117,11 @@ pub trait Rig: Send {
     /// The bytes exchanged with devices since this was last asked, in order, at the caller's time. A rig without
     /// wires has none. Must not wait.
     fn take_raw(&mut self) -> Vec<RawBytes> {
+        Vec::new()
+    }
+
+    /// How each link has behaved since it was opened, by the name of the device behind it. A rig without wires has none.
+    fn links(&self) -> Vec<(String, LinkStats)> {
         Vec::new()
     }
 }

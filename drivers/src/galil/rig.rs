@@ -152,8 +152,11 @@ impl Rig for GalilRig {
             serial_number: self.connected.board.serial_number,
             ..self.settings.clone()
         };
-        let Open { connected, line } = open(&self.place, &settings, &self.clock)
-            .map_err(|error| RigError::Galil { file, error })?;
+        let Open { connected, line } =
+            open(&self.place, &settings, &self.clock).map_err(|error| RigError::Device {
+                file,
+                error: error.into(),
+            })?;
         self.first_raw.extend(connected.raw.iter().cloned());
         self.connected = connected;
         self.line = Some(line);
@@ -163,6 +166,10 @@ impl Rig for GalilRig {
 
     fn is_virtual(&self) -> bool {
         false
+    }
+
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        vec![("galil".to_owned(), self.stats())]
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {

@@ -107,6 +107,7 @@ impl Sampler {
             volts: Volts(volts),
             pulses: self.settings.sign() * given,
             status,
+            age: None,
         }))
     }
 

@@ -204,6 +204,7 @@ impl SimRig {
             volts,
             pulses: axis.pulses,
             status: axis.status,
+            age: None,
         };
         self.report(at, RigEventBody::Reading(reading));
     }
