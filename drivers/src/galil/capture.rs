@@ -126,8 +126,10 @@ pub struct Capture {
     pub pace: Pace,
     /// The recording, if there is one.
     pub plan: Option<Plan>,
-    /// For the operator and the log.
+    /// What is the same whenever the same controller is opened over the same link, for the rig's identity.
     pub words: String,
+    /// What was measured, for the operator.
+    pub measured: String,
 }
 
 /// Chooses and starts it.
@@ -144,7 +146,8 @@ pub fn set_up(
         Capture {
             pace,
             plan: None,
-            words: format!("polled at up to {rate:.0} samples/s{why}"),
+            words: "samples polled".to_owned(),
+            measured: format!("samples polled at up to {rate:.0} a second{why}"),
         }
     };
     // A recording of whoever was here before takes the controller's time.
@@ -174,9 +177,9 @@ pub fn set_up(
         Ok(plan) => Ok(Capture {
             pace,
             plan: Some(plan),
-            words: format!(
-                "recorded at {:.0} samples/s, each up to {:.0} ms old",
-                1e9 / (tick.0 << n) as f64,
+            words: format!("{:.0} samples/s recorded", 1e9 / (tick.0 << n) as f64),
+            measured: format!(
+                "recorded samples are up to {:.0} ms old when they come",
                 ms(age).ceil()
             ),
         }),

@@ -101,7 +101,7 @@ fn count(settings: &GalilSettings, latency: Nanos, what: &str) {
         ms(stats.round_trip_min),
         ms(stats.round_trip_mean),
         ms(stats.round_trip_max),
-        description.identity,
+        runner.rig.link().unwrap_or(""),
     );
     assert!(runner.faults().is_empty());
     // A question is answered between its beginning and its end.
