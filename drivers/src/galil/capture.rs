@@ -44,8 +44,8 @@ pub struct Measured {
     trip: Nanos,
     /// From one answer to the next when many are asked in a row.
     apart: Nanos,
-    /// Bytes of an answer.
-    answer_bytes: f64,
+    /// Bytes that went one way in this time, at least.
+    bytes: f64,
 }
 
 /// How long an answer takes alone, and how fast answers come in a row.
@@ -81,7 +81,8 @@ pub fn measure(
         stats,
         trip,
         apart,
-        answer_bytes: bytes as f64 / ROW as f64,
+        // Both ways are equally fast, and the longer one is what takes the time.
+        bytes: (bytes as f64 / ROW as f64).max(question.len() as f64 + 1.0),
     })
 }
 
@@ -100,7 +101,7 @@ impl Measured {
 
     /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
     fn fetching(&self, tick: Nanos, n: u32) -> Option<(Pace, Nanos)> {
-        let bytes_per_ns = self.answer_bytes / self.apart.0 as f64;
+        let bytes_per_ns = self.bytes / self.apart.0 as f64;
         let interval = (tick.0 << n) as f64;
         let left = LOAD_MAX * bytes_per_ns - ELEMENT_BYTES / interval;
         if left <= 0.0 {
