@@ -10,12 +10,15 @@ pub mod doubles;
 pub mod emulate;
 pub mod galil;
 pub mod grbl;
+pub mod hx711;
+pub mod mark10;
 pub mod open;
 pub mod parts;
 pub mod rig;
 pub mod rig_file;
 pub mod serial;
 pub mod sim;
+pub mod text;
 pub mod wire;
 
 pub use open::{is_rig_file, open, open_wired, read_rig_file};

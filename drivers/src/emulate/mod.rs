@@ -9,6 +9,8 @@ pub mod cell;
 pub mod faults;
 pub mod galil;
 pub mod grbl;
+pub mod hx711;
+pub mod mark10;
 pub mod orders;
 mod plant;
 mod pty;

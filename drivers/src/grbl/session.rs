@@ -495,7 +495,8 @@ impl Session {
             return;
         }
         // The report is of a time between its question and now.
-        let (early, late) = (self.track().at(asked).pulses, self.track().at(now).pulses);
+        let early = self.track().at(asked).pulses;
+        let late = self.track().at(now).pulses;
         let here = self.pulses(steps) as f64;
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;

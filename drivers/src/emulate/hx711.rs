@@ -1,0 +1,244 @@
+//! An HX711 board as it answers: the chip on the emulated bridge, and palpate's sketch on an Arduino.
+//!
+//! The bridge's signal is made of the amplified one: 5 V of it are the chip's whole range at gain 128 (19.5 mV at a supply
+//! of 5 V; HX711 data sheet, Avia Semiconductor, page 3), so that what is calibrated in those volts stays right.
+
+use super::DeviceFault;
+use super::cell::{EmulatedCell, Felt};
+use crate::hx711::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, line};
+use palpate_model::Nanos;
+
+/// Amplified signal at the end of the range, gain 128.
+const FULL_SCALE_V: f64 = 5.0;
+/// The chip's oscillator is an RC one, its data sheet says "typically": here it runs fast by 3 %, within what is seen of
+/// such chips.
+const OSCILLATOR: f64 = 1.03;
+/// An Arduino Uno's ceramic resonator, rated at 0.5 %: here fast by 0.2 %.
+const RESONATOR: f64 = 1.002;
+/// Its `micros()` counts in steps of 4 (Arduino reference, `micros`).
+const MICROS_STEP: u64 = 4;
+/// The Uno's boot loader waits about so long before the sketch.
+const BOOT: Nanos = Nanos::from_millis(1_600);
+/// So many conversions pass after a start before the output is settled (data sheet, page 3: 400 ms at 10, 50 ms at 80
+/// samples a second).
+const SETTLING: u32 = 4;
+/// How long the sketch waits for the chip.
+const MISSING_AFTER: Nanos = Nanos::from_millis(500);
+/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
+const OUTPUT_MAX: usize = 4096;
+
+/// What an emulated board is like.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmulatedHx711Settings {
+    /// Name in its sketch.
+    pub board: String,
+    /// Conversions a second as wired: 80, or 10.
+    pub is_fast: bool,
+    /// Gain of channel A: 128, or 64.
+    pub is_half_gain: bool,
+    /// The board's clock in microseconds when the emulator starts, so that it wraps soon.
+    pub micros: u32,
+}
+
+impl Default for EmulatedHx711Settings {
+    fn default() -> Self {
+        Self {
+            board: "emulated".into(),
+            is_fast: true,
+            is_half_gain: false,
+            micros: 0,
+        }
+    }
+}
+
+/// The board.
+pub struct EmulatedHx711 {
+    settings: EmulatedHx711Settings,
+    /// When the sketch began, and what its clock said then.
+    started: Option<(Nanos, u32)>,
+    /// When the boot loader ends.
+    boot_end: Nanos,
+    /// Conversions since the start, or since the chip came back.
+    conversions: u32,
+    /// Whether the sketch has said that it started.
+    has_begun: bool,
+    next: Nanos,
+    sum: f64,
+    steps: u32,
+    count: i32,
+    missing_since: Option<Nanos>,
+    is_chip_lost: bool,
+    is_stuck: bool,
+    is_saturated: bool,
+    is_other: bool,
+    output: Vec<u8>,
+}
+
+impl EmulatedHx711 {
+    /// A board that has been on for a while.
+    #[must_use]
+    pub fn new(settings: EmulatedHx711Settings) -> Self {
+        let micros = settings.micros;
+        let mut board = Self {
+            settings,
+            started: Some((Nanos::ZERO, micros)),
+            boot_end: Nanos::ZERO,
+            conversions: SETTLING,
+            has_begun: true,
+            next: Nanos::ZERO,
+            sum: 0.0,
+            steps: 0,
+            count: 0,
+            missing_since: None,
+            is_chip_lost: false,
+            is_stuck: false,
+            is_saturated: false,
+            is_other: false,
+            output: Vec::new(),
+        };
+        board.next = board.period();
+        board
+    }
+
+    /// The chip loses its wires, or gets them back.
+    pub fn lose_chip(&mut self, is_lost: bool) {
+        self.is_chip_lost = is_lost;
+    }
+
+    fn period(&self) -> Nanos {
+        let rate = if self.settings.is_fast { 80.0 } else { 10.0 };
+        Nanos((1e9 / (rate * OSCILLATOR)).round() as u64)
+    }
+
+    fn micros(&self, now: Nanos) -> u32 {
+        let (since, first) = self.started.unwrap_or((now, 0));
+        let run = (now.since(since).0 as f64 * RESONATOR / 1e3) as u64;
+        // The board's counter has 32 bits.
+        ((u64::from(first) + run) / MICROS_STEP * MICROS_STEP) as u32
+    }
+
+    fn header(&self) -> Header {
+        Header {
+            rate: match (self.conversions < SETTLING, self.settings.is_fast) {
+                (true, _) => 0,
+                (false, true) => 80,
+                (false, false) => 10,
+            },
+            gain: if self.settings.is_half_gain { 64 } else { 128 },
+            board: if self.is_other {
+                "another".into()
+            } else {
+                self.settings.board.clone()
+            },
+        }
+    }
+
+    fn say(&mut self, message: &Message) {
+        let text = line(message);
+        if self.output.len() + text.len() <= OUTPUT_MAX {
+            self.output.extend_from_slice(text.as_bytes());
+        }
+    }
+
+    fn restart(&mut self, now: Nanos) {
+        self.started = None;
+        self.boot_end = now + BOOT;
+        self.conversions = 0;
+        self.has_begun = false;
+        self.missing_since = None;
+        self.output.clear();
+    }
+
+    fn convert(&mut self, at: Nanos) {
+        let volts = if self.steps > 0 {
+            self.sum / f64::from(self.steps)
+        } else {
+            0.0
+        };
+        (self.sum, self.steps) = (0.0, 0);
+        if !self.is_stuck {
+            let gain = if self.settings.is_half_gain { 0.5 } else { 1.0 };
+            let count = (volts / FULL_SCALE_V * gain * f64::from(1 << 23)).round();
+            // The cast saturates.
+            self.count = (count as i32).clamp(COUNT_MIN, COUNT_MAX);
+        }
+        let count = if self.is_saturated {
+            COUNT_MAX
+        } else {
+            self.count
+        };
+        self.conversions = self.conversions.saturating_add(1);
+        let micros = self.micros(at);
+        if self.conversions == SETTLING && !self.has_begun {
+            self.has_begun = true;
+            let header = self.header();
+            self.say(&Message::Started { micros, header });
+        } else if self.conversions > SETTLING {
+            self.say(&Message::Value { micros, count });
+        }
+    }
+
+    /// The sketch says again and again that the chip does not answer.
+    fn wait_for_chip(&mut self, now: Nanos) {
+        let since = *self.missing_since.get_or_insert(now);
+        if now.since(since) >= MISSING_AFTER {
+            self.missing_since = Some(now);
+            self.conversions = 0;
+            let micros = self.micros(now);
+            self.say(&Message::Missing { micros });
+        }
+    }
+}
+
+impl EmulatedCell for EmulatedHx711 {
+    fn receive(&mut self, now: Nanos, bytes: &[u8]) {
+        if self.started.is_some() && bytes.contains(&b'?') {
+            let message = Message::Header {
+                micros: self.micros(now),
+                header: self.header(),
+            };
+            self.say(&message);
+        }
+    }
+
+    fn advance(&mut self, now: Nanos, felt: Felt) {
+        if self.started.is_none() {
+            if now < self.boot_end {
+                return;
+            }
+            self.started = Some((self.boot_end, 0));
+            self.next = self.boot_end + self.period();
+            (self.sum, self.steps) = (0.0, 0);
+        }
+        self.sum += felt.volts.0;
+        self.steps += 1;
+        if self.is_chip_lost {
+            self.wait_for_chip(now);
+            self.next = now + self.period();
+            return;
+        }
+        self.missing_since = None;
+        while self.next <= now {
+            let at = self.next;
+            self.convert(at);
+            self.next = at + self.period();
+        }
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        match fault {
+            DeviceFault::Reset if is_on => self.restart(now),
+            DeviceFault::Reset => {}
+            DeviceFault::Stuck => self.is_stuck = is_on,
+            DeviceFault::Saturated => self.is_saturated = is_on,
+            DeviceFault::WrongDevice => {
+                self.is_other = is_on;
+                self.restart(now);
+            }
+        }
+    }
+}

@@ -1,0 +1,351 @@
+//! A Mark-10 gauge of Series 5 as it answers (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
+
+use crate::emulate::DeviceFault;
+use crate::emulate::cell::{EmulatedCell, Felt};
+use crate::mark10::gauge::{FILTER_MAX, RATES};
+use crate::mark10::protocol::ForceUnit;
+use crate::sim::{Cause, Random};
+use palpate_model::Nanos;
+use std::collections::VecDeque;
+
+/// Largest force, in N. Beyond 110 % of it no number is given: a guess.
+const CAPACITY: f64 = 25.0;
+/// One step of its last digit in N; the reading 4.285 N of the Series 4 user's guide, page 16, is a multiple of it.
+const STEP: f64 = 0.005;
+/// White noise of its own samples in N, so that a reading at rest now and then moves by a step.
+const NOISE: f64 = 0.002;
+/// Samples of its converter in a ms; filters average 2^n of them. A guess.
+const SAMPLES_PER_MS: f64 = 7.0;
+/// Milliseconds of the longest filter.
+const STEPS_MAX: usize = 147;
+/// Longest command; more is an illegal one.
+const COMMAND_MAX: usize = 32;
+/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
+const OUTPUT_MAX: usize = 4096;
+/// From its supply to the first answer: a guess.
+const START: Nanos = Nanos::from_millis(500);
+
+/// What an emulated gauge is like.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct EmulatedGaugeSettings {
+    /// Serial number that it tells.
+    pub serial_number: String,
+    /// Whether `AOUT1` gives 50 readings a second, as on the 7i.
+    pub is_7i: bool,
+    /// Unit it is switched on with.
+    pub unit: ForceUnit,
+    /// Seed of its noise.
+    pub seed: u64,
+}
+
+impl Default for EmulatedGaugeSettings {
+    fn default() -> Self {
+        Self {
+            serial_number: "3519042".into(),
+            is_7i: false,
+            // As in the example of LIST: what a driver must not take for newtons.
+            unit: ForceUnit::Pound,
+            seed: 0,
+        }
+    }
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Current,
+    PeakTension,
+    PeakCompression,
+}
+
+/// What commands set; lost with its supply, as nothing is saved.
+#[derive(Clone, Debug)]
+struct Set {
+    unit: ForceUnit,
+    mode: Mode,
+    filter_displayed: u8,
+    filter_current: u8,
+    auto_transmit: u16,
+    auto_off: u8,
+    is_full: bool,
+    is_inverted: bool,
+    is_unsigned: bool,
+}
+
+impl Set {
+    fn new(unit: ForceUnit) -> Self {
+        Self {
+            unit,
+            mode: Mode::Current,
+            filter_displayed: 8,
+            filter_current: 1,
+            auto_transmit: 0,
+            auto_off: 5,
+            is_full: true,
+            is_inverted: false,
+            is_unsigned: false,
+        }
+    }
+}
+
+/// The gauge.
+pub struct EmulatedGauge {
+    settings: EmulatedGaugeSettings,
+    set: Set,
+    noise: Random,
+    command: Vec<u8>,
+    /// Force in N at the newest ms each, with its noise, newest last.
+    felt: VecDeque<f64>,
+    zero: f64,
+    peaks: (f64, f64),
+    next: Nanos,
+    off_until: Nanos,
+    is_stuck: bool,
+    is_saturated: bool,
+    is_other: bool,
+    output: Vec<u8>,
+}
+
+impl EmulatedGauge {
+    /// A gauge that has been on for a while, not zeroed.
+    #[must_use]
+    pub fn new(settings: EmulatedGaugeSettings) -> Self {
+        Self {
+            set: Set::new(settings.unit),
+            noise: Random::new(settings.seed, Cause::Noise),
+            settings,
+            command: Vec::new(),
+            felt: VecDeque::from([0.0]),
+            zero: 0.0,
+            peaks: (0.0, 0.0),
+            next: Nanos::ZERO,
+            off_until: Nanos::ZERO,
+            is_stuck: false,
+            is_saturated: false,
+            is_other: false,
+            output: Vec::new(),
+        }
+    }
+
+    /// Its reading of the moment as `?` gives it, for a stand that it sits on.
+    #[must_use]
+    pub fn displayed(&self) -> String {
+        let force = match self.set.mode {
+            Mode::Current => self.filtered(self.set.filter_displayed),
+            Mode::PeakTension => self.peaks.0,
+            Mode::PeakCompression => self.peaks.1,
+        };
+        self.words(force)
+    }
+
+    /// Mean of the newest 2^n samples above zero.
+    fn filtered(&self, exponent: u8) -> f64 {
+        let samples = f64::from(1_u32 << exponent.min(FILTER_MAX));
+        let steps = (samples / SAMPLES_PER_MS).ceil() as usize;
+        let newest = self.felt.iter().rev().take(steps);
+        let count = newest.len();
+        newest.sum::<f64>() / count as f64 - self.zero
+    }
+
+    fn words(&self, newtons: f64) -> String {
+        if self.is_saturated || (newtons + self.zero).abs() > 1.1 * CAPACITY {
+            return "OVER".into();
+        }
+        let unit = self.set.unit;
+        // As many digits as its step in newtons has in that unit; -0 has no sign.
+        let step = STEP / unit.newtons();
+        let decimals = (-step.log10()).ceil().clamp(0.0, 5.0) as usize;
+        let rounded = (newtons / STEP).round() * STEP / unit.newtons();
+        let sign = if self.set.is_inverted { -1.0 } else { 1.0 };
+        let signed = if self.set.is_unsigned {
+            rounded.abs()
+        } else {
+            sign * rounded
+        };
+        let text = format!("{signed:.decimals$}");
+        let is_zero = text.bytes().all(|b| !(b'1'..=b'9').contains(&b));
+        let text = if is_zero {
+            text.trim_start_matches('-').to_owned()
+        } else {
+            text
+        };
+        if self.set.is_full {
+            format!("{text} {}", unit.name())
+        } else {
+            text
+        }
+    }
+
+    fn list(&self) -> String {
+        let set = &self.set;
+        let mode = match set.mode {
+            Mode::Current => "CUR",
+            Mode::PeakTension => "PT",
+            Mode::PeakCompression => "PC",
+        };
+        format!(
+            "V1.00;{};{mode};FLTC{};FLTP{};AOUT{:02};AOFF{};{};MIT;POL;IPOL{};OPOL{};B0",
+            set.unit.name().to_ascii_uppercase(),
+            set.filter_displayed,
+            set.filter_current,
+            set.auto_transmit,
+            set.auto_off,
+            if set.is_full { "FULL" } else { "NUM" },
+            u8::from(set.is_inverted),
+            u8::from(set.is_unsigned),
+        )
+    }
+
+    fn say(&mut self, text: &str) {
+        if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
+            self.output.extend_from_slice(text.as_bytes());
+            self.output.extend_from_slice(b"\r\n");
+        }
+    }
+
+    fn run(&mut self, now: Nanos, command: &str) {
+        if let Some(answer) = self.answer(now, command) {
+            self.say(&answer);
+        }
+    }
+
+    /// What it answers; nothing when something was set.
+    fn answer(&mut self, now: Nanos, command: &str) -> Option<String> {
+        let set = &mut self.set;
+        match command {
+            "" => {}
+            "?" => return Some(self.displayed()),
+            "?C" => return Some(self.words(self.filtered(self.set.filter_current))),
+            "?PT" => return Some(self.words(self.peaks.0)),
+            "?PC" => return Some(self.words(self.peaks.1)),
+            "LIST" => return Some(self.list()),
+            "RN" => return Some("Series 5 Force Gauge".into()),
+            "RM" => return Some("M5-5".into()),
+            "RV" => return Some("V1.00".into()),
+            "RS" if self.is_other => return Some("9999999".into()),
+            "RS" => return Some(self.settings.serial_number.clone()),
+            "CUR" => set.mode = Mode::Current,
+            "PT" => set.mode = Mode::PeakTension,
+            "PC" => set.mode = Mode::PeakCompression,
+            "FULL" => set.is_full = true,
+            "NUM" => set.is_full = false,
+            "CLR" => self.peaks = (0.0, 0.0),
+            "Z" => {
+                self.zero += self.filtered(self.set.filter_displayed);
+                self.peaks = (0.0, 0.0);
+            }
+            "SAVE" => {}
+            "?ET" | "?A" | "AM" | "PM" => return Some("*11".into()),
+            _ => return self.with_number(now, command),
+        }
+        None
+    }
+
+    fn with_number(&mut self, now: Nanos, command: &str) -> Option<String> {
+        if let Some(unit) = match command {
+            "N" | "MN" | "KN" | "LB" | "KG" | "G" | "OZ" => ForceUnit::parse(command),
+            _ => None,
+        } {
+            self.set.unit = unit;
+            return None;
+        }
+        let digits = command.trim_start_matches(|c: char| c.is_ascii_uppercase());
+        let name = &command[..command.len() - digits.len()];
+        if !["FLTC", "FLTP", "AOUT", "AOFF", "IPOL", "OPOL"].contains(&name) {
+            return Some("*10".into());
+        }
+        let Ok(number) = digits.parse::<u16>() else {
+            return Some("*12".into());
+        };
+        let set = &mut self.set;
+        let small = number.min(255) as u8;
+        match (name, number) {
+            ("FLTC", 0..=10) => set.filter_displayed = small,
+            ("FLTP", 0..=10) => set.filter_current = small,
+            ("AOFF", 0..=30) => set.auto_off = small,
+            ("FLTC" | "FLTP" | "AOFF", _) => return Some("*22".into()),
+            ("AOUT", n) if n == 0 || RATES.contains(&n) => {
+                set.auto_transmit = n;
+                self.next = now + self.period();
+            }
+            ("IPOL", 0 | 1) => set.is_inverted = number == 1,
+            ("OPOL", 0 | 1) => set.is_unsigned = number == 1,
+            _ => return Some("*12".into()),
+        }
+        None
+    }
+
+    fn period(&self) -> Nanos {
+        let rate = match self.set.auto_transmit {
+            1 if self.settings.is_7i => 50,
+            rate => rate.max(1),
+        };
+        Nanos(1_000_000_000 / u64::from(rate))
+    }
+
+    fn restart(&mut self, now: Nanos) {
+        self.set = Set::new(self.settings.unit);
+        self.off_until = now + START;
+        self.command.clear();
+        self.output.clear();
+        // It zeroes itself when it is switched on.
+        self.zero = self.felt.back().copied().unwrap_or(0.0);
+        self.peaks = (0.0, 0.0);
+    }
+}
+
+impl EmulatedCell for EmulatedGauge {
+    fn receive(&mut self, now: Nanos, bytes: &[u8]) {
+        if now < self.off_until {
+            return;
+        }
+        for byte in bytes {
+            match byte {
+                b'\r' => {
+                    let command = std::mem::take(&mut self.command);
+                    self.run(now, &String::from_utf8_lossy(&command));
+                }
+                // "where the Line Feed, 0x0A, is ignored" (Series 5 user's guide, page 17).
+                b'\n' => {}
+                _ if self.command.len() < COMMAND_MAX => self.command.push(*byte),
+                _ => {}
+            }
+        }
+    }
+
+    fn advance(&mut self, now: Nanos, felt: Felt) {
+        if !self.is_stuck {
+            let force = felt.force.0 + NOISE * self.noise.normal();
+            if self.felt.len() >= STEPS_MAX {
+                self.felt.pop_front();
+            }
+            self.felt.push_back(force);
+            let above = force - self.zero;
+            self.peaks = (self.peaks.0.min(above), self.peaks.1.max(above));
+        }
+        if now < self.off_until || self.set.auto_transmit == 0 {
+            return;
+        }
+        while self.next <= now {
+            let text = self.displayed();
+            self.say(&text);
+            self.next = self.next + self.period();
+        }
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        match fault {
+            DeviceFault::Reset if is_on => self.restart(now),
+            DeviceFault::Reset => {}
+            DeviceFault::Stuck => self.is_stuck = is_on,
+            DeviceFault::Saturated => self.is_saturated = is_on,
+            DeviceFault::WrongDevice => {
+                self.is_other = is_on;
+                self.restart(now);
+            }
+        }
+    }
+}

@@ -1,0 +1,364 @@
+//! An HX711 board in progress: it sends by itself, nothing is asked.
+
+use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
+use crate::cell::{CellDialogue, CellSample};
+use crate::text::{Lines, Taken};
+use palpate_model::Nanos;
+use palpate_model::units::Volts;
+use std::collections::VecDeque;
+
+/// Ten conversions of the slow chip: longer than an answer of the board can be late.
+const SILENCE_MAX: Nanos = Nanos::from_millis(1_000);
+/// Values that may wait to be taken: a minute of the fast chip.
+const SAMPLES_MAX: usize = 4_800;
+/// Troubles that may wait to be told.
+const TROUBLES_MAX: usize = 16;
+/// An Arduino's resonator is right to half a percent; so much may its clock gain on the host's.
+const FAST_MAX: f64 = 0.02;
+/// Lines of an earlier moment may arrive in one go with that of now.
+const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
+
+/// The board's clock, its wraps taken out.
+#[derive(Clone, Copy, Debug)]
+struct BoardClock {
+    /// As the board told it last.
+    micros: u32,
+    /// The same without wraps and restarts.
+    time: Nanos,
+    /// Arrival of that.
+    at: Nanos,
+    /// Board's time and host's when counting began.
+    from: (Nanos, Nanos),
+}
+
+/// A board that sends values.
+pub struct Hx711Dialogue {
+    header: Header,
+    volts_per_count: f64,
+    lines: Lines,
+    clock: Option<BoardClock>,
+    newest: Nanos,
+    samples: VecDeque<CellSample>,
+    troubles: VecDeque<String>,
+    garbled: u64,
+    is_beyond: bool,
+    is_missing: bool,
+    other: Option<String>,
+}
+
+impl Hx711Dialogue {
+    /// Goes on with the board of a header from `now`.
+    #[must_use]
+    pub fn new(header: Header, volts_per_count: f64, now: Nanos) -> Self {
+        Self {
+            header,
+            volts_per_count,
+            lines: Lines::default(),
+            clock: None,
+            newest: now,
+            samples: VecDeque::new(),
+            troubles: VecDeque::new(),
+            garbled: 0,
+            is_beyond: false,
+            is_missing: false,
+            other: None,
+        }
+    }
+
+    fn message(&mut self, now: Nanos, message: Message) {
+        match message {
+            Message::Value { micros, count } => self.value(now, micros, count),
+            Message::Started { micros, header } => {
+                self.trouble("the HX711 board has started anew; check its supply");
+                self.restart(now, micros);
+                self.check(header);
+            }
+            Message::Header { header, .. } => self.check(header),
+            Message::Missing { .. } => {
+                if !std::mem::replace(&mut self.is_missing, true) {
+                    self.trouble(
+                        "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply",
+                    );
+                }
+            }
+        }
+    }
+
+    fn value(&mut self, now: Nanos, micros: u32, count: i32) {
+        let Some(time) = self.board_time(now, micros) else {
+            self.garbled += 1;
+            return;
+        };
+        self.is_missing = false;
+        self.newest = now;
+        let is_beyond = count == COUNT_MIN || count == COUNT_MAX;
+        if is_beyond && !self.is_beyond {
+            self.trouble(
+                "the bridge's signal is beyond the HX711's range; check the cell's wires, or set gain 64 in the sketch",
+            );
+        }
+        self.is_beyond = is_beyond;
+        if self.samples.len() >= SAMPLES_MAX {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(CellSample {
+            at: now,
+            device_time: Some(time),
+            counts: count,
+            volts: Volts(f64::from(count) * self.volts_per_count),
+        });
+    }
+
+    /// The board's time of a value; `None` for one that was there already.
+    fn board_time(&mut self, now: Nanos, micros: u32) -> Option<Nanos> {
+        let Some(clock) = self.clock else {
+            // The first count of the board is its time; whatever came before is nobody's business.
+            let time = Nanos(u64::from(micros) * 1_000);
+            self.clock = Some(BoardClock {
+                micros,
+                time,
+                at: now,
+                from: (time, now),
+            });
+            return Some(time);
+        };
+        let step = micros.wrapping_sub(clock.micros);
+        if step == 0 {
+            return None;
+        }
+        let time = Nanos(clock.time.0 + u64::from(step) * 1_000);
+        let run = time.since(clock.from.0).0 as f64;
+        let host = now.since(clock.from.1).0 as f64;
+        if run > host * (1.0 + FAST_MAX) + AHEAD_MAX.0 as f64 {
+            // The line that would have told it was lost.
+            self.trouble("the HX711 board has started anew; check its supply");
+            self.restart(now, micros);
+            return self.clock.map(|clock| clock.time);
+        }
+        self.clock = Some(BoardClock {
+            micros,
+            time,
+            at: now,
+            ..clock
+        });
+        Some(time)
+    }
+
+    /// The board counts from the beginning; its time goes on by the host's clock.
+    fn restart(&mut self, now: Nanos, micros: u32) {
+        if let Some(clock) = &mut self.clock {
+            let time = Nanos(clock.time.0 + now.since(clock.at).0.max(1));
+            *clock = BoardClock {
+                micros,
+                time,
+                at: now,
+                from: (time, now),
+            };
+        }
+    }
+
+    fn check(&mut self, header: Header) {
+        if header.board != self.header.board || header.gain != self.header.gain {
+            self.other = Some(format!(
+                "another HX711 board answers: {} with gain {} in place of {} with gain {}",
+                header.board, header.gain, self.header.board, self.header.gain
+            ));
+        }
+    }
+
+    fn trouble(&mut self, words: &str) {
+        if self.troubles.len() < TROUBLES_MAX {
+            self.troubles.push_back(words.to_owned());
+        }
+    }
+}
+
+impl CellDialogue for Hx711Dialogue {
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        for byte in bytes {
+            match self.lines.take(*byte) {
+                None => {}
+                Some(Taken::Garbled) => self.garbled += 1,
+                Some(Taken::Line(line)) => match parse(&line) {
+                    Some(message) => self.message(now, message),
+                    None => self.garbled += 1,
+                },
+            }
+        }
+    }
+
+    fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
+        None
+    }
+
+    fn take_sample(&mut self) -> Option<CellSample> {
+        self.samples.pop_front()
+    }
+
+    fn take_trouble(&mut self) -> Option<String> {
+        self.troubles.pop_front()
+    }
+
+    fn garbled(&self) -> u64 {
+        self.garbled
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        if self.other.is_some() {
+            return self.other.clone();
+        }
+        if now.since(self.newest) <= SILENCE_MAX {
+            return None;
+        }
+        Some(if self.is_missing {
+            "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply".into()
+        } else {
+            "the HX711 board has sent no value for a second; check its cable and supply".into()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::protocol::line;
+    use super::*;
+
+    fn header(board: &str) -> Header {
+        Header {
+            rate: 80,
+            gain: 128,
+            board: board.into(),
+        }
+    }
+
+    fn dialogue() -> Hx711Dialogue {
+        Hx711Dialogue::new(header("a"), 5.0 / f64::from(1 << 23), Nanos::ZERO)
+    }
+
+    fn ms(ms: u64) -> Nanos {
+        Nanos::from_millis(ms)
+    }
+
+    fn say(to: &mut Hx711Dialogue, at: Nanos, message: &Message) {
+        to.received(at, line(message).as_bytes());
+    }
+
+    fn value(micros: u32, count: i32) -> Message {
+        Message::Value { micros, count }
+    }
+
+    #[test]
+    fn the_clock_of_the_board_wraps_and_its_time_does_not() {
+        let mut dialogue = dialogue();
+        let mut micros = u32::MAX - 30_000;
+        let mut times = Vec::new();
+        for i in 0..6 {
+            say(&mut dialogue, ms(12 * i + 12), &value(micros, 5));
+            micros = micros.wrapping_add(12_500);
+            times.push(dialogue.take_sample().unwrap().device_time.unwrap());
+        }
+        assert!(
+            times
+                .windows(2)
+                .all(|w| w[1].since(w[0]) == Nanos(12_500_000))
+        );
+        assert_eq!(dialogue.take_trouble(), None);
+    }
+
+    #[test]
+    fn a_restart_is_told_and_time_goes_on() {
+        let mut dialogue = dialogue();
+        say(&mut dialogue, ms(10), &value(900_000_000, 5));
+        say(
+            &mut dialogue,
+            ms(500),
+            &Message::Started {
+                micros: 1_000,
+                header: header("a"),
+            },
+        );
+        say(&mut dialogue, ms(513), &value(13_500, 6));
+        let times = [(); 2].map(|()| dialogue.take_sample().unwrap().device_time.unwrap());
+        assert_eq!(times[1].since(times[0]), Nanos(490_000_000 + 12_500_000));
+        assert!(dialogue.take_trouble().unwrap().contains("started anew"));
+        // The line that tells it may be lost.
+        say(&mut dialogue, ms(600), &value(700, 6));
+        assert!(dialogue.take_trouble().unwrap().contains("started anew"));
+        let last = dialogue.take_sample().unwrap().device_time.unwrap();
+        assert_eq!(last.since(times[1]), Nanos(87_000_000));
+    }
+
+    #[test]
+    fn a_host_that_stood_still_is_no_restart() {
+        let mut dialogue = dialogue();
+        say(&mut dialogue, ms(10), &value(1_000, 5));
+        for i in 1..=400_u32 {
+            say(&mut dialogue, ms(5_010), &value(1_000 + 12_500 * i, 5));
+        }
+        say(&mut dialogue, ms(5_020), &value(1_000 + 12_500 * 401, 5));
+        assert_eq!(dialogue.take_trouble(), None);
+    }
+
+    #[test]
+    fn beyond_the_range_and_a_missing_chip_are_told_once() {
+        let mut dialogue = dialogue();
+        for i in 0..3 {
+            say(
+                &mut dialogue,
+                ms(12 * i),
+                &value(12_500 * i as u32 + 1, COUNT_MAX),
+            );
+        }
+        let sample = dialogue.take_sample().unwrap();
+        assert!((sample.volts.0 - 5.0).abs() < 1e-6 && sample.counts == COUNT_MAX);
+        assert!(
+            dialogue
+                .take_trouble()
+                .unwrap()
+                .contains("beyond the HX711's range")
+        );
+        assert_eq!(dialogue.take_trouble(), None);
+        for i in 0..3_u32 {
+            let micros = 600_000 + 500_000 * i;
+            say(
+                &mut dialogue,
+                ms(600 + 500 * u64::from(i)),
+                &Message::Missing { micros },
+            );
+        }
+        assert!(dialogue.take_trouble().unwrap().contains("DOUT"));
+        assert_eq!(dialogue.take_trouble(), None);
+        assert!(dialogue.is_dead(ms(1_000)).is_none());
+        assert!(dialogue.is_dead(ms(1_600)).unwrap().contains("DOUT"));
+        say(&mut dialogue, ms(1_700), &value(1_700_000, 1));
+        assert!(dialogue.is_dead(ms(1_710)).is_none());
+        assert!(dialogue.is_dead(ms(2_800)).unwrap().contains("no value"));
+    }
+
+    #[test]
+    fn another_board_in_its_place_ends_it() {
+        let mut dialogue = dialogue();
+        let other = Message::Started {
+            micros: 9,
+            header: header("b"),
+        };
+        say(&mut dialogue, ms(1), &other);
+        assert!(
+            dialogue
+                .is_dead(ms(2))
+                .unwrap()
+                .contains("another HX711 board")
+        );
+    }
+
+    #[test]
+    fn a_line_that_came_twice_is_one_value() {
+        let mut dialogue = dialogue();
+        for _ in 0..2 {
+            say(&mut dialogue, ms(1), &value(1_000, 5));
+        }
+        dialogue.received(ms(2), b"D,2000,5*0000\r\n\xff\r\n");
+        assert!(dialogue.take_sample().is_some() && dialogue.take_sample().is_none());
+        assert_eq!(dialogue.garbled(), 3);
+    }
+}

@@ -1,0 +1,129 @@
+//! What happens once when an HX711 board is opened.
+
+use super::Hx711Settings;
+use super::dialogue::Hx711Dialogue;
+use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
+use crate::cell::CellDescription;
+use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
+use crate::wire::{HostClock, Link};
+use palpate_model::Nanos;
+use palpate_model::rig::AdcDescription;
+use std::sync::Arc;
+
+const DEVICE: &str = "HX711 board";
+/// Opening the port resets an Arduino Uno, whose boot loader then waits up to two seconds; the chip needs another 0.4 s
+/// (data sheet, page 3).
+const START_MAX: Nanos = Nanos::from_millis(5_000);
+/// How often it is asked who it is until then.
+const ASK_EVERY: Nanos = Nanos::from_millis(400);
+/// Conversions by which its rate is measured.
+const MEASURED: usize = 9;
+/// So long may they take at 10 a second.
+const MEASURE_MAX: Nanos = Nanos::from_millis(2_500);
+
+/// Waits for the board, makes sure which it is and measures its rate.
+pub fn open(
+    link: &mut dyn Link,
+    clock: &HostClock,
+    settings: &Hx711Settings,
+    name: &Arc<str>,
+) -> Result<OpenedCell, DeviceError> {
+    let is_scale = settings.full_scale.0.is_finite() && settings.full_scale.0 > 0.0;
+    if !is_scale {
+        return Err(unfit("its full scale must be above 0 V".into()));
+    }
+    let mut console = TextConsole::new(link, clock, name, DEVICE);
+    let header = identify(&mut console)?;
+    if let Some(expected) = &settings.board
+        && *expected != header.board
+    {
+        return Err(DeviceError::OtherSerial {
+            device: DEVICE,
+            found: header.board,
+            expected: expected.clone(),
+        });
+    }
+    let rate = measure(&mut console)?;
+    let volts_per_count = settings.volts_per_count(header.gain);
+    let description = CellDescription {
+        identity: format!(
+            "HX711 board {}, {rate:.1} values a second, gain {}, {} of full scale",
+            header.board, header.gain, settings.full_scale
+        ),
+        adc: AdcDescription {
+            counts_min: COUNT_MIN,
+            counts_max: COUNT_MAX,
+            volts_per_count,
+        },
+        noise_expected: settings.noise,
+        rate,
+        newtons_per_volt: None,
+    };
+    Ok(OpenedCell {
+        description,
+        dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
+        raw: console.raw,
+        farewell: Vec::new(),
+    })
+}
+
+fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {
+    let start = console.now();
+    while console.now().since(start) < START_MAX {
+        console.write("?\r\n")?;
+        let found = console.find(ASK_EVERY, |line| match parse(line) {
+            Some(Message::Header { header, .. }) => Some(header),
+            _ => None,
+        })?;
+        match found {
+            // The chip may not have been measured yet.
+            Some(header) if header.rate > 0 => return Ok(header),
+            _ => {}
+        }
+    }
+    if console.heard.is_empty() {
+        return Err(DeviceError::Silent {
+            device: DEVICE,
+            hint: "check port, cable and that palpate's sketch is on the board, with 115200 baud",
+        });
+    }
+    let is_missing = String::from_utf8_lossy(&console.heard)
+        .lines()
+        .any(|line| matches!(parse(line), Some(Message::Missing { .. })));
+    if is_missing {
+        return Err(unfit(
+            "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
+        ));
+    }
+    Err(DeviceError::Other {
+        device: DEVICE,
+        found: stranger(&console.heard),
+    })
+}
+
+/// Values a second by the board's clock.
+fn measure(console: &mut TextConsole<'_>) -> Result<f64, DeviceError> {
+    let mut micros: Vec<u32> = Vec::new();
+    console.find(MEASURE_MAX, |line| {
+        if let Some(Message::Value { micros: at, .. }) = parse(line) {
+            micros.push(at);
+        }
+        (micros.len() == MEASURED).then_some(())
+    })?;
+    let mut steps: Vec<u32> = micros.windows(2).map(|w| w[1].wrapping_sub(w[0])).collect();
+    // The median forgives lines that were lost.
+    steps.sort_unstable();
+    match steps.get(steps.len() / 2) {
+        Some(step) if *step > 0 && micros.len() == MEASURED => Ok(1e6 / f64::from(*step)),
+        _ => Err(unfit(
+            "the chip does not answer it; check DOUT, SCK and the chip's supply".into(),
+        )),
+    }
+}
+
+fn unfit(detail: String) -> DeviceError {
+    DeviceError::Unfit {
+        device: DEVICE,
+        detail,
+    }
+}

@@ -1,0 +1,234 @@
+//! A gauge in progress: it sends readings by itself, nothing is asked.
+//!
+//! The language has no checksum. A reading counts only with the unit and as many digits behind the point as when the
+//! gauge was opened; a digit lost or changed before the point is not seen here, only as a jump of the force.
+
+use crate::cell::{CellDialogue, CellSample};
+use crate::mark10::protocol::{ForceUnit, GaugeLine, Reading};
+use crate::text::{Lines, Taken};
+use palpate_model::Nanos;
+use palpate_model::units::{Newtons, Volts};
+use std::collections::VecDeque;
+
+/// A gauge is gone when so many readings in a row have not come, and at least a second.
+const READINGS_MISSED: f64 = 5.0;
+const SILENCE_MIN: Nanos = Nanos::from_millis(1_000);
+/// Readings that may wait to be taken: 15 s at the fastest rate.
+const SAMPLES_MAX: usize = 4_000;
+/// Gauges show no number beyond 110 % of their capacity: a guess, to be checked on the device.
+const RANGE: f64 = 1.1;
+
+/// How readings become counts.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct GaugeScale {
+    /// Unit of every reading.
+    pub unit: ForceUnit,
+    /// Digits behind the point of every reading.
+    pub decimals: u8,
+    /// Largest count of its range.
+    pub counts_max: i32,
+}
+
+impl GaugeScale {
+    /// That of a gauge that gives such readings.
+    #[must_use]
+    pub fn new(like: Reading, capacity: Newtons) -> Self {
+        let per_count = like.unit.newtons() * like.number.step();
+        // Saturates for a capacity beyond all counts.
+        let counts_max = (RANGE * capacity.0 / per_count).round() as i32;
+        Self {
+            unit: like.unit,
+            decimals: like.number.decimals,
+            counts_max,
+        }
+    }
+
+    /// Volts of one count: one volt a newton.
+    #[must_use]
+    pub fn volts_per_count(&self) -> f64 {
+        self.unit.newtons() * 10_f64.powi(-i32::from(self.decimals))
+    }
+}
+
+/// A gauge that sends readings.
+pub struct GaugeDialogue {
+    scale: GaugeScale,
+    silence_max: Nanos,
+    lines: Lines,
+    newest: Nanos,
+    counts: i32,
+    samples: VecDeque<CellSample>,
+    is_beyond: bool,
+    trouble: Option<String>,
+    garbled: u64,
+}
+
+impl GaugeDialogue {
+    /// Goes on with a gauge that sends so many readings a second, from `now`.
+    #[must_use]
+    pub fn new(scale: GaugeScale, per_second: f64, now: Nanos) -> Self {
+        Self {
+            scale,
+            silence_max: SILENCE_MIN.max(Nanos((READINGS_MISSED * 1e9 / per_second) as u64)),
+            lines: Lines::default(),
+            newest: now,
+            counts: 0,
+            samples: VecDeque::new(),
+            is_beyond: false,
+            trouble: None,
+            garbled: 0,
+        }
+    }
+
+    fn line(&mut self, now: Nanos, line: &str) {
+        let counts = match GaugeLine::parse(line) {
+            GaugeLine::Reading(Reading { number, unit })
+                if unit == self.scale.unit && number.decimals == self.scale.decimals =>
+            {
+                number.digits
+            }
+            // The end of the range on the side where it was, so that every limit sees it.
+            GaugeLine::Overload if self.counts < 0 => -self.scale.counts_max,
+            GaugeLine::Overload => self.scale.counts_max,
+            _ => {
+                self.garbled += 1;
+                return;
+            }
+        };
+        self.newest = now;
+        self.counts = counts;
+        let is_beyond = counts.saturating_abs() >= self.scale.counts_max;
+        if is_beyond && !self.is_beyond {
+            self.trouble = Some(
+                "the force is beyond the gauge's range; take the load off before it is damaged"
+                    .into(),
+            );
+        }
+        self.is_beyond = is_beyond;
+        if self.samples.len() >= SAMPLES_MAX {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(CellSample {
+            at: now,
+            device_time: None,
+            counts,
+            volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
+        });
+    }
+}
+
+impl CellDialogue for GaugeDialogue {
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        for byte in bytes {
+            match self.lines.take(*byte) {
+                None => {}
+                Some(Taken::Garbled) => self.garbled += 1,
+                Some(Taken::Line(line)) => self.line(now, &line),
+            }
+        }
+    }
+
+    fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
+        None
+    }
+
+    fn take_sample(&mut self) -> Option<CellSample> {
+        self.samples.pop_front()
+    }
+
+    fn take_trouble(&mut self) -> Option<String> {
+        self.trouble.take()
+    }
+
+    fn garbled(&self) -> u64 {
+        self.garbled
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        (now.since(self.newest) > self.silence_max).then(|| {
+            "the gauge has fallen silent; check its cable and battery, zero it and open the rig again"
+                .into()
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::mark10::protocol::Decimal;
+
+    fn dialogue() -> GaugeDialogue {
+        let like = Reading {
+            number: Decimal::parse("0.000").unwrap(),
+            unit: ForceUnit::Newton,
+        };
+        GaugeDialogue::new(GaugeScale::new(like, Newtons(25.0)), 250.0, Nanos::ZERO)
+    }
+
+    #[test]
+    fn one_volt_is_one_newton() {
+        let mut dialogue = dialogue();
+        dialogue.received(Nanos(5), b"4.285 N\r\n-0.015 N\r\n");
+        let sample = dialogue.take_sample().unwrap();
+        assert_eq!((sample.counts, sample.at), (4285, Nanos(5)));
+        assert!((sample.volts.0 - 4.285).abs() < 1e-12);
+        assert_eq!(dialogue.take_sample().unwrap().counts, -15);
+        assert_eq!(dialogue.garbled(), 0);
+    }
+
+    #[test]
+    fn pounds_are_converted() {
+        let like = Reading {
+            number: Decimal::parse("-18.78").unwrap(),
+            unit: ForceUnit::Pound,
+        };
+        let scale = GaugeScale::new(like, Newtons(500.0));
+        let mut dialogue = GaugeDialogue::new(scale, 10.0, Nanos::ZERO);
+        dialogue.received(Nanos(5), b"-18.78 lbF\r\n18.78 N\r\n");
+        let sample = dialogue.take_sample().unwrap();
+        assert!((sample.volts.0 + 18.78 * 4.448_221_615).abs() < 1e-6);
+        assert_eq!((dialogue.take_sample(), dialogue.garbled()), (None, 1));
+    }
+
+    #[test]
+    fn other_units_other_digits_and_rubbish_are_counted() {
+        let mut dialogue = dialogue();
+        for line in [
+            "4.285 mN",
+            "4.28 N",
+            "4285 N",
+            "4.285N",
+            "*10",
+            "RS",
+            "4.2\u{7f}5 N",
+        ] {
+            dialogue.received(Nanos(5), format!("{line}\r\n").as_bytes());
+        }
+        assert_eq!((dialogue.take_sample(), dialogue.garbled()), (None, 7));
+    }
+
+    #[test]
+    fn beyond_its_range_it_reads_the_end_of_it() {
+        let mut dialogue = dialogue();
+        dialogue.received(
+            Nanos(1),
+            b"-20.000 N\r\nOVER\r\nOVER\r\n27.500 N\r\n3.000 N\r\n",
+        );
+        let counts: Vec<i32> = std::iter::from_fn(|| dialogue.take_sample())
+            .map(|sample| sample.counts)
+            .collect();
+        assert_eq!(counts, [-20_000, -27_500, -27_500, 27_500, 3_000]);
+        assert!(dialogue.take_trouble().unwrap().contains("beyond"));
+        assert_eq!(dialogue.take_trouble(), None);
+    }
+
+    #[test]
+    fn silence_is_told() {
+        let mut dialogue = dialogue();
+        let at = Nanos::from_millis(500);
+        dialogue.received(at, b"0.000 N\r\n");
+        assert_eq!(dialogue.is_dead(at + SILENCE_MIN), None);
+        let later = at + SILENCE_MIN + Nanos(1);
+        assert!(dialogue.is_dead(later).unwrap().contains("silent"));
+    }
+}

@@ -1,0 +1,46 @@
+//! A gauge on a line of its own that sends its readings by itself.
+
+mod dialogue;
+mod open;
+
+pub use dialogue::{GaugeDialogue, GaugeScale};
+pub use open::open;
+
+use palpate_model::units::Newtons;
+
+/// Rates of `AOUT` (Model 7i user's guide, page 30).
+pub const RATES: [u16; 8] = [1, 2, 5, 10, 25, 50, 125, 250];
+/// Largest exponent of a filter: 1024 samples.
+pub const FILTER_MAX: u8 = 10;
+/// What a gauge is told when its line is closed.
+pub const FAREWELL: &[u8] = b"AOUT0\r";
+
+/// What palpate has to know of a gauge, and how it is to be set.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GaugeSettings {
+    /// Serial number that it must have, as it tells it; any without.
+    pub serial_number: Option<String>,
+    /// Largest force of its range, as on its label; a gauge does not tell it.
+    pub capacity: Newtons,
+    /// Readings a second that it is to send, one of [`RATES`].
+    pub per_second: u16,
+    /// Exponent of its filters, 0 to 10: 2^n of its samples are averaged. Left as they are without.
+    pub filter: Option<u8>,
+    /// Whether pressing pulls at the gauge, so that tension is to count as positive.
+    pub is_reversed: bool,
+    /// Standard deviation of its readings at rest; one step of its last digit without.
+    pub noise: Option<Newtons>,
+}
+
+impl Default for GaugeSettings {
+    fn default() -> Self {
+        Self {
+            serial_number: None,
+            capacity: Newtons(25.0),
+            per_second: 250,
+            filter: None,
+            is_reversed: false,
+            noise: None,
+        }
+    }
+}

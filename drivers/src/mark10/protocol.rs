@@ -1,0 +1,358 @@
+//! Gauge Control Language 2: readings, errors and settings of Mark-10 gauges.
+//!
+//! Commands end with CR or CR LF, answers with CR LF; commands that set something are silent unless they fail (Series 5
+//! user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31; Series 4 user's guide, page 16).
+
+/// Digits of a reading: gauges show five, with room for those of a small unit.
+const DIGITS_MAX: usize = 8;
+/// Digits behind the point.
+const DECIMALS_MAX: usize = 5;
+
+/// A unit of force. Gauges have units of torque and units that the user defines too; those are none.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum ForceUnit {
+    /// `mN`.
+    Millinewton,
+    /// `N`.
+    Newton,
+    /// `kN`.
+    Kilonewton,
+    /// `gF`.
+    Gram,
+    /// `kgF`.
+    Kilogram,
+    /// `ozF`.
+    Ounce,
+    /// `lbF`.
+    Pound,
+}
+
+/// Newtons of a kilogram-force, exactly (3rd CGPM, 1901).
+const KILOGRAM_FORCE: f64 = 9.806_65;
+/// Kilograms of an avoirdupois pound, exactly (international yard and pound agreement, 1959).
+const POUND: f64 = 0.453_592_37;
+
+impl ForceUnit {
+    /// Reads it as readings and settings write it: `lbF`, `LBF`, `LB`.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        Some(match text.to_ascii_uppercase().as_str() {
+            "MN" => Self::Millinewton,
+            "N" => Self::Newton,
+            "KN" => Self::Kilonewton,
+            "G" | "GF" => Self::Gram,
+            "KG" | "KGF" => Self::Kilogram,
+            "OZ" | "OZF" => Self::Ounce,
+            "LB" | "LBF" => Self::Pound,
+            _ => return None,
+        })
+    }
+
+    /// Newtons of one.
+    #[must_use]
+    pub const fn newtons(self) -> f64 {
+        match self {
+            Self::Millinewton => 1e-3,
+            Self::Newton => 1.0,
+            Self::Kilonewton => 1e3,
+            Self::Gram => 1e-3 * KILOGRAM_FORCE,
+            Self::Kilogram => KILOGRAM_FORCE,
+            Self::Ounce => POUND / 16.0 * KILOGRAM_FORCE,
+            Self::Pound => POUND * KILOGRAM_FORCE,
+        }
+    }
+
+    /// As readings write it.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Millinewton => "mN",
+            Self::Newton => "N",
+            Self::Kilonewton => "kN",
+            Self::Gram => "gF",
+            Self::Kilogram => "kgF",
+            Self::Ounce => "ozF",
+            Self::Pound => "lbF",
+        }
+    }
+}
+
+/// A number as it was written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Decimal {
+    /// Its digits without the point, signed.
+    pub digits: i32,
+    /// How many of them stand behind the point.
+    pub decimals: u8,
+}
+
+impl Decimal {
+    /// Reads digits with at most a minus before and a point within them: `+` is never sent (Model 7i user's guide, page
+    /// 30, `OPOL`).
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let (sign, rest) = text.strip_prefix('-').map_or((1, text), |rest| (-1, rest));
+        let (whole, part) = rest.split_once('.').unwrap_or((rest, ""));
+        let is_point_last = rest.ends_with('.');
+        let joined = format!("{whole}{part}");
+        let is_number = !whole.is_empty()
+            && !is_point_last
+            && joined.len() <= DIGITS_MAX
+            && part.len() <= DECIMALS_MAX
+            && joined.bytes().all(|b| b.is_ascii_digit());
+        if !is_number {
+            return None;
+        }
+        Some(Self {
+            digits: sign * joined.parse::<i32>().ok()?,
+            decimals: part.len() as u8,
+        })
+    }
+
+    /// What its last digit is worth.
+    #[must_use]
+    pub fn step(self) -> f64 {
+        10_f64.powi(-i32::from(self.decimals))
+    }
+
+    /// Its value.
+    #[must_use]
+    pub fn value(self) -> f64 {
+        // Divided by a whole number, so that 4.285 is the double nearest to it.
+        f64::from(self.digits) / 10_f64.powi(i32::from(self.decimals))
+    }
+}
+
+/// A reading: compression positive, tension negative.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Reading {
+    /// The number.
+    pub number: Decimal,
+    /// Its unit.
+    pub unit: ForceUnit,
+}
+
+/// The answer to `LIST`: settings, by the abbreviations that set them.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct GaugeList {
+    /// Version of the firmware.
+    pub firmware: String,
+    /// Unit of force; what stands there when it is another unit.
+    pub unit: Result<ForceUnit, String>,
+    /// `CUR` for current readings.
+    pub mode: String,
+    /// Exponent of the filter of displayed readings, 2^n samples.
+    pub filter_displayed: Option<u8>,
+    /// Exponent of the filter of current readings.
+    pub filter_current: Option<u8>,
+    /// Readings that it sends by itself, as `AOUT` sets them.
+    pub auto_transmit: Option<u16>,
+    /// Whether units are sent with readings.
+    pub has_units: bool,
+    /// Whether tension is positive; some firmware does not say.
+    pub is_inverted: Option<bool>,
+    /// Whether the sign is left out.
+    pub is_unsigned: Option<bool>,
+    /// The whole line.
+    pub line: String,
+}
+
+/// A line of a gauge.
+#[derive(Clone, Debug, PartialEq)]
+pub enum GaugeLine {
+    /// A reading with its unit.
+    Reading(Reading),
+    /// A reading beyond the gauge's range.
+    Overload,
+    /// The last command was refused.
+    Error(GaugeError),
+    /// The answer to `LIST`.
+    List(GaugeList),
+    /// Anything else, such as a model number.
+    Other(String),
+}
+
+/// Why a gauge refuses a command (Series 5 user's guide, page 19).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, thiserror::Error)]
+pub enum GaugeError {
+    /// `*10`.
+    #[error("illegal command, *10")]
+    Illegal,
+    /// `*11`.
+    #[error("not applicable, *11")]
+    NotApplicable,
+    /// `*12`.
+    #[error("invalid specifier, *12")]
+    Specifier,
+    /// `*22`.
+    #[error("value too large, *22")]
+    TooLarge,
+}
+
+impl GaugeLine {
+    /// Reads a line without its end.
+    #[must_use]
+    pub fn parse(line: &str) -> Self {
+        let line = line.trim();
+        let error = match line {
+            "*10" => Some(GaugeError::Illegal),
+            "*11" => Some(GaugeError::NotApplicable),
+            "*12" => Some(GaugeError::Specifier),
+            "*22" => Some(GaugeError::TooLarge),
+            _ => None,
+        };
+        if let Some(error) = error {
+            return Self::Error(error);
+        }
+        if let Some((number, unit)) = line.split_once(' ')
+            && let (Some(number), Some(unit)) =
+                (Decimal::parse(number), ForceUnit::parse(unit.trim_start()))
+        {
+            return Self::Reading(Reading { number, unit });
+        }
+        // A guess: the guides tell what the display shows, not what is sent then.
+        if line.to_ascii_uppercase().starts_with("OVER") {
+            return Self::Overload;
+        }
+        GaugeList::parse(line).map_or_else(|| Self::Other(line.to_owned()), Self::List)
+    }
+}
+
+impl GaugeList {
+    fn parse(line: &str) -> Option<Self> {
+        let fields: Vec<&str> = line.split(';').map(str::trim).collect();
+        let firmware = fields.first()?.strip_prefix('V')?;
+        let is_version = firmware.starts_with(|c: char| c.is_ascii_digit());
+        if !is_version || fields.len() < 4 {
+            return None;
+        }
+        let after = |name: &str| fields.iter().find_map(|field| field.strip_prefix(name));
+        let flag = |name: &str| match after(name) {
+            Some("1") => Some(true),
+            Some("0") => Some(false),
+            _ => None,
+        };
+        let small = |name: &str| after(name).and_then(|n| n.parse().ok());
+        Some(Self {
+            firmware: firmware.to_owned(),
+            unit: ForceUnit::parse(fields[1]).ok_or_else(|| fields[1].to_owned()),
+            mode: fields[2].to_owned(),
+            filter_displayed: small("FLTC"),
+            filter_current: small("FLTP"),
+            auto_transmit: after("AOUT").and_then(|n| n.parse().ok()),
+            has_units: fields.contains(&"FULL"),
+            is_inverted: flag("IPOL"),
+            is_unsigned: flag("OPOL"),
+            line: line.to_owned(),
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn reading(line: &str) -> Option<(i32, u8, ForceUnit)> {
+        match GaugeLine::parse(line) {
+            GaugeLine::Reading(Reading { number, unit }) => {
+                Some((number.digits, number.decimals, unit))
+            }
+            _ => None,
+        }
+    }
+
+    #[test]
+    fn readings_of_the_series_4_guide() {
+        // Page 16, "Example return strings".
+        assert_eq!(reading("-18.78 lbF"), Some((-1878, 2, ForceUnit::Pound)));
+        assert_eq!(reading("4.285 N"), Some((4285, 3, ForceUnit::Newton)));
+        let number = Decimal::parse("4.285").unwrap();
+        assert_eq!((number.value(), number.step()), (4.285, 1e-3));
+        assert_eq!(Decimal::parse("-0.005").unwrap().value(), -0.005);
+    }
+
+    #[test]
+    fn what_is_no_reading_is_none() {
+        for wrong in [
+            "4.285",
+            "+4.285 N",
+            "4.285 NM",
+            "4,285 N",
+            "4.2.5 N",
+            ". N",
+            "4. N",
+            ".5 N",
+            "- N",
+            "1e3 N",
+            "N",
+            "123456789 N",
+            "4.285 N N",
+            "0.123456 N",
+            "nan N",
+        ] {
+            assert_eq!(reading(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn settings_of_the_series_5_guide() {
+        // Page 19, "example LIST output".
+        let line = "V1.00;LBF;CUR;FLTC8;FLTP1;AOUT00;AOFF5;FULL;MIT;POL;B0";
+        let GaugeLine::List(list) = GaugeLine::parse(line) else {
+            panic!("no list");
+        };
+        assert_eq!(list.firmware, "1.00");
+        assert_eq!(list.unit, Ok(ForceUnit::Pound));
+        assert_eq!(list.mode, "CUR");
+        assert_eq!(
+            (list.filter_displayed, list.filter_current),
+            (Some(8), Some(1))
+        );
+        assert_eq!(list.auto_transmit, Some(0));
+        assert!(list.has_units);
+        assert_eq!((list.is_inverted, list.is_unsigned), (None, None));
+        let GaugeLine::List(list) = GaugeLine::parse("V2.1;LBIN;PT;IPOL1;OPOL0;NUM;AOUT125") else {
+            panic!("no list");
+        };
+        assert_eq!(list.unit, Err("LBIN".to_owned()));
+        assert_eq!(
+            (list.is_inverted, list.is_unsigned),
+            (Some(true), Some(false))
+        );
+        assert!(!list.has_units && list.auto_transmit == Some(125));
+    }
+
+    #[test]
+    fn errors_of_the_series_5_guide() {
+        // Page 19.
+        for (line, error) in [
+            ("*10", GaugeError::Illegal),
+            ("*11", GaugeError::NotApplicable),
+            ("*12", GaugeError::Specifier),
+            ("*22", GaugeError::TooLarge),
+        ] {
+            assert_eq!(GaugeLine::parse(line), GaugeLine::Error(error));
+            assert!(error.to_string().ends_with(line));
+        }
+        assert_eq!(GaugeLine::parse("*13"), GaugeLine::Other("*13".into()));
+    }
+
+    #[test]
+    fn units_are_those_of_the_tables() {
+        // NIST SP 811, appendix B.8: lbf 4.448222, ozf 0.2780139, kgf 9.80665.
+        for (name, newtons) in [
+            ("mN", 1e-3),
+            ("N", 1.0),
+            ("kN", 1e3),
+            ("gF", 9.80665e-3),
+            ("kgF", 9.80665),
+            ("ozF", 0.278_013_9),
+            ("lbF", 4.448_222),
+        ] {
+            let unit = ForceUnit::parse(name).unwrap();
+            assert_eq!(unit.name(), name);
+            assert!((unit.newtons() / newtons - 1.0).abs() < 2e-7, "{name}");
+        }
+        assert_eq!(ForceUnit::parse("LBFT"), None);
+    }
+}

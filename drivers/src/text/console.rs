@@ -1,0 +1,137 @@
+//! Question and answer, one at a time, while a device is opened.
+
+use super::error::DeviceError;
+use super::lines::{Lines, Taken};
+use crate::wire::{HostClock, Link};
+use palpate_model::Nanos;
+use palpate_model::rig::RawBytes;
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::time::Duration;
+
+/// Longest single wait for bytes.
+const READ_MAX: Duration = Duration::from_millis(5);
+/// So much of what came is kept to tell who it is that answers.
+const HEARD_MAX: usize = 512;
+
+/// A link to a device that speaks in lines, with nothing else going on.
+pub struct TextConsole<'a> {
+    link: &'a mut dyn Link,
+    clock: &'a HostClock,
+    name: Arc<str>,
+    /// What it is called in errors.
+    device: &'static str,
+    lines: Lines,
+    ready: VecDeque<(Nanos, String)>,
+    /// The newest bytes that came.
+    pub heard: Vec<u8>,
+    /// What was exchanged so far.
+    pub raw: Vec<RawBytes>,
+}
+
+impl<'a> TextConsole<'a> {
+    /// On a link. `name` stands in the log, `device` in errors.
+    pub fn new(
+        link: &'a mut dyn Link,
+        clock: &'a HostClock,
+        name: &Arc<str>,
+        device: &'static str,
+    ) -> Self {
+        Self {
+            link,
+            clock,
+            name: Arc::clone(name),
+            device,
+            lines: Lines::default(),
+            ready: VecDeque::new(),
+            heard: Vec::new(),
+            raw: Vec::new(),
+        }
+    }
+
+    /// The host's clock.
+    #[must_use]
+    pub fn now(&self) -> Nanos {
+        (self.clock)()
+    }
+
+    /// Writes bytes as they are.
+    pub fn write(&mut self, text: &str) -> Result<(), DeviceError> {
+        self.link
+            .write(text.as_bytes())
+            .map_err(|err| DeviceError::lost(self.device, &err))?;
+        self.tap(true, text.as_bytes());
+        Ok(())
+    }
+
+    /// The next whole line with its arrival; `None` when none comes within a time. Garbled ones are passed over.
+    pub fn line(&mut self, within: Nanos) -> Result<Option<(Nanos, String)>, DeviceError> {
+        let start = self.now();
+        while self.ready.is_empty() && self.now().since(start) < within {
+            self.read()?;
+        }
+        Ok(self.ready.pop_front())
+    }
+
+    /// The first line that means something to `read`, within a time; others are passed over.
+    pub fn find<T>(
+        &mut self,
+        within: Nanos,
+        mut read: impl FnMut(&str) -> Option<T>,
+    ) -> Result<Option<T>, DeviceError> {
+        let start = self.now();
+        while let Some(left) = within.0.checked_sub(self.now().since(start).0) {
+            let Some((_, line)) = self.line(Nanos(left))? else {
+                break;
+            };
+            if let Some(found) = read(&line) {
+                return Ok(Some(found));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Throws away what comes until nothing has come for `quiet`. A device that never falls silent is left after ten
+    /// times as long.
+    pub fn drain(&mut self, quiet: Nanos) -> Result<(), DeviceError> {
+        let (start, mut newest) = (self.now(), self.now());
+        while self.now().since(newest) < quiet && self.now().since(start) < Nanos(10 * quiet.0) {
+            if self.read()? > 0 {
+                newest = self.now();
+            }
+        }
+        self.ready.clear();
+        self.lines.clear();
+        Ok(())
+    }
+
+    fn read(&mut self) -> Result<usize, DeviceError> {
+        let mut buffer = [0_u8; 1024];
+        let count = self
+            .link
+            .read(&mut buffer, READ_MAX)
+            .map_err(|err| DeviceError::lost(self.device, &err))?;
+        let at = self.now();
+        self.tap(false, &buffer[..count]);
+        self.heard.extend_from_slice(&buffer[..count]);
+        self.heard
+            .drain(..self.heard.len().saturating_sub(HEARD_MAX));
+        for byte in &buffer[..count] {
+            if let Some(Taken::Line(line)) = self.lines.take(*byte) {
+                self.ready.push_back((at, line));
+            }
+        }
+        Ok(count)
+    }
+
+    fn tap(&mut self, is_sent: bool, bytes: &[u8]) {
+        if !bytes.is_empty() {
+            self.raw.push(RawBytes {
+                at: self.now(),
+                device: Arc::clone(&self.name),
+                is_sent,
+                bytes: bytes.to_vec(),
+            });
+        }
+    }
+}

@@ -1,0 +1,122 @@
+//! Why a device that speaks in lines cannot be used, in words.
+
+use std::io;
+use thiserror::Error;
+
+/// A device cannot be used.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// Nothing comes.
+    #[error("the {device} does not answer; {hint}")]
+    Silent {
+        /// What was expected.
+        device: &'static str,
+        /// What to look at.
+        hint: &'static str,
+    },
+    /// Something else answers.
+    #[error("this is no {device} but {found}; check which cable goes where")]
+    Other {
+        /// What was expected.
+        device: &'static str,
+        /// What it is, or what it said.
+        found: String,
+    },
+    /// Another one of its kind.
+    #[error(
+        "the {device} has serial number {found} but the rig file says {expected}; check which cable goes where, or correct the file"
+    )]
+    OtherSerial {
+        /// What was expected.
+        device: &'static str,
+        /// What it told.
+        found: String,
+        /// What the rig file says.
+        expected: String,
+    },
+    /// It cannot do what is needed, or is not set up for it.
+    #[error("the {device} cannot be used: {detail}")]
+    Unfit {
+        /// What was expected.
+        device: &'static str,
+        /// Why, and what to do.
+        detail: String,
+    },
+    /// The link went while the device was opened.
+    #[error("the link to the {device} was lost while it was opened ({detail}); check the cable")]
+    Lost {
+        /// What was expected.
+        device: &'static str,
+        /// What the operating system said.
+        detail: String,
+    },
+}
+
+impl DeviceError {
+    /// The link is gone.
+    pub(crate) fn lost(device: &'static str, err: &io::Error) -> Self {
+        Self::Lost {
+            device,
+            detail: err.to_string(),
+        }
+    }
+}
+
+/// Longest piece of what a stranger said that is told.
+const QUOTE_MAX: usize = 60;
+
+/// What a device is that answered otherwise than expected: by its name where its words give it away.
+#[must_use]
+pub fn stranger(said: &[u8]) -> String {
+    let text = String::from_utf8_lossy(said);
+    let has = |part: &str| text.contains(part);
+    let named = if has("Grbl") || has("[MSG:") || has("error:") || has("ALARM:") {
+        Some("a Grbl controller")
+    } else if has(",palpate-hx711,") || has("D,") && has("*") {
+        Some("an HX711 board")
+    } else if has("DMC") || is_prompts(&text) {
+        Some("a Galil controller")
+    } else if has(" mm") || has(" in\r") {
+        Some("a Mark-10 stand")
+    } else if has(";CUR;") || has(" N\r") || has(" lbF") || has("*10") {
+        Some("a Mark-10 gauge")
+    } else {
+        None
+    };
+    named.map_or_else(
+        || {
+            let quote: String = text.chars().take(QUOTE_MAX).collect();
+            format!("something that says {quote:?}")
+        },
+        str::to_owned,
+    )
+}
+
+/// Prompts of a Galil controller and nothing else.
+fn is_prompts(text: &str) -> bool {
+    let rest = text.trim();
+    !rest.is_empty() && rest.chars().all(|c| matches!(c, ':' | '?' | '\r' | '\n'))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strangers_are_called_by_their_names() {
+        for (said, name) in [
+            ("\r\nGrbl 1.1h ['$' for help]\r\n", "Grbl"),
+            ("error:8\r\n", "Grbl"),
+            ("?:", "Galil"),
+            ("DMC4143 Rev 1.3a\r\n:", "Galil"),
+            ("4.285 N\r\n", "Mark-10 gauge"),
+            ("-18.78 lbF\r\n", "Mark-10 gauge"),
+            ("H,100,palpate-hx711,1,80,128,a*1234\r\n", "HX711"),
+        ] {
+            assert!(stranger(said.as_bytes()).contains(name), "{said:?}");
+        }
+        let other = stranger(b"\x00\xffhello\r\n");
+        assert!(other.contains("hello") && !other.contains('\0'), "{other}");
+    }
+}

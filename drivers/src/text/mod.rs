@@ -1,0 +1,11 @@
+//! Devices that speak in lines of text: what came cut into lines, and question and answer while one is opened.
+
+mod console;
+mod error;
+mod lines;
+mod opened;
+
+pub use console::TextConsole;
+pub use error::{DeviceError, stranger};
+pub use lines::{Lines, Taken};
+pub use opened::OpenedCell;
