@@ -274,7 +274,7 @@ impl Host {
 
     /// Where the slide really is on the board's counter, in pulses.
     pub fn truth(&self) -> f64 {
-        self.wire.lock().board.place_mm() / 0.0025
+        (self.wire.lock().board.place_mm() / 0.0025).round()
     }
 }
 

@@ -64,7 +64,7 @@ fn a_stop_brakes_and_the_place_is_known() {
     host.pass(1.0);
     let before = host.truth();
     assert_eq!(host.tell(RigCommand::Stop), RigCommand::Stop);
-    assert!(host.has(AxisStatus::STOPPING));
+    host.until("braking", |host| host.has(AxisStatus::STOPPING));
     host.settle();
     let way = (host.truth() - before) * 0.0025;
     // Braking from 9 mm/s takes 0.675 mm, and 60 ms go by before it.

@@ -91,7 +91,7 @@ fn a_jog_of_somebody_else_is_ended() {
         assert!(wire.board.place_mm() > 1.0);
     }
     let connected = try_connect(&wire, &slide()).expect("it connects");
-    let truth = wire.lock().board.place_mm() / 0.0025;
+    let truth = (wire.lock().board.place_mm() / 0.0025).round();
     assert_eq!(connected.facts.steps as f64, truth);
     assert!(truth < 4_000.0);
 }
