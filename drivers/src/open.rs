@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
-use crate::wire::HostClock;
+use crate::wire::{HostClock, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
 use std::io::Read;
@@ -76,6 +76,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).next_event(until)
     }
 
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        (**self).reconnect()
+    }
+
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
     }
@@ -86,6 +90,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         (**self).take_raw()
+    }
+
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        (**self).links()
     }
 }
 

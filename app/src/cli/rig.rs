@@ -192,7 +192,21 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         ));
     }
     let source = Source::find(calibration)?;
-    let file = palpate_drivers::read_rig_file(&args.rig).map_err(Failure::usage)?;
+    let (rig, locks) = open_rig_file(&args.rig)?;
+    let limits = Limits::for_travel(travel(args, rig.description().travel)?);
+    let doubts = source.doubts(&rig.description().name);
+    Ok(OpenRig {
+        rig,
+        calibration: source.calibration,
+        doubts,
+        limits,
+        _locks: locks,
+    })
+}
+
+/// Opens the rig of a file and keeps other programs off it.
+pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, Vec<HolderLock>), Failure> {
+    let file = palpate_drivers::read_rig_file(file_name).map_err(Failure::usage)?;
     // Two programs may be connected to one controller on a network; only one may drive it.
     let locks = file
         .places()
@@ -203,17 +217,9 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
             rig_lock(&name.chars().map(plain).collect::<String>())
         })
         .collect::<Result<Vec<_>, _>>()?;
-    let rig = palpate_drivers::open_wired(&args.rig, &driver_clock())
+    let rig = palpate_drivers::open_wired(file_name, &driver_clock())
         .map_err(|err| Failure::Failed(err.to_string()))?;
-    let limits = Limits::for_travel(travel(args, rig.description().travel)?);
-    let doubts = source.doubts(&rig.description().name);
-    Ok(OpenRig {
-        rig,
-        calibration: source.calibration,
-        doubts,
-        limits,
-        _locks: locks,
-    })
+    Ok((rig, locks))
 }
 
 /// The end of the travel: the rig's, or one before it.

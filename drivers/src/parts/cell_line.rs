@@ -6,7 +6,7 @@ use crate::cell::CellDialogue;
 use crate::rig::RigEventBody;
 use crate::wire::{Dialogue, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand};
+use palpate_model::rig::{Age, AxisStatus, Fault, Reading, RigCommand};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, PoisonError};
 
@@ -84,6 +84,10 @@ impl CellLine {
                 volts: sample.volts,
                 pulses: 0,
                 status: AxisStatus(0),
+                age: sample.device_time.map(|_| Age {
+                    by: now.since(taken),
+                    within: self.clock.spread(),
+                }),
             };
             self.events.push_back((now, RigEventBody::Reading(reading)));
         }

@@ -1,7 +1,7 @@
 //! The keys of a Galil controller.
 
 use super::fields::Fields;
-use crate::galil::{AnalogRange, GalilSettings, Levels, MotorType};
+use crate::galil::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 
@@ -55,6 +55,9 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let noise = fields.number("noise_v", 1e-9, 1.0);
     let filter = fields.text("filter");
     let has_watchdog = fields.flag("watchdog").unwrap_or(true);
+    let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
+    // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
+    let sample_us = fields.number("sample_us", 500.0, 1000.0);
     let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
     // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
     if acceleration / mm_per_pulse < 1024.0 {
@@ -89,9 +92,17 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             serial_number: serial_number.map(|number| number as u64),
             has_watchdog,
             filter,
+            sampling: sampling?,
+            sample_us: sample_us.map(|us| us as u16),
         },
     ))
 }
+
+const SAMPLINGS: [(&str, Sampling); 3] = [
+    ("auto", Sampling::Auto),
+    ("poll", Sampling::Poll),
+    ("record", Sampling::Record),
+];
 
 fn place(fields: &mut Fields) -> Option<Place> {
     let (port, address) = (fields.text("port"), fields.text("address"));

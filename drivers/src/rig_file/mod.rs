@@ -86,8 +86,7 @@ impl RigFile {
     pub fn open(&self, clock: &HostClock) -> Result<Box<dyn Rig>, DeviceError> {
         match self {
             Self::Galil { place, settings } => {
-                let link = place.open().map_err(GalilOpenError::from)?;
-                Ok(Box::new(GalilRig::open(link, settings, clock.clone())?))
+                Ok(Box::new(GalilRig::open(place, settings, clock.clone())?))
             }
         }
     }
