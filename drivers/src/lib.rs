@@ -6,12 +6,15 @@
 //! no hardware. [`doubles`] is for tests only, [`emulate`] answers like a device on a wire.
 
 pub mod cell;
+pub mod detect;
 pub mod doubles;
 pub mod emulate;
 pub mod galil;
+pub mod grbl;
 pub mod hx711;
 pub mod mark10;
 pub mod open;
+pub mod parts;
 pub mod rig;
 pub mod rig_file;
 pub mod serial;
@@ -20,4 +23,4 @@ pub mod text;
 pub mod wire;
 
 pub use open::{is_rig_file, open, open_wired, read_rig_file};
-pub use rig::{Rig, RigError, RigEvent, RigEventBody};
+pub use rig::{Rig, RigError, RigEvent, RigEventBody, Taken};

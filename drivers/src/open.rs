@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
-use crate::wire::HostClock;
+use crate::wire::{HostClock, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
 use std::io::Read;
@@ -55,13 +55,12 @@ pub fn read_rig_file(file: &str) -> Result<RigFile, RigError> {
 
 /// Opens the rig that a file describes and checks its devices against it. Nothing moves.
 pub fn open_wired(file: &str, clock: &HostClock) -> Result<Box<dyn Rig>, RigError> {
-    let rig = read_rig_file(file)?
+    read_rig_file(file)?
         .open(clock)
-        .map_err(|error| RigError::Galil {
+        .map_err(|error| RigError::Device {
             file: file.to_owned(),
             error,
-        })?;
-    Ok(Box::new(rig))
+        })
 }
 
 impl<R: Rig + ?Sized> Rig for Box<R> {
@@ -77,6 +76,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).next_event(until)
     }
 
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        (**self).reconnect()
+    }
+
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
     }
@@ -87,6 +90,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         (**self).take_raw()
+    }
+
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        (**self).links()
     }
 }
 

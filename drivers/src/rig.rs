@@ -1,7 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
-use crate::galil::GalilOpenError;
-use crate::rig_file::RigFileError;
+use crate::rig_file::{DeviceError, RigFileError};
+use crate::wire::LinkStats;
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
 use thiserror::Error;
@@ -13,6 +13,29 @@ pub struct RigEvent {
     pub at: Nanos,
     /// What arrived.
     pub body: RigEventBody,
+    /// When a sample was taken, as far as that is known better than that it was before it arrived.
+    pub taken: Option<Taken>,
+}
+
+/// When a sample was taken, on the host's clock.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Taken {
+    /// The best estimate.
+    pub at: Nanos,
+    /// How far it may be wrong either way.
+    pub uncertainty: Nanos,
+}
+
+impl RigEvent {
+    /// A report of which no more is known than its arrival.
+    #[must_use]
+    pub const fn arrived(at: Nanos, body: RigEventBody) -> Self {
+        Self {
+            at,
+            body,
+            taken: None,
+        }
+    }
 }
 
 /// What a rig can report.
@@ -49,13 +72,16 @@ pub enum RigError {
     /// The rig file has mistakes.
     #[error(transparent)]
     RigFile(#[from] RigFileError),
+    /// There is no link that could be made again.
+    #[error("this rig cannot be connected again; choose it anew")]
+    NotAgain,
     /// What the rig file describes cannot be used.
     #[error("rig {file}: {error}")]
-    Galil {
+    Device {
         /// The rig file.
         file: String,
         /// Why.
-        error: GalilOpenError,
+        error: DeviceError,
     },
 }
 
@@ -74,6 +100,13 @@ pub trait Rig: Send {
     /// The next event at or before `until`, if there is one.
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent>;
 
+    /// Connects anew after the link was lost or the controller was reset: the same devices at the same place, checked and
+    /// set up as at first, the axis stopped. Nothing moves; where the axis is has to be found again. It may wait for
+    /// seconds. A rig whose link is whole is connected anew too. Who has asked the operator calls it.
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        Err(RigError::NotAgain)
+    }
+
     /// Whether time is simulated, so that the caller may run it at any pace.
     fn is_virtual(&self) -> bool;
 
@@ -84,6 +117,11 @@ pub trait Rig: Send {
     /// The bytes exchanged with devices since this was last asked, in order, at the caller's time. A rig without
     /// wires has none. Must not wait.
     fn take_raw(&mut self) -> Vec<RawBytes> {
+        Vec::new()
+    }
+
+    /// How each link has behaved since it was opened, by the name of the device behind it. A rig without wires has none.
+    fn links(&self) -> Vec<(String, LinkStats)> {
         Vec::new()
     }
 }

@@ -111,6 +111,7 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
                 volts: Volts(1.28 + 1e-4 * (tick % 2) as f64 + 1e-3 * (tick / 1000 % 7) as f64),
                 pulses: 0,
                 status: AxisStatus::MOTOR_ON,
+                age: None,
             };
             let now = Nanos(tick * 1_000_000);
             let (next, effects) = step(state, now, Input::Reading(reading));

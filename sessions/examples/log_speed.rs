@@ -23,6 +23,7 @@ fn row(index: u64, random: &mut u64) -> Row {
     Row {
         tick: index,
         host: Nanos(index * 50_000),
+        age: None,
         counts: None,
         volts: Some(volts),
         pulses: Some((index / 500 % 500) as i64),

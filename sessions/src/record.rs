@@ -7,7 +7,7 @@
 
 use crate::packed::{Field, extend_doubles, extend_numbers, next_field, zigzag};
 use palpate_model::Nanos;
-use palpate_model::rig::Phase;
+use palpate_model::rig::{Age, Phase};
 use serde::{Deserialize, Serialize};
 
 /// Most samples in one block, so that a block and its decoded form stay small.
@@ -23,6 +23,8 @@ pub struct Row {
     pub tick: u64,
     /// Arrival on the host's clock.
     pub host: Nanos,
+    /// How long before it arrived it was taken; `None` where the link does not tell.
+    pub age: Option<Age>,
     /// Converter counts; `None` on a rig without a converter.
     pub counts: Option<i32>,
     /// Load-cell signal in V, as received; `None` in an imported session whose file had none.
@@ -144,6 +146,10 @@ pub(crate) struct DaqBlock {
     pub pulses_delta: Vec<i64>,
     #[prost(uint32, repeated, tag = "7")]
     pub status: Vec<u32>,
+    #[prost(uint64, repeated, tag = "8")]
+    pub age_ns: Vec<u64>,
+    #[prost(uint64, repeated, tag = "9")]
+    pub age_within_ns: Vec<u64>,
 }
 
 /// Derived values of the same samples; where `validity` lacks a value's bit, it is 0.
@@ -178,16 +184,17 @@ pub(crate) struct View {
     pub cycle: u32,
 }
 
-/// Which of its optional values a row has: counts, volts and pulses.
-fn held(row: &Row) -> [bool; 3] {
+/// Which of its optional values a row has: age, counts, volts and pulses.
+fn held(row: &Row) -> [bool; 4] {
     [
+        row.age.is_some(),
         row.counts.is_some(),
         row.volts.is_some(),
         row.pulses.is_some(),
     ]
 }
 
-/// Cuts rows where a block must end: at its size limit, and where counts, volts or pulses appear or vanish.
+/// Cuts rows where a block must end: at its size limit, and where optional values appear or vanish.
 pub(crate) fn block_slices(rows: &[Row]) -> impl Iterator<Item = &[Row]> {
     rows.chunk_by(|a, b| held(a) == held(b))
         .flat_map(|rows| rows.chunks(BLOCK_ROWS_MAX))
@@ -212,6 +219,8 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
             pulses = to;
         }
         (tick, host) = (row.tick, row.host.0);
+        daq.age_ns.extend(row.age.map(|age| age.by.0));
+        daq.age_within_ns.extend(row.age.map(|age| age.within.0));
         daq.counts.extend(row.counts);
         daq.volts.extend(row.volts);
         daq.status.push(row.status);
@@ -226,8 +235,15 @@ pub(crate) fn blocks_from_rows(first_sample: u64, rows: &[Row]) -> (DaqBlock, De
     (daq, derived)
 }
 
+fn age(daq: &DaqBlock, index: usize) -> Option<Age> {
+    Some(Age {
+        by: Nanos(*daq.age_ns.get(index)?),
+        within: Nanos(*daq.age_within_ns.get(index)?),
+    })
+}
+
 /// Bytes of the largest block: every value of a sample in its longest form.
-const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 48;
+const BLOCK_BYTES_MAX: usize = BLOCK_ROWS_MAX * 68;
 
 /// A verified block of samples, column by column. Its memory is used again for the next one.
 #[derive(Debug, Default)]
@@ -288,6 +304,7 @@ impl Block {
         Row {
             tick: daq.tick_delta[index] as u64,
             host: Nanos(daq.host_delta_ns[index] as u64),
+            age: age(daq, index),
             counts: daq.counts.get(index).copied(),
             volts: daq.volts.get(index).copied(),
             pulses: daq.pulses_delta.get(index).copied(),
@@ -322,6 +339,8 @@ impl Block {
             (5, Field::Bytes(bytes)) => extend_doubles(&mut daq.volts, bytes),
             (6, Field::Bytes(bytes)) => extend_numbers(&mut daq.pulses_delta, bytes, zigzag),
             (7, Field::Bytes(bytes)) => extend_numbers(&mut daq.status, bytes, |it| it as u32),
+            (8, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_ns, bytes, |it| it),
+            (9, Field::Bytes(bytes)) => extend_numbers(&mut daq.age_within_ns, bytes, |it| it),
             _ => Ok(()),
         })
     }
@@ -365,7 +384,13 @@ impl Block {
             derived.phase.len(),
             derived.cycle.len(),
         ];
-        let optional = [daq.counts.len(), daq.volts.len(), daq.pulses_delta.len()];
+        let optional = [
+            daq.counts.len(),
+            daq.volts.len(),
+            daq.pulses_delta.len(),
+            daq.age_ns.len(),
+            daq.age_within_ns.len(),
+        ];
         let is_odd = |length: &usize| *length > 0 && *length != count;
         if lengths.iter().any(|&length| length != count) || optional.iter().any(is_odd) {
             return Err("the columns of a sample block differ in length".into());
@@ -439,6 +464,7 @@ mod tests {
         Row {
             tick,
             host: Nanos(u64::MAX - tick),
+            age: None,
             counts,
             volts: Some(0.1 + tick as f64 * 1e-17),
             pulses: Some(i64::MIN.wrapping_add(tick as i64)),
@@ -464,7 +490,20 @@ mod tests {
                 pulses: None,
                 ..row(13, Some(1))
             },
-            row(14, Some(2)),
+            Row {
+                age: Some(Age {
+                    by: Nanos(u64::MAX),
+                    within: Nanos(1),
+                }),
+                ..row(14, Some(2))
+            },
+            Row {
+                age: Some(Age {
+                    by: Nanos(0),
+                    within: Nanos(u64::MAX),
+                }),
+                ..row(15, Some(2))
+            },
         ];
         let mut back = Vec::new();
         let mut first = 0;

@@ -128,6 +128,8 @@ impl Channel {
                 ("volts", "V"),
                 ("pulses_delta", "pulses"),
                 ("status", "bits"),
+                ("age_ns", "ns"),
+                ("age_within_ns", "ns"),
             ],
             Self::Derived => &[
                 ("force_newtons", "N"),
@@ -200,6 +202,8 @@ const DAQ_FIELDS: &[Field] = &[
     ("volts", 5, Label::Repeated, Type::Double),
     ("pulses_delta", 6, Label::Repeated, Type::Sint64),
     ("status", 7, Label::Repeated, Type::Uint32),
+    ("age_ns", 8, Label::Repeated, Type::Uint64),
+    ("age_within_ns", 9, Label::Repeated, Type::Uint64),
 ];
 
 const DERIVED_FIELDS: &[Field] = &[
@@ -341,6 +345,8 @@ mod tests {
             volts: vec![1.0],
             pulses_delta: vec![1],
             status: vec![1],
+            age_ns: vec![1],
+            age_within_ns: vec![1],
         };
         assert_eq!(wire_fields(&daq.encode_to_vec()), promised(DAQ_FIELDS));
         let derived = DerivedBlock {

@@ -47,7 +47,7 @@ pub struct ExportArgs {
     #[arg(long, value_name = "SECONDS", allow_negative_numbers = true, value_parser = seconds)]
     until: Option<f64>,
     /// Only these columns, in this order, as in t_s,force_N; also session_id, specimen, sample, tick,
-    /// host_ns and status
+    /// host_ns, status, age_ns and age_within_ns
     #[arg(long, alias = "channel", value_name = "NAMES", value_delimiter = ',')]
     columns: Vec<String>,
     /// Only every so many of the samples that are left, none averaged; the file's name says so

@@ -31,6 +31,7 @@ mod select;
 mod shell;
 mod trade;
 mod verdict;
+mod wired;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
@@ -114,6 +115,9 @@ enum Command {
     Mask(analysis::MaskArgs),
     /// Let an analysis count no more; its record stays
     Withdraw(analysis::WithdrawArgs),
+    /// Look at rigs on wires: which are there, whether one is as its file says, what it reports
+    #[command(subcommand)]
+    Rig(wired::RigCommand),
     /// Answer like a controller on a wire, with the simulated bench behind it
     #[command(subcommand)]
     Emulate(emulate::EmulateCommand),
@@ -237,6 +241,7 @@ pub fn main() -> ExitCode {
         }
         Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
         Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
+        Some(Command::Rig(command)) => with(command.is_json(), |out| wired::run(&command, out)),
         Some(Command::Emulate(command)) => {
             with(command.is_json(), |out| emulate::run(&command, out))
         }

@@ -140,8 +140,8 @@ pub struct OpenRig {
     pub doubts: Vec<String>,
     /// Interlock thresholds.
     pub limits: Limits,
-    /// Keeps other programs off a rig that has a name of its own.
-    pub _lock: Option<HolderLock>,
+    /// Keep other programs off a rig that has a name of its own.
+    pub _locks: Vec<HolderLock>,
 }
 
 /// Opens the rig, or says who holds it.
@@ -152,9 +152,9 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
     }
     let rig = palpate_drivers::open(&args.rig, &settings).map_err(Failure::usage)?;
     // A plain `sim` lives and dies with its program; a named one is shared like a real rig.
-    let lock = match args.rig.split_once(':') {
-        Some((_, name)) => Some(rig_lock(name)?),
-        None => None,
+    let locks = match args.rig.split_once(':') {
+        Some((_, name)) => vec![rig_lock(name)?],
+        None => Vec::new(),
     };
     let limits = Limits::for_travel(travel(args, rig.description().travel)?);
     // The built-in one belongs to its rig.
@@ -174,7 +174,7 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
         calibration,
         doubts,
         limits,
-        _lock: lock,
+        _locks: locks,
     })
 }
 
@@ -192,17 +192,7 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         ));
     }
     let source = Source::find(calibration)?;
-    let file = palpate_drivers::read_rig_file(&args.rig).map_err(Failure::usage)?;
-    // Two programs may be connected to one controller on a network; only one may drive it.
-    let place: String = file
-        .place
-        .to_string()
-        .chars()
-        .map(|c| if c.is_ascii_alphanumeric() { c } else { '-' })
-        .collect();
-    let lock = rig_lock(&place)?;
-    let rig = palpate_drivers::open_wired(&args.rig, &driver_clock())
-        .map_err(|err| Failure::Failed(err.to_string()))?;
+    let (rig, locks) = open_rig_file(&args.rig)?;
     let limits = Limits::for_travel(travel(args, rig.description().travel)?);
     let doubts = source.doubts(&rig.description().name);
     Ok(OpenRig {
@@ -210,8 +200,26 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
         calibration: source.calibration,
         doubts,
         limits,
-        _lock: Some(lock),
+        _locks: locks,
     })
+}
+
+/// Opens the rig of a file and keeps other programs off it.
+pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, Vec<HolderLock>), Failure> {
+    let file = palpate_drivers::read_rig_file(file_name).map_err(Failure::usage)?;
+    // Two programs may be connected to one controller on a network; only one may drive it.
+    let locks = file
+        .places()
+        .into_iter()
+        .map(|place| {
+            let name = place.to_string();
+            let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };
+            rig_lock(&name.chars().map(plain).collect::<String>())
+        })
+        .collect::<Result<Vec<_>, _>>()?;
+    let rig = palpate_drivers::open_wired(file_name, &driver_clock())
+        .map_err(|err| Failure::Failed(err.to_string()))?;
+    Ok((rig, locks))
 }
 
 /// The end of the travel: the rig's, or one before it.
@@ -241,7 +249,7 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
         calibration,
         doubts,
         limits,
-        _lock,
+        _locks,
     } = bench;
     let output = Output::text();
     doubts.iter().for_each(|doubt| output.note(doubt));

@@ -4,6 +4,9 @@ use super::text::in_columns;
 use palpate_protocols::fidelity::{Achieved, Fidelity};
 use palpate_sessions::{EndRecord, Verdict};
 
+/// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.
+const GAP_USUAL_S: f64 = 1.1e-3;
+
 /// The lines of a session's fidelity.
 #[must_use]
 pub fn fidelity_text(
@@ -23,8 +26,13 @@ pub fn fidelity_text(
         0 => "none late".into(),
         late => format!("{late} late, by up to {:.0} ms", found.late_worst_s * 1e3),
     };
+    // A rig that is asked for its samples over a link gives them as it can.
+    let apart = match found.longest_gap_s {
+        gap if gap > GAP_USUAL_S => format!(", at most {:.1} ms apart", gap * 1e3),
+        _ => String::new(),
+    };
     lines.push(format!(
-        "samples    {}, {} missing, {late}",
+        "samples    {}, {} missing, {late}{apart}",
         found.samples, found.dropped
     ));
     let time = &found.time_use;

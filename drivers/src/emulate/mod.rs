@@ -4,9 +4,11 @@
 //! never reads a clock, a port or a file, so that equal bytes at equal times give equal answers.
 //! [`serve`] puts one on a pseudo-terminal or a TCP port; [`faults`] spoils its line on command.
 
+pub mod bench;
 pub mod cell;
 pub mod faults;
 pub mod galil;
+pub mod grbl;
 pub mod hx711;
 pub mod mark10;
 pub mod orders;

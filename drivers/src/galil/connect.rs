@@ -1,10 +1,12 @@
 //! What happens once when a controller is opened: who it is, whether it is the right one, its settings, a limit to
 //! everything before anything can move, and how fast the link is.
 
-use super::console::{ANSWER_MAX, Console};
+use super::capture::{self, Capture};
+use super::console::Console;
 use super::model::{GalilBoard, GalilOpenError};
 use super::order::{limit_commands, software_limits};
-use super::sampling::{Sampler, signed};
+use super::recording::Plan;
+use super::sampling::signed;
 use super::session::Pace;
 use super::settings::GalilSettings;
 use super::watchdog;
@@ -25,11 +27,6 @@ const SMOOTHING: f64 = 0.5;
 const QUIET: Nanos = Nanos::from_millis(120);
 /// A download is answered when it has been stored.
 const DOWNLOAD_MAX: Nanos = Nanos::from_millis(10_000);
-/// Single questions by which the link is measured, and questions in a row that show what it carries.
-const SINGLE: usize = 10;
-const ROW: usize = 12;
-/// More questions would only wait in the controller's input buffer, before a stop.
-const IN_FLIGHT_MAX: usize = 8;
 /// By how many samples reported pulses may differ from the command: 1.5 of the smoothing filter, and two between
 /// `BG` or `ST` and the sample behind it.
 const LAG_SAMPLES: f64 = 4.0;
@@ -47,6 +44,8 @@ pub struct Connected {
     pub pace: Pace,
     /// The link as it was measured.
     pub stats: LinkStats,
+    /// The recording that was started, if one was.
+    pub plan: Option<Plan>,
     /// Whether the watchdog's program runs.
     pub has_watchdog: bool,
     /// How far the axis goes at most when palpate falls silent, in mm; the whole travel without a watchdog.
@@ -76,21 +75,36 @@ pub fn connect(
         });
     }
     let tick = Nanos((tm * NANOS_PER_TM).round() as u64);
-    let (stats, pace) = measure(&mut console, settings, tick)?;
+    // From here on only the signal has decimals, and its form is said with it: short answers are fast ones.
+    console.try_ask("VF 10.0")?;
+    let measured = capture::measure(&mut console, settings)?;
+    let Capture { pace, plan, words } = capture::set_up(&mut console, settings, &measured, tick)?;
+    let stats = LinkStats {
+        in_flight: pace.in_flight,
+        ..measured.stats
+    };
     let worst_case_mm = if has_watchdog {
-        watchdog::worst_case_mm(settings.speed_max, acceleration)
+        watchdog::worst_case_mm(settings.speed_max, acceleration, tick)
     } else {
         settings.travel.0 + 2.0 * super::order::LIMIT_MARGIN_MM
     };
     let watch = if has_watchdog { "with" } else { "without" };
     let safety =
         format!("{watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost");
-    let description = describe(settings, &board, acceleration, pace, &safety, tm);
+    let ms = |span: Nanos| span.0 as f64 * 1e-6;
+    let link = format!(
+        "an answer takes {:.1} to {:.1} ms, samples {words}",
+        ms(stats.round_trip_min),
+        ms(stats.round_trip_max)
+    );
+    let words = format!("{safety}; {link}");
+    let description = describe(settings, &board, acceleration, (pace, plan), &words, tm);
     Ok(Connected {
         board,
         description,
         pace,
         stats,
+        plan,
         has_watchdog,
         worst_case_mm,
         raw: console.raw,
@@ -169,6 +183,9 @@ fn set_up_axis(
     settings: &GalilSettings,
 ) -> Result<MmPerS2, GalilOpenError> {
     let a = settings.axis;
+    if let Some(us) = settings.sample_us {
+        console.set(&format!("TM {us}"), "_TM", f64::from(us))?;
+    }
     let motor_type = settings.motor_type.code();
     if console.number(&format!("_MT{a}"))? != motor_type {
         console.ask(&format!("MO{a}"))?;
@@ -269,46 +286,12 @@ fn start_watchdog(
     Ok(console.number(&format!("_XQ{}", watchdog::THREAD))? >= 0.0)
 }
 
-/// How long an answer takes alone, and how fast answers come in a row.
-fn measure(
-    console: &mut Console<'_>,
-    settings: &GalilSettings,
-    tick: Nanos,
-) -> Result<(LinkStats, Pace), GalilOpenError> {
-    let question = Sampler::question(settings);
-    let mut stats = LinkStats::default();
-    for _ in 0..SINGLE {
-        let asked = console.now();
-        console.ask(&question)?;
-        stats.push(console.now().since(asked));
-    }
-    let start = console.now();
-    console.write(&format!("{question}\r").repeat(ROW))?;
-    let replies = console.replies(ROW, Nanos(ROW as u64 * ANSWER_MAX.0))?;
-    if replies.len() < ROW {
-        return Err(GalilOpenError::Silent);
-    }
-    let row = console.now().since(start);
-    let alone = stats.round_trip_mean;
-    let apart = Nanos(row.since(alone).0 / (ROW as u64 - 1));
-    // A little sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
-    let every = apart.max(Nanos(tick.0 * 9 / 10));
-    let in_flight = (alone.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
-    stats.in_flight = in_flight;
-    let pace = Pace {
-        every,
-        in_flight,
-        tick,
-    };
-    Ok((stats, pace))
-}
-
 fn describe(
     settings: &GalilSettings,
     board: &GalilBoard,
     acceleration: MmPerS2,
-    pace: Pace,
-    safety: &str,
+    (pace, plan): (Pace, Option<Plan>),
+    words: &str,
     tm: f64,
 ) -> RigDescription {
     let counts = 1_i32 << settings.bits.min(24);
@@ -321,7 +304,7 @@ fn describe(
     RigDescription {
         name: settings.name.clone(),
         identity: format!(
-            "{board}, axis {}, input {} (filter before it: {filter}), {safety}",
+            "{board}, axis {}, input {} (filter before it: {filter}), {words}",
             settings.axis, settings.input
         ),
         settings: BTreeMap::new(),
@@ -338,7 +321,11 @@ fn describe(
             volts_per_count: settings.volts_per_count(),
         }),
         noise_expected: settings.noise,
-        ticks_per_sample: (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) / SHARE_MIN,
+        // A recording has them all.
+        ticks_per_sample: plan.map_or_else(
+            || (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) / SHARE_MIN,
+            |plan| plan.interval as f64,
+        ),
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
     }
 }

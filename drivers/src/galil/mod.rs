@@ -4,16 +4,21 @@
 //! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `connect.rs`, what happens once when the
 //! controller is opened. [`GalilRig`] puts a session on a link.
 
+mod capture;
 mod connect;
 mod console;
 mod error;
 mod model;
 mod order;
 pub mod protocol;
+mod recording;
 mod rig;
 mod sampling;
+mod search;
 mod session;
 mod settings;
+mod sine;
+mod timing;
 mod watchdog;
 
 pub use connect::{Connected, connect};
@@ -21,4 +26,4 @@ pub use error::GalilError;
 pub use model::{GalilBoard, GalilOpenError};
 pub use rig::GalilRig;
 pub use session::Session;
-pub use settings::{AnalogRange, GalilSettings, Levels, MotorType};
+pub use settings::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};

@@ -142,6 +142,11 @@ pub enum GalilOpenError {
         /// What it reads back.
         found: String,
     },
+    /// The rig file asks for a recording that there cannot be.
+    #[error(
+        "samples cannot be recorded by this controller ({0}); leave sampling out of the rig file, or set it to \"auto\""
+    )]
+    NoRecording(String),
     /// The thread cannot be had.
     #[error("the driver's thread cannot be started ({0}); close other programs")]
     Thread(String),

@@ -3,8 +3,10 @@
 use super::protocol::Reply;
 use super::sampling::signed;
 use super::settings::GalilSettings;
-use palpate_model::rig::{MoveTo, RigCommand};
-use palpate_model::units::{MmPerS, MmPerS2};
+use super::sine::Feed;
+use palpate_model::Nanos;
+use palpate_model::rig::{MoveTo, Oscillation, RigCommand, Sine};
+use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 
 /// Software limits are this far beyond the travel and behind home, in mm: behind the limit switches of a slide, which
 /// are within 5 mm, and before its mechanical ends. They stop the axis when both palpate and a switch fail.
@@ -49,14 +51,19 @@ pub struct Order {
     is_refused: bool,
     /// The part that counts was written, so that the axis may already be doing it.
     pub is_begun: bool,
+    tick: Nanos,
+    /// Of a sine that was set: what goes on after its begin.
+    pub feed: Option<Feed>,
 }
 
 impl Order {
-    /// A command that was not begun.
+    /// A command that was not begun, for samples of this length.
     #[must_use]
-    pub const fn new(command: RigCommand) -> Self {
+    pub const fn new(command: RigCommand, tick: Nanos) -> Self {
         Self {
             command,
+            tick,
+            feed: None,
             stage: Stage::Setting,
             open: 0,
             numbers: Vec::new(),
@@ -97,10 +104,18 @@ impl Order {
                 let (forward, reverse) = software_limits(settings, 0, settings.travel.0);
                 limit_commands(a, forward, reverse)
             }
-            RigCommand::Oscillate(_) => {
-                return Next::Refused(
-                    "sines need the contour mode, which this driver does not use yet; choose a protocol of ramps".into(),
-                );
+            RigCommand::Oscillate(wanted) => {
+                let length = Seconds(self.tick.seconds().0);
+                let path = Sine::new(Position(0.0), &wanted, settings.mm_per_pulse, length);
+                if let Err(why) = path.check(settings.speed_max, wanted.acceleration) {
+                    return Next::Refused(why);
+                }
+                let rate = settings.counts2(wanted.acceleration);
+                vec![
+                    format!("AC{a}={rate}"),
+                    format!("DC{a}={rate}"),
+                    format!("MG _AC{a},_DC{a}"),
+                ]
             }
             RigCommand::Stop | RigCommand::Halt => {
                 return Next::Refused("a stop does not wait in a queue".into());
@@ -134,7 +149,7 @@ impl Order {
     fn do_it(&mut self, settings: &GalilSettings) -> Next {
         let a = settings.axis;
         let numbers = std::mem::take(&mut self.numbers);
-        let (made, command) = match (self.command, numbers.as_slice()) {
+        let (made, commands) = match (self.command, numbers.as_slice()) {
             (RigCommand::MoveTo(wanted), &[speed, ac, dc, target]) => {
                 let target = signed(target).map(|target| settings.sign() * target);
                 if target != Some(wanted.target_pulses) {
@@ -153,7 +168,7 @@ impl Order {
                     speed: MmPerS(speed * settings.mm_per_pulse),
                     acceleration: MmPerS2(ac * settings.mm_per_pulse),
                 };
-                (RigCommand::MoveTo(made), format!("BG{a}"))
+                (RigCommand::MoveTo(made), vec![format!("BG{a}")])
             }
             (RigCommand::DefinePosition { pulses }, &[forward, reverse]) => {
                 let wanted = software_limits(settings, 0, settings.travel.0);
@@ -163,13 +178,27 @@ impl Order {
                         wanted.0, wanted.1
                     ));
                 }
-                (self.command, format!("DP{a}={}", settings.sign() * pulses))
+                let define = format!("DP{a}={}", settings.sign() * pulses);
+                (self.command, vec![define])
+            }
+            (RigCommand::Oscillate(wanted), &[ac, dc]) => {
+                if ac != dc || ac <= 0.0 {
+                    return Next::Refused(format!(
+                        "it reads back acceleration {ac} and deceleration {dc} in counts"
+                    ));
+                }
+                let made = Oscillation {
+                    acceleration: MmPerS2(ac * settings.mm_per_pulse),
+                    ..wanted
+                };
+                let feed = self.feed.insert(Feed::new(&made, settings, self.tick));
+                (RigCommand::Oscillate(made), feed.begin())
             }
             _ => return Next::Refused("its answer has other numbers than were asked for".into()),
         };
         self.stage = Stage::Doing(made);
-        self.open = 1;
-        Next::SendAndSample(vec![command])
+        self.open = commands.len();
+        Next::SendAndSample(commands)
     }
 
     fn done(&self, made: RigCommand) -> Next {

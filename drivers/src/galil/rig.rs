@@ -4,8 +4,8 @@ use super::connect::{Connected, connect};
 use super::model::{GalilBoard, GalilOpenError};
 use super::session::Session;
 use super::settings::GalilSettings;
-use crate::rig::{Rig, RigEvent, RigEventBody};
-use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
+use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
+use crate::wire::{HostClock, Line, LineSettings, LinkStats, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -16,12 +16,19 @@ use std::time::Duration;
 /// catch up a quarter of a second.
 const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 
+/// A controller that is connected, and the thread that talks to it.
+struct Open {
+    connected: Connected,
+    line: Line,
+}
+
 /// A Galil controller with slide and load cell.
 pub struct GalilRig {
-    board: GalilBoard,
-    description: RigDescription,
-    worst_case_mm: f64,
-    line: Line,
+    place: Place,
+    settings: GalilSettings,
+    connected: Connected,
+    /// `None` while it is being connected anew, and after that has failed.
+    line: Option<Line>,
     clock: HostClock,
     /// The host's clock where the caller's time is zero.
     origin: Option<Nanos>,
@@ -33,58 +40,49 @@ pub struct GalilRig {
 }
 
 impl GalilRig {
-    /// Sets up the controller behind a link and begins to take samples.
+    /// Opens the link, sets up the controller behind it and begins to take samples.
     pub fn open(
-        mut link: Box<dyn Link>,
+        place: &Place,
         settings: &GalilSettings,
         clock: HostClock,
     ) -> Result<Self, GalilOpenError> {
-        let device: Arc<str> = "galil".into();
-        let Connected {
-            board,
-            description,
-            pace,
-            stats,
-            has_watchdog,
-            worst_case_mm,
-            raw,
-        } = connect(link.as_mut(), &clock, settings, &device)?;
-        let session = Session::new(settings.clone(), pace, has_watchdog, stats, clock());
-        let line_settings = LineSettings {
-            device,
-            farewell: format!("ST{}\r", settings.axis).into_bytes(),
-        };
-        let line = Line::start(link, session, Arc::clone(&clock), line_settings)
-            .map_err(|err| GalilOpenError::Thread(err.to_string()))?;
+        let Open { connected, line } = open(place, settings, &clock)?;
         Ok(Self {
-            board,
-            description,
-            worst_case_mm,
-            line,
+            place: place.clone(),
+            settings: settings.clone(),
+            first_raw: connected.raw.clone(),
+            connected,
+            line: Some(line),
             clock,
             origin: None,
             newest: Nanos::ZERO,
             refused: VecDeque::new(),
-            first_raw: raw,
         })
     }
 
     /// Who the controller is.
     #[must_use]
     pub fn board(&self) -> &GalilBoard {
-        &self.board
+        &self.connected.board
     }
 
     /// How far the axis goes at most when palpate falls silent, in mm.
     #[must_use]
     pub fn worst_case_mm(&self) -> f64 {
-        self.worst_case_mm
+        self.connected.worst_case_mm
+    }
+
+    /// The time that [`Rig::take_raw`] tells, now.
+    #[must_use]
+    pub fn now(&self) -> Nanos {
+        (self.clock)().since(self.origin.unwrap_or(Nanos::ZERO))
     }
 
     /// How the link behaves.
     #[must_use]
     pub fn stats(&self) -> LinkStats {
-        self.line.stats()
+        let stats = self.line.as_ref().map(Line::stats);
+        stats.unwrap_or(self.connected.stats)
     }
 
     /// The caller's time of a moment of the host's clock; never before what was told already.
@@ -97,15 +95,19 @@ impl GalilRig {
 
 impl Rig for GalilRig {
     fn description(&self) -> &RigDescription {
-        &self.description
+        &self.connected.description
     }
 
     fn send(&mut self, command: RigCommand) {
-        if self.line.send(command).is_err() {
-            self.refused.push_back(Fault::CommandRefused {
-                detail: "too many commands at once".into(),
-            });
-        }
+        let sent = self.line.as_mut().map(|line| line.send(command));
+        let detail = match sent {
+            Some(Ok(())) => return,
+            Some(Err(_)) => "too many commands at once",
+            None => "the controller is not connected",
+        };
+        self.refused.push_back(Fault::CommandRefused {
+            detail: detail.into(),
+        });
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
@@ -123,29 +125,78 @@ impl Rig for GalilRig {
         self.origin = Some(origin);
         if let Some(fault) = self.refused.pop_front() {
             let at = self.told(now, until);
-            return Some(RigEvent {
-                at,
-                body: RigEventBody::Fault(fault),
-            });
+            return Some(RigEvent::arrived(at, RigEventBody::Fault(fault)));
         }
         let end = origin + until;
         let wait = Duration::from_nanos(end.since(now).0);
-        let event = self.line.next_event(end, wait)?;
-        let at = self.told(event.at, until);
-        Some(RigEvent { at, ..event })
+        let Some(line) = &self.line else {
+            std::thread::sleep(wait);
+            return None;
+        };
+        let mut event = line.next_event(end, wait)?;
+        event.at = self.told(event.at, until);
+        if let Some(taken) = &mut event.taken {
+            taken.at = taken.at.since(origin).min(event.at);
+        }
+        Some(event)
+    }
+
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        // The old link says farewell and is closed, or a serial port would be busy with it.
+        self.first_raw
+            .extend(self.line.iter().flat_map(Line::take_raw));
+        self.line = None;
+        let file = self.settings.name.clone();
+        let settings = GalilSettings {
+            // The same controller, whatever the rig file leaves open.
+            serial_number: self.connected.board.serial_number,
+            ..self.settings.clone()
+        };
+        let Open { connected, line } =
+            open(&self.place, &settings, &self.clock).map_err(|error| RigError::Device {
+                file,
+                error: error.into(),
+            })?;
+        self.first_raw.extend(connected.raw.iter().cloned());
+        self.connected = connected;
+        self.line = Some(line);
+        self.refused.clear();
+        Ok(())
     }
 
     fn is_virtual(&self) -> bool {
         false
     }
 
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        vec![("galil".to_owned(), self.stats())]
+    }
+
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.first_raw);
-        raw.extend(self.line.take_raw());
+        raw.extend(self.line.iter().flat_map(Line::take_raw));
         let origin = self.origin.unwrap_or(Nanos::ZERO);
         for piece in &mut raw {
             piece.at = piece.at.since(origin);
         }
         raw
     }
+}
+
+fn open(
+    place: &Place,
+    settings: &GalilSettings,
+    clock: &HostClock,
+) -> Result<Open, GalilOpenError> {
+    let device: Arc<str> = "galil".into();
+    let mut link = place.open()?;
+    let connected = connect(link.as_mut(), clock, settings, &device)?;
+    let session = Session::new(settings.clone(), &connected, clock());
+    let line_settings = LineSettings {
+        device,
+        farewell: format!("ST{}\r", settings.axis).into_bytes(),
+    };
+    let line = Line::start(link, session, Arc::clone(clock), line_settings)
+        .map_err(|err| GalilOpenError::Thread(err.to_string()))?;
+    Ok(Open { connected, line })
 }

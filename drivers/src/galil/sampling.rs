@@ -9,7 +9,7 @@ use palpate_model::units::Volts;
 const TIME_WRAPS: u64 = 1 << 31;
 
 /// Bits of `TS` (DMC-1400 user manual, page 211).
-mod ts {
+pub mod ts {
     pub const MOVING: u32 = 1 << 7;
     pub const MOTOR_OFF: u32 = 1 << 5;
     pub const FORWARD: u32 = 1 << 3;
@@ -19,7 +19,7 @@ mod ts {
 
 /// Stop codes of a motion that ends or has ended before its target: limits, `ST`, abort, faults (DMC-40x0 command
 /// reference, `SC`: "decelerating or stopped by").
-const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
+pub const EARLY: [u32; 9] = [2, 3, 4, 6, 7, 8, 11, 15, 16];
 
 /// What became of a poll's answer.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -59,7 +59,14 @@ impl Sampler {
     #[must_use]
     pub fn question(settings: &GalilSettings) -> String {
         let (input, a) = (settings.input, settings.axis);
-        format!("MG @AN[{input}],_TD{a},_RP{a},_TS{a},_SC{a},TIME")
+        format!("MG @AN[{input}]{{F3.4}},_TD{a},_RP{a},_TS{a},_SC{a},TIME")
+    }
+
+    /// Whether a clock that shows this has begun anew since the newest sample.
+    #[must_use]
+    pub fn is_reset(&self, time: i64) -> bool {
+        self.time
+            .is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
     }
 
     /// Takes an answer; `None` when it is none. `is_begun` says that a motion was begun just before this was asked:
@@ -100,6 +107,7 @@ impl Sampler {
             volts: Volts(volts),
             pulses: self.settings.sign() * given,
             status,
+            age: None,
         }))
     }
 
@@ -134,7 +142,7 @@ impl Sampler {
 }
 
 /// A whole number that is not negative.
-fn whole(value: f64) -> Option<u64> {
+pub fn whole(value: f64) -> Option<u64> {
     (value.fract() == 0.0 && (0.0..=4_294_967_295.0).contains(&value)).then_some(value as u64)
 }
 

@@ -1,10 +1,15 @@
 //! The dialogue with a controller that has been set up: samples asked for one after the other, commands between them,
 //! stops before everything.
 
+use super::connect::Connected;
 use super::order::{Next, Order};
 use super::protocol::{Incoming, LINE_MAX, Parser, Reply, error_of, packed};
+use super::recording::{self, Look, Out, Recording};
 use super::sampling::{Sampled, Sampler};
+use super::search::{MARKERS_MAX, QUIET, Search};
 use super::settings::GalilSettings;
+use super::sine::Feed;
+use super::timing::Timing;
 use super::watchdog;
 use crate::rig::RigEventBody;
 use crate::wire::{Dialogue, LinkStats};
@@ -14,13 +19,6 @@ use std::collections::VecDeque;
 
 /// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
-/// The line is quiet after so long without a byte.
-const QUIET: Nanos = Nanos::from_millis(25);
-/// So long a marker may take to come back; a controller needs a third of a second to start again.
-const MARKER_MAX: Nanos = Nanos::from_millis(350);
-/// Markers sent before the link counts as dead: on a line that spoils one byte in fifty all come back spoilt once in
-/// four thousand times.
-const MARKERS_MAX: u32 = 6;
 /// Commands that wait; as many as may wait on the way here.
 const ORDERS_MAX: usize = 64;
 
@@ -36,9 +34,15 @@ const fn is_motion(command: &RigCommand) -> bool {
 
 /// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Asked {
-    /// A sample; `true` right behind the begin of a motion.
-    Sample(bool),
+pub(super) enum Asked {
+    /// A sample.
+    Sample,
+    /// A sample behind a command; `true` behind the begin of a motion.
+    Marked(bool),
+    /// Elements of a recorded array.
+    Elements,
+    /// Increments of a sine, which a stop or a limit may have ended before.
+    Segment,
     /// The watchdog's variable.
     Renewal,
     /// A part of the order under way.
@@ -62,17 +66,9 @@ struct Owed {
 
 /// A line to be written.
 #[derive(Clone, Debug, PartialEq)]
-struct Outgoing {
-    text: String,
-    asked: Vec<Asked>,
-}
-
-/// The order of questions and answers is lost and looked for.
-#[derive(Clone, Copy, Debug)]
-struct Search {
-    last_byte: Nanos,
-    marker_at: Option<Nanos>,
-    markers: u32,
+pub(super) struct Outgoing {
+    pub text: String,
+    pub asked: Vec<Asked>,
 }
 
 /// How fast the link was when the controller was set up.
@@ -89,56 +85,63 @@ pub struct Pace {
 /// The dialogue.
 #[derive(Clone, Debug)]
 pub struct Session {
-    settings: GalilSettings,
+    pub(super) settings: GalilSettings,
     pace: Pace,
     has_watchdog: bool,
     question: String,
-    parser: Parser,
+    pub(super) parser: Parser,
     sampler: Sampler,
-    expected: VecDeque<(Asked, Nanos)>,
+    pub(super) recording: Option<Recording>,
+    pub(super) sine: Option<Feed>,
+    timing: Timing,
+    pub(super) expected: VecDeque<(Asked, Nanos)>,
     urgent: VecDeque<Outgoing>,
-    lines: VecDeque<Outgoing>,
+    pub(super) lines: VecDeque<Outgoing>,
+    pub(super) fetches: VecDeque<Outgoing>,
     /// The part of an order that begins something, and when it may go out.
-    beginning: Option<(Outgoing, Nanos)>,
+    pub(super) beginning: Option<(Outgoing, Nanos)>,
     orders: VecDeque<(u64, RigCommand)>,
-    order: Option<(u64, Order)>,
+    pub(super) order: Option<(u64, Order)>,
     /// Commands in the order in which they came, so that answers come in it too.
     owed: VecDeque<Owed>,
     commands: u64,
-    is_motion_begun: bool,
-    search: Option<Search>,
+    pub(super) is_motion_begun: bool,
+    pub(super) search: Option<Search>,
     /// Stops whose answers went by while the order was being looked for.
-    unconfirmed: Vec<(u64, RigCommand)>,
+    pub(super) unconfirmed: Vec<(u64, RigCommand)>,
     /// Why nothing but stops is done any more.
     is_reset: bool,
     attended: Option<Nanos>,
     asked_at: Option<Nanos>,
     renewed_at: Option<Nanos>,
-    answered_at: Nanos,
+    pub(super) answered_at: Nanos,
     events: VecDeque<(Nanos, RigEventBody)>,
-    stats: LinkStats,
+    pub(super) stats: LinkStats,
 }
 
 impl Session {
     /// With a controller that was set up just now.
     #[must_use]
-    pub fn new(
-        settings: GalilSettings,
-        pace: Pace,
-        has_watchdog: bool,
-        stats: LinkStats,
-        now: Nanos,
-    ) -> Self {
+    pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
+        let recording = connected.plan.map(Recording::new);
+        let question = match &recording {
+            Some(_) => recording::question(&settings),
+            None => Sampler::question(&settings),
+        };
         Self {
-            question: Sampler::question(&settings),
+            question,
             sampler: Sampler::new(settings.clone()),
+            recording,
+            sine: None,
+            timing: Timing::default(),
             settings,
-            pace,
-            has_watchdog,
+            pace: connected.pace,
+            has_watchdog: connected.has_watchdog,
             parser: Parser::default(),
             expected: VecDeque::new(),
             urgent: VecDeque::new(),
             lines: VecDeque::new(),
+            fetches: VecDeque::new(),
             beginning: None,
             orders: VecDeque::new(),
             order: None,
@@ -153,15 +156,20 @@ impl Session {
             renewed_at: None,
             answered_at: now,
             events: VecDeque::new(),
-            stats: LinkStats {
-                in_flight: pace.in_flight,
-                ..stats
-            },
+            stats: connected.stats,
         }
     }
 
     fn report(&mut self, now: Nanos, body: RigEventBody) {
         self.events.push_back((now, body));
+    }
+
+    /// Reports behind all samples that the controller has taken by now.
+    fn report_in_order(&mut self, now: Nanos, body: RigEventBody) {
+        match &mut self.recording {
+            Some(recording) => recording.hold(body),
+            None => self.report(now, body),
+        }
     }
 
     /// Notes a command that wants an answer.
@@ -181,7 +189,7 @@ impl Session {
         }
         while let Some(answer) = self.owed.front_mut().and_then(|owed| owed.answer.take()) {
             self.owed.pop_front();
-            self.report(now, answer);
+            self.report_in_order(now, answer);
         }
     }
 
@@ -189,7 +197,7 @@ impl Session {
         self.answer(now, number, RigEventBody::Ack(Ack { command }));
     }
 
-    fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
+    pub(super) fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
         let detail = detail.into();
         let fault = Fault::CommandRefused { detail };
         self.answer(now, number, RigEventBody::Fault(fault));
@@ -201,12 +209,13 @@ impl Session {
         text.push_str(&self.question);
         text.push('\r');
         let mut all = vec![asked; commands.len()];
-        all.push(Asked::Sample(is_begun));
+        all.push(Asked::Marked(is_begun));
         Outgoing { text, asked: all }
     }
 
     /// Puts a stop before everything. Motions that wait are not begun any more.
     fn stop(&mut self, now: Nanos, command: RigCommand) {
+        self.sine = None;
         let mut ended = Vec::new();
         self.orders.retain(|(number, order)| {
             let stays = !is_motion(order);
@@ -229,7 +238,7 @@ impl Session {
         self.urge(command, Asked::Stop(number, command));
     }
 
-    fn urge(&mut self, command: RigCommand, asked: Asked) {
+    pub(super) fn urge(&mut self, command: RigCommand, asked: Asked) {
         let axis = self.settings.axis;
         let text = match command {
             // 1: the motion alone, so that the watchdog's program goes on (DMC-40x0 command reference, `AB`).
@@ -286,9 +295,13 @@ impl Session {
         };
         self.answered_at = now;
         match asked {
-            Asked::Sample(is_begun) => {
-                self.stats.push(now.since(sent));
-                self.on_sample(now, reply, is_begun);
+            Asked::Sample => self.on_answer(now, sent, reply, None),
+            Asked::Marked(is_begun) => self.on_answer(now, sent, reply, Some(is_begun)),
+            Asked::Elements => self.on_elements(now, reply),
+            Asked::Segment => {
+                if !reply.is_accepted && self.sine.take().is_some() {
+                    self.end_sine(now, "the controller takes no more of it");
+                }
             }
             Asked::Renewal => {
                 // A refusal is a program that is gone, which a reset explains; the clock will tell.
@@ -326,13 +339,105 @@ impl Session {
         }
     }
 
-    fn on_sample(&mut self, now: Nanos, reply: &Reply, is_begun: bool) {
-        let numbers = reply.numbers().filter(|_| reply.is_accepted);
+    /// The answer to the question, polled or while recording.
+    fn on_answer(&mut self, now: Nanos, sent: Nanos, reply: &Reply, marked: Option<bool>) {
+        self.stats.push(now.since(sent));
+        let Some(numbers) = reply.numbers().filter(|_| reply.is_accepted) else {
+            return self.lose_order(now);
+        };
+        let Some(recording) = &mut self.recording else {
+            // Without a recording `_RD` means nothing; a question with it may still be on its way.
+            let poll = Look::read(&numbers).map_or(numbers, |look| look.poll.to_vec());
+            return self.on_sample(now, Some(sent), &poll, marked == Some(true));
+        };
+        let Some(look) = Look::read(&numbers) else {
+            return self.lose_order(now);
+        };
+        if self.sampler.is_reset(look.time) {
+            self.give_up_recording(now);
+            return self.on_sample(now, Some(sent), &look.poll, false);
+        }
+        match recording.look(look, marked) {
+            Ok(()) => {
+                self.stats.lost = recording.lost;
+                self.timing
+                    .push(look.time as u64, self.pace.tick, sent, now);
+                self.fetch(now);
+            }
+            Err(_) => {
+                self.give_up_recording(now);
+                let detail = "the controller has stopped recording, and samples were lost; open the rig again";
+                let fault = Fault::CommandRefused {
+                    detail: detail.into(),
+                };
+                self.report(now, RigEventBody::Fault(fault));
+                self.on_sample(now, Some(sent), &look.poll, marked == Some(true));
+            }
+        }
+    }
+
+    /// From here on samples are polled.
+    fn give_up_recording(&mut self, now: Nanos) {
+        let Some(mut recording) = self.recording.take() else {
+            return;
+        };
+        self.question = Sampler::question(&self.settings);
+        for out in recording.drain() {
+            self.put_out(now, out);
+        }
+    }
+
+    /// Asks for elements that are there, and tells what waited when there are none.
+    fn fetch(&mut self, now: Nanos) {
+        let Some(recording) = &mut self.recording else {
+            return;
+        };
+        if let Some(commands) = recording.fetch() {
+            for text in packed(&commands) {
+                let asked = vec![Asked::Elements; text.matches(';').count() + 1];
+                self.fetches.push_back(Outgoing { text, asked });
+            }
+        } else if !recording.is_fetching() {
+            for out in recording.settled() {
+                self.put_out(now, out);
+            }
+        }
+    }
+
+    fn on_elements(&mut self, now: Nanos, reply: &Reply) {
+        let Some(recording) = &mut self.recording else {
+            // Of a recording that was given up.
+            return;
+        };
+        let column = reply.numbers().filter(|_| reply.is_accepted);
+        let out = column.and_then(|column| recording.take(column, &self.settings));
+        let Some(out) = out else {
+            return self.lose_order(now);
+        };
+        for out in out {
+            self.put_out(now, out);
+        }
+        if self.search.is_none() {
+            self.fetch(now);
+        }
+    }
+
+    fn put_out(&mut self, now: Nanos, out: Out) {
+        match out {
+            Out::Event(event) => self.report(now, event),
+            Out::Sample(poll, is_begun) => self.on_sample(now, None, &poll, is_begun),
+        }
+    }
+
+    /// The numbers of a sample, as a poll gives them.
+    fn on_sample(&mut self, now: Nanos, sent: Option<Nanos>, numbers: &[f64], is_begun: bool) {
         let is_begun = is_begun || self.is_motion_begun;
-        let sampled = numbers.and_then(|numbers| self.sampler.take(&numbers, is_begun));
-        match sampled {
+        match self.sampler.take(numbers, is_begun) {
             Some(Sampled::Reading(reading)) => {
                 self.is_motion_begun = false;
+                if let Some(sent) = sent {
+                    self.timing.push(reading.tick, self.pace.tick, sent, now);
+                }
                 self.report(now, RigEventBody::Reading(reading));
             }
             Some(Sampled::Same) => self.is_motion_begun = is_begun,
@@ -344,9 +449,20 @@ impl Session {
         }
     }
 
+    /// A sine that cannot go on: the axis is stopped.
+    pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
+        self.urge(RigCommand::Stop, Asked::QuietStop);
+        let fault = Fault::CommandRefused {
+            detail: format!("the sine was broken off: {why}"),
+        };
+        self.report_in_order(now, RigEventBody::Fault(fault));
+    }
+
     /// The controller has forgotten its settings: nothing may move before it is opened again.
     fn on_reset(&mut self, now: Nanos) {
         self.is_reset = true;
+        self.timing = Timing::default();
+        self.sine = None;
         self.has_watchdog = false;
         self.beginning = None;
         let under_way = self.order.take().map(|(number, _)| number);
@@ -357,72 +473,8 @@ impl Session {
         self.report(now, RigEventBody::Fault(Fault::ControllerReset));
     }
 
-    /// Answers and questions do not belong together any more: bytes were lost, doubled or spoilt.
-    fn lose_order(&mut self, now: Nanos) {
-        self.stats.resynchronised += 1;
-        self.parser.clear();
-        for (asked, _) in self.expected.drain(..) {
-            if let Asked::Stop(number, command) = asked {
-                self.unconfirmed.push((number, command));
-            }
-        }
-        self.lines.clear();
-        self.beginning = None;
-        self.is_motion_begun = false;
-        if let Some((number, _)) = self.order.take() {
-            // It may or may not be under way: to be safe, it is not.
-            self.refuse(
-                now,
-                number,
-                "its answer was garbled, so the axis was stopped; check the cable",
-            );
-            self.urge(RigCommand::Stop, Asked::QuietStop);
-        }
-        self.search = Some(Search {
-            last_byte: now,
-            marker_at: None,
-            markers: 0,
-        });
-    }
-
-    fn on_reply_while_searching(&mut self, now: Nanos, reply: &Reply) {
-        let Some((Asked::Marker(number), _)) = self.expected.front() else {
-            return;
-        };
-        if reply.numbers() == Some(vec![f64::from(*number)]) {
-            self.expected.clear();
-            self.search = None;
-            self.answered_at = now;
-            for (number, command) in std::mem::take(&mut self.unconfirmed) {
-                self.urge(command, Asked::Stop(number, command));
-            }
-        }
-    }
-
-    /// The next marker, once the line has become quiet.
-    fn search_line(&mut self, now: Nanos) -> Option<Outgoing> {
-        let search = self.search.as_mut()?;
-        let is_due = match search.marker_at {
-            None => now.since(search.last_byte) >= QUIET,
-            Some(at) => now.since(at) >= MARKER_MAX,
-        };
-        if !is_due || search.markers >= MARKERS_MAX {
-            return None;
-        }
-        search.markers += 1;
-        search.marker_at = Some(now);
-        self.parser.clear();
-        self.expected.clear();
-        // A number that no sample begins with, and another one each time.
-        let number = 27_180 + search.markers;
-        Some(Outgoing {
-            text: format!("MG {number}\r"),
-            asked: vec![Asked::Marker(number)],
-        })
-    }
-
     fn samples_in_flight(&self) -> usize {
-        let is_sample = |asked: &Asked| matches!(asked, Asked::Sample(_));
+        let is_sample = |asked: &Asked| matches!(asked, Asked::Sample | Asked::Marked(_));
         self.expected
             .iter()
             .filter(|(asked, _)| is_sample(asked))
@@ -466,6 +518,16 @@ impl Session {
                 asked: vec![Asked::Renewal],
             });
         }
+        if self.sine.as_ref().is_some_and(|sine| sine.is_dry(now)) {
+            self.sine = None;
+            self.end_sine(now, "this computer did not send it in time");
+            return self.urgent.pop_front();
+        }
+        if let Some(commands) = self.sine.as_mut().and_then(|sine| sine.take(now)) {
+            let asked = vec![Asked::Segment; commands.len()];
+            let text = format!("{}\r", commands.join(";"));
+            return Some(Outgoing { text, asked });
+        }
         // Answers of an order that a stop has ended may still be on their way.
         let has_answers_to_come = self
             .expected
@@ -475,7 +537,7 @@ impl Session {
             && !has_answers_to_come
             && let Some((number, command)) = self.orders.pop_front()
         {
-            let mut order = Order::new(command);
+            let mut order = Order::new(command, self.pace.tick);
             let next = order.begin(&self.settings);
             self.order = Some((number, order));
             self.go_on(now, next);
@@ -490,6 +552,10 @@ impl Session {
             let (line, _) = self.beginning.take()?;
             if let Some((_, order)) = &mut self.order {
                 order.is_begun = true;
+                if let Some(mut feed) = order.feed.take() {
+                    feed.begun(now);
+                    self.sine = Some(feed);
+                }
             }
             self.asked_at = Some(now);
             return Some(line);
@@ -497,11 +563,17 @@ impl Session {
         let is_due = self
             .asked_at
             .is_none_or(|at| now.since(at) >= self.pace.every);
+        if let Some(line) = self.fetches.pop_front() {
+            return Some(line);
+        }
+        if self.recording.as_ref().is_some_and(Recording::is_fetching) {
+            return None;
+        }
         if is_due && self.samples_in_flight() < self.pace.in_flight {
             self.asked_at = Some(now);
             return Some(Outgoing {
                 text: format!("{}\r", self.question),
-                asked: vec![Asked::Sample(false)],
+                asked: vec![Asked::Sample],
             });
         }
         None
@@ -576,6 +648,8 @@ impl Dialogue for Session {
             Some((_, due)) => *due,
             None => self.asked_at.map_or(now, |at| at + self.pace.every),
         };
+        let feed_due = self.sine.as_ref().and_then(Feed::due);
+        let due = feed_due.map_or(due, |feed| feed.min(due));
         if self.samples_in_flight() < self.pace.in_flight || self.beginning.is_some() {
             due.max(now)
         } else {
@@ -588,19 +662,25 @@ impl Dialogue for Session {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        let search = self.search?;
-        let is_over = search.markers >= MARKERS_MAX
-            && search
-                .marker_at
-                .is_some_and(|at| now.since(at) >= MARKER_MAX);
-        is_over.then(|| {
+        self.search?.is_over(now).then(|| {
             format!(
                 "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
             )
         })
     }
 
+    fn uncertainty(&self, at: Nanos) -> Option<Nanos> {
+        self.timing.uncertainty(at, self.pace.tick)
+    }
+
+    fn host_time(&self, tick: u64) -> Option<Nanos> {
+        self.timing.host_time(tick, self.pace.tick)
+    }
+
     fn stats(&self) -> LinkStats {
-        self.stats
+        LinkStats {
+            deviation_max: self.timing.deviation_max,
+            ..self.stats
+        }
     }
 }

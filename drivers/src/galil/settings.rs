@@ -57,6 +57,13 @@ impl AnalogRange {
         })
     }
 
+    /// Volts of an element that `_AF` recorded: 16 bits whatever the converter has, with a sign where the range has two
+    /// (DMC-1700/1800 user manual, page 77; `GalilController.cpp` of EPICS scales them so).
+    #[must_use]
+    pub fn volts_of_recorded(self, counts: f64) -> f64 {
+        counts * self.span().0 / 65_536.0
+    }
+
     /// Whether it has two signs.
     #[must_use]
     pub const fn is_bipolar(self) -> bool {
@@ -128,6 +135,22 @@ pub struct GalilSettings {
     /// Whether a program on the controller may stop the axis when palpate falls silent. It takes the place of a program
     /// that is there, but for one in permanent memory.
     pub has_watchdog: bool,
+    /// How samples are taken.
+    pub sampling: Sampling,
+    /// Period of the controller's samples as `TM` counts it, in its microseconds; left alone without.
+    pub sample_us: Option<u16>,
+}
+
+/// How samples are taken.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Sampling {
+    /// Recorded where that gives no old samples, else asked for.
+    #[default]
+    Auto,
+    /// Asked for one by one.
+    Poll,
+    /// Recorded by the controller and fetched.
+    Record,
 }
 
 impl GalilSettings {
@@ -181,6 +204,8 @@ pub mod tests {
             filter: None,
             serial_number: None,
             has_watchdog: true,
+            sampling: Sampling::Poll,
+            sample_us: None,
         }
     }
 

@@ -9,10 +9,11 @@ pub const VARIABLE: &str = "plpwd";
 pub const LABEL: &str = "#PLPWD";
 /// The thread it runs in: the first one is for whoever else has programs, and automatic subroutines.
 pub const THREAD: u8 = 1;
-/// How often the program looks, in the controller's ms.
+/// How often the program looks, in the controller's ms. Whether these are samples when `TM` is not 1000 is not confirmed:
+/// half as long at 500, renewals are still often enough.
 const LOOK_MS: u32 = 250;
 /// How often palpate renews: so often that two renewals may be lost.
-pub const RENEW: Nanos = Nanos::from_millis(75);
+pub const RENEW: Nanos = Nanos::from_millis(40);
 
 /// Its lines. `WT`, `JP`, labels: DMC-40x0 command reference. `ST` of an axis leaves programs running.
 #[must_use]
@@ -32,8 +33,9 @@ pub fn program(axis: char) -> Vec<String> {
 /// How far the axis goes at most after the last byte from palpate: two looks of the program at full speed, and the way
 /// of the brake.
 #[must_use]
-pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
-    let silent = 2.0 * f64::from(LOOK_MS) * 1e-3;
+pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2, tick: Nanos) -> f64 {
+    let look_secs = f64::from(LOOK_MS) * tick.seconds().0.max(1e-3);
+    let silent = 2.0 * look_secs;
     speed.0 * silent + speed.0 * speed.0 / (2.0 * acceleration.0)
 }
 
@@ -43,7 +45,7 @@ mod tests {
 
     #[test]
     fn the_worst_case_is_two_looks_and_the_brake() {
-        let worst = worst_case_mm(MmPerS(20.0), MmPerS2(61.44));
+        let worst = worst_case_mm(MmPerS(20.0), MmPerS2(61.44), Nanos(976_563));
         assert!((worst - (10.0 + 400.0 / 122.88)).abs() < 1e-12);
     }
 }

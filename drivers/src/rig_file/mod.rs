@@ -4,13 +4,14 @@
 //! described in `docs/guide/galil.md`.
 
 mod fields;
+mod galil;
 
 pub use fields::Mistake;
 
-use crate::galil::{AnalogRange, GalilOpenError, GalilRig, GalilSettings, Levels, MotorType};
+use crate::galil::{GalilOpenError, GalilRig, GalilSettings};
+use crate::rig::Rig;
 use crate::wire::{HostClock, Place};
 use fields::Fields;
-use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 use std::fmt;
 use thiserror::Error;
 
@@ -19,11 +20,15 @@ pub const BYTES_MAX: usize = 64 * 1024;
 
 /// A rig as its file describes it.
 #[derive(Clone, Debug, PartialEq)]
-pub struct RigFile {
-    /// Where the controller is.
-    pub place: Place,
-    /// How it is wired.
-    pub galil: GalilSettings,
+#[non_exhaustive]
+pub enum RigFile {
+    /// Slide and load cell on one Galil controller.
+    Galil {
+        /// Where the controller is.
+        place: Place,
+        /// How it is wired.
+        settings: GalilSettings,
+    },
 }
 
 /// A rig file with mistakes, all of them.
@@ -69,138 +74,38 @@ impl RigFile {
         }
     }
 
-    /// Opens the devices and checks them against the file. Nothing moves.
-    pub fn open(&self, clock: &HostClock) -> Result<GalilRig, GalilOpenError> {
-        let link = self.place.open()?;
-        GalilRig::open(link, &self.galil, clock.clone())
+    /// Where its devices are, that of the axis first.
+    #[must_use]
+    pub fn places(&self) -> Vec<&Place> {
+        match self {
+            Self::Galil { place, .. } => vec![place],
+        }
     }
+
+    /// Opens the devices and checks them against the file. Nothing moves.
+    pub fn open(&self, clock: &HostClock) -> Result<Box<dyn Rig>, DeviceError> {
+        match self {
+            Self::Galil { place, settings } => {
+                Ok(Box::new(GalilRig::open(place, settings, clock.clone())?))
+            }
+        }
+    }
+}
+
+/// A device that a rig file describes cannot be used.
+#[derive(Clone, Debug, PartialEq, Error)]
+#[non_exhaustive]
+pub enum DeviceError {
+    /// A Galil controller.
+    #[error(transparent)]
+    Galil(#[from] GalilOpenError),
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
-    let _device: Option<()> = fields.choice("device", &[("galil", ())], None);
-    let name = fields.text("name");
-    let place = place(fields);
-    let serial_number = fields.number("serial_number", 0.0, 1e15);
-    let axis = fields.text("axis").unwrap_or_else(|| "A".into());
-    let axis = match axis.as_bytes() {
-        [letter @ b'A'..=b'H'] => char::from(*letter),
-        _ => {
-            fields.mistake("axis", "an axis is a letter from A to H");
-            'A'
-        }
-    };
-    let input = fields.number("input", 1.0, 8.0).unwrap_or(1.0);
-    let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
-    let is_reversed = fields.choice(
-        "direction",
-        &[("forward", false), ("reverse", true)],
-        Some(false),
-    );
-    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
-    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
-    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
-    let motor_type = fields.choice(
-        "motor_type",
-        &[
-            ("active-low", MotorType::ActiveLow),
-            ("active-high", MotorType::ActiveHigh),
-        ],
-        Some(MotorType::ActiveLow),
-    );
-    let levels = [
-        ("active-low", Levels::ActiveLow),
-        ("active-high", Levels::ActiveHigh),
-    ];
-    let limits = fields.choice("limit_switches", &levels, Some(Levels::ActiveLow));
-    let home = fields.choice("home_switch", &levels, Some(Levels::ActiveLow));
-    let range = fields.choice(
-        "range",
-        &[
-            ("-10..10 V", AnalogRange::Bipolar10),
-            ("-5..5 V", AnalogRange::Bipolar5),
-            ("0..5 V", AnalogRange::Unipolar5),
-            ("0..10 V", AnalogRange::Unipolar10),
-        ],
-        Some(AnalogRange::Bipolar10),
-    );
-    let bits = fields.choice("converter", &[("12 bit", 12), ("16 bit", 16)], None);
-    let noise = fields.number("noise_v", 1e-9, 1.0);
-    let filter = fields.text("filter");
-    let has_watchdog = fields.flag("watchdog").unwrap_or(true);
-    let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
-    // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
-    if acceleration / mm_per_pulse < 1024.0 {
-        let least = 1024.0 * mm_per_pulse;
-        fields.mistake(
-            "acceleration_mm_s2",
-            &format!("the controller makes no less than {least:.4} mm/s2 with such pulses"),
-        );
-    }
-    let range = range?;
-    let bits = bits?;
-    let counts = f64::from(1_u32 << bits);
-    Some(RigFile {
-        place: place?,
-        galil: GalilSettings {
-            name: name.unwrap_or_else(|| stem(file)),
-            axis,
-            // Between 1 and 8, both checked.
-            input: input as u8,
-            mm_per_pulse,
-            is_reversed: is_reversed?,
-            travel: Position(travel?),
-            speed_max: MmPerS(speed_max?),
-            acceleration: MmPerS2(acceleration),
-            motor_type: motor_type?,
-            limits: limits?,
-            home: home?,
-            range,
-            bits,
-            // Without better knowledge, a count of the converter.
-            noise: Volts(noise.unwrap_or(range.span().0 / counts)),
-            serial_number: serial_number.map(|number| number as u64),
-            has_watchdog,
-            filter,
-        },
-    })
-}
-
-fn place(fields: &mut Fields) -> Option<Place> {
-    let (port, address) = (fields.text("port"), fields.text("address"));
-    let baud = fields.number("baud", 300.0, 4e6);
-    let has_handshake = fields.choice(
-        "handshake",
-        &[("none", false), ("rts-cts", true)],
-        Some(false),
-    );
-    match (port, address) {
-        (Some(port), None) => Some(Place::Serial {
-            port,
-            // The factory setting of boards with an USB port, and what gclib opens them with (gclib.h, `--baud`).
-            baud: baud.unwrap_or(115_200.0) as u32,
-            has_handshake: has_handshake?,
-        }),
-        (None, Some(address)) => {
-            if baud.is_some() {
-                fields.mistake("baud", "a controller on a network has no baud rate");
-            }
-            Some(Place::Tcp(address))
-        }
-        (Some(_), Some(_)) => {
-            fields.mistake(
-                "address",
-                "a device is at a port or at an address, not at both",
-            );
-            None
-        }
-        (None, None) => {
-            fields.mistake(
-                "port",
-                "where is the controller? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\"",
-            );
-            None
-        }
-    }
+    fields.choice("device", &[("galil", ())], None);
+    let name = fields.text("name").unwrap_or_else(|| stem(file));
+    let (place, settings) = galil::read(name, fields)?;
+    Some(RigFile::Galil { place, settings })
 }
 
 /// The file's name without folders and ending.

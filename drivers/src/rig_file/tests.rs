@@ -1,4 +1,5 @@
 use super::*;
+use crate::galil::AnalogRange;
 
 const THESIS: &str = r#"# The slide of the source thesis
 device = "galil"
@@ -9,6 +10,12 @@ speed_max_mm_s = 20
 acceleration_mm_s2 = 61.44
 converter = "16 bit"
 "#;
+
+fn galil(file: &str, text: &str) -> (Place, GalilSettings) {
+    match RigFile::parse(file, text).unwrap() {
+        RigFile::Galil { place, settings } => (place, settings),
+    }
+}
 
 fn mistakes(text: &str) -> Vec<(usize, String)> {
     RigFile::parse("bench.toml", text)
@@ -21,20 +28,20 @@ fn mistakes(text: &str) -> Vec<(usize, String)> {
 
 #[test]
 fn what_is_not_said_is_usual() {
-    let file = RigFile::parse("rigs/bench 2.toml", THESIS).unwrap();
+    let (place, galil) = galil("rigs/bench 2.toml", THESIS);
     assert_eq!(
-        file.place,
+        place,
         Place::Serial {
             port: "/dev/ttyUSB0".into(),
             baud: 115_200,
             has_handshake: false
         }
     );
-    assert_eq!(file.galil.name, "bench 2");
-    assert_eq!((file.galil.axis, file.galil.input), ('A', 1));
-    assert_eq!(file.galil.range, AnalogRange::Bipolar10);
-    assert_eq!(file.galil.noise.0, 20.0 / 65_536.0);
-    assert!(file.galil.has_watchdog && !file.galil.is_reversed);
+    assert_eq!(galil.name, "bench 2");
+    assert_eq!((galil.axis, galil.input), ('A', 1));
+    assert_eq!(galil.range, AnalogRange::Bipolar10);
+    assert_eq!(galil.noise.0, 20.0 / 65_536.0);
+    assert!(galil.has_watchdog && !galil.is_reversed);
 }
 
 #[test]
@@ -54,14 +61,14 @@ filter = "RC low-pass, 100 Hz"
 serial_number = 1820
 watchdog = false
 "#;
-    let file = RigFile::parse("x.toml", &text).unwrap();
-    assert_eq!(file.place, Place::Tcp("10.0.0.5:23".into()));
-    assert_eq!(file.galil.name, "left bench");
-    assert_eq!((file.galil.axis, file.galil.input), ('C', 3));
-    assert_eq!(file.galil.sign(), -1);
-    assert_eq!(file.galil.serial_number, Some(1820));
-    assert_eq!(file.galil.filter.as_deref(), Some("RC low-pass, 100 Hz"));
-    assert!(!file.galil.has_watchdog);
+    let (place, galil) = galil("x.toml", &text);
+    assert_eq!(place, Place::Tcp("10.0.0.5:23".into()));
+    assert_eq!(galil.name, "left bench");
+    assert_eq!((galil.axis, galil.input), ('C', 3));
+    assert_eq!(galil.sign(), -1);
+    assert_eq!(galil.serial_number, Some(1820));
+    assert_eq!(galil.filter.as_deref(), Some("RC low-pass, 100 Hz"));
+    assert!(!galil.has_watchdog);
 }
 
 #[test]

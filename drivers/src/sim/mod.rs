@@ -204,13 +204,14 @@ impl SimRig {
             volts,
             pulses: axis.pulses,
             status: axis.status,
+            age: None,
         };
         self.report(at, RigEventBody::Reading(reading));
     }
 
     fn report(&mut self, sent: Nanos, body: RigEventBody) {
         let at = self.link.arrival(sent);
-        self.reports.push_back(RigEvent { at, body });
+        self.reports.push_back(RigEvent::arrived(at, body));
     }
 }
 

@@ -17,6 +17,11 @@ pub struct LinkStats {
     pub round_trip_max: Nanos,
     /// Questions that may wait for their answers at once.
     pub in_flight: usize,
+    /// How far the middle of a question was at most from the time at which a device's clock, as it was known before, said
+    /// that it was answered.
+    pub deviation_max: Nanos,
+    /// Samples that a device took and overwrote before they were fetched.
+    pub lost: u64,
     /// How often the order of questions and answers was lost and found again.
     pub resynchronised: u64,
 }
@@ -69,6 +74,16 @@ pub trait Dialogue: Send {
 
     /// Why the link counts as dead although it is open, such as silence.
     fn is_dead(&self, now: Nanos) -> Option<String>;
+
+    /// Time of a device's tick on the host's clock, as far as is known.
+    fn host_time(&self, _tick: u64) -> Option<Nanos> {
+        None
+    }
+
+    /// How far [`Dialogue::host_time`] may be wrong at a time of the host.
+    fn uncertainty(&self, _at: Nanos) -> Option<Nanos> {
+        None
+    }
 
     /// How the link behaves.
     fn stats(&self) -> LinkStats;

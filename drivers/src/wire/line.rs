@@ -3,7 +3,7 @@
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
 use super::link::Link;
-use crate::rig::{RigEvent, RigEventBody};
+use crate::rig::{RigEvent, RigEventBody, Taken};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand};
 use std::collections::VecDeque;
@@ -175,10 +175,9 @@ impl<D> Drop for Owner<D> {
         let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
         reports.is_over = true;
         if std::thread::panicking() {
-            reports.events.push_back(RigEvent {
-                at: (self.clock)(),
-                body: lost("the driver has failed; open the rig again"),
-            });
+            let failed = lost("the driver has failed; open the rig again");
+            let at = (self.clock)();
+            reports.events.push_back(RigEvent::arrived(at, failed));
         }
         came.notify_all();
     }
@@ -207,10 +206,7 @@ impl<D: Dialogue> Owner<D> {
             }
         };
         let at = (self.clock)();
-        self.report(vec![RigEvent {
-            at,
-            body: lost(ending),
-        }]);
+        self.report(vec![RigEvent::arrived(at, lost(ending))]);
     }
 
     /// Commands, lines, bytes: once.
@@ -242,10 +238,21 @@ impl<D: Dialogue> Owner<D> {
         }
         let mut events = Vec::new();
         while let Some((at, body)) = self.dialogue.take_event() {
-            events.push(RigEvent { at, body });
+            let taken = match &body {
+                RigEventBody::Reading(reading) => self.taken(at, reading.tick),
+                _ => None,
+            };
+            events.push(RigEvent { at, body, taken });
         }
         self.report(events);
         Ok(())
+    }
+
+    fn taken(&self, at: Nanos, tick: u64) -> Option<Taken> {
+        Some(Taken {
+            at: self.dialogue.host_time(tick)?,
+            uncertainty: self.dialogue.uncertainty(at)?,
+        })
     }
 
     fn take_stops(&mut self) {

@@ -3,12 +3,14 @@
 //! Nothing here knows what the bytes mean: that is a [`Dialogue`], a state machine with the time handed in, so that
 //! every protocol can be tested without a port, a thread or a clock. [`Line`] runs one on a link.
 
+mod answers;
 mod dialogue;
 mod line;
 mod link;
 mod memory;
 mod place;
 
+pub use answers::Answers;
 pub use dialogue::{Dialogue, LinkStats};
 pub use line::{Line, LineSettings};
 pub use link::{Link, SerialLink, TcpLink};

@@ -4,7 +4,8 @@ use palpate_drivers::RigEventBody;
 use palpate_drivers::emulate::Device;
 use palpate_drivers::emulate::galil::{self, GalilEmulator};
 use palpate_drivers::galil::{
-    AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Session, connect,
+    AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Sampling, Session,
+    connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_model::Nanos;
@@ -113,6 +114,8 @@ pub fn thesis() -> GalilSettings {
         filter: None,
         serial_number: None,
         has_watchdog: true,
+        sampling: Sampling::Poll,
+        sample_us: None,
     }
 }
 
@@ -150,6 +153,8 @@ pub struct Host {
     pub acks: Vec<RigCommand>,
     pub faults: Vec<Fault>,
     pub is_attended: bool,
+    /// Readings that had come before the newest acknowledgement.
+    pub acked_behind: usize,
 }
 
 impl Host {
@@ -160,13 +165,7 @@ impl Host {
     pub fn on(wire: Shared, settings: &GalilSettings) -> Self {
         let connected = try_connect(&wire, settings).expect("it connects");
         let now = wire.lock().now;
-        let session = Session::new(
-            settings.clone(),
-            connected.pace,
-            connected.has_watchdog,
-            connected.stats,
-            now,
-        );
+        let session = Session::new(settings.clone(), &connected, now);
         Self {
             wire,
             session,
@@ -175,6 +174,7 @@ impl Host {
             acks: Vec::new(),
             faults: Vec::new(),
             is_attended: true,
+            acked_behind: 0,
         }
     }
 
@@ -198,7 +198,10 @@ impl Host {
         while let Some((_, body)) = self.session.take_event() {
             match body {
                 RigEventBody::Reading(reading) => self.readings.push(reading),
-                RigEventBody::Ack(ack) => self.acks.push(ack.command),
+                RigEventBody::Ack(ack) => {
+                    self.acked_behind = self.readings.len();
+                    self.acks.push(ack.command);
+                }
                 RigEventBody::Fault(fault) => self.faults.push(fault),
             }
         }

@@ -8,7 +8,7 @@
 use crate::bench::{thesis, to};
 use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings as Emulated};
 use palpate_drivers::emulate::serve::{Place as At, ServeOptions, Told, serve};
-use palpate_drivers::galil::GalilRig;
+use palpate_drivers::galil::{GalilRig, GalilSettings};
 use palpate_drivers::wire::{HostClock, Place, WireError};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
@@ -19,14 +19,14 @@ use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-struct Served {
-    address: String,
-    orders: SyncSender<String>,
+pub struct Served {
+    pub address: String,
+    pub orders: SyncSender<String>,
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
 }
 
-fn start(place: At, is_serial: bool, latency: Nanos) -> Served {
+pub fn start(place: At, is_serial: bool, latency: Nanos) -> Served {
     let (orders, received) = sync_channel(16);
     let (sender, told) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
@@ -71,23 +71,22 @@ impl Drop for Served {
     }
 }
 
-fn clock() -> HostClock {
+pub fn clock() -> HostClock {
     let start = Instant::now();
     Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
 }
 
 /// The rig with somebody who takes its reports.
-struct Runner {
-    rig: GalilRig,
+pub struct Runner {
+    pub rig: GalilRig,
     now: Nanos,
-    newest: Option<Reading>,
-    events: Vec<RigEvent>,
+    pub newest: Option<Reading>,
+    pub events: Vec<RigEvent>,
 }
 
 impl Runner {
-    fn open(place: &Place) -> Self {
-        let link = place.open().expect("the emulator is there");
-        let rig = GalilRig::open(link, &thesis(), clock()).expect("it is a Galil controller");
+    pub fn open(place: &Place, settings: &GalilSettings) -> Self {
+        let rig = GalilRig::open(place, settings, clock()).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
         Self {
             rig,
@@ -97,7 +96,7 @@ impl Runner {
         }
     }
 
-    fn pass(&mut self) {
+    pub fn pass(&mut self) {
         self.now = self.now + Nanos::from_millis(10);
         while let Some(event) = self.rig.next_event(self.now) {
             assert!(event.at <= self.now);
@@ -108,7 +107,7 @@ impl Runner {
         }
     }
 
-    fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
+    pub fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
         // A minute of waiting is for a computer with much else to do.
         for _ in 0..6_000 {
             if is_so(self) {
@@ -119,7 +118,7 @@ impl Runner {
         panic!("{what} never: {:?}", self.faults());
     }
 
-    fn faults(&self) -> Vec<&Fault> {
+    pub fn faults(&self) -> Vec<&Fault> {
         self.events
             .iter()
             .filter_map(|event| match &event.body {
@@ -129,7 +128,7 @@ impl Runner {
             .collect()
     }
 
-    fn tell(&mut self, command: RigCommand) {
+    pub fn tell(&mut self, command: RigCommand) {
         self.events.clear();
         self.rig.send(command);
         self.until("acknowledged", |runner| {
@@ -139,9 +138,31 @@ impl Runner {
         });
     }
 
-    fn is_at_rest(&self) -> bool {
+    pub fn is_at_rest(&self) -> bool {
         self.newest
             .is_some_and(|reading| !reading.status.has(AxisStatus::MOVING))
+    }
+
+    /// The plug is put back: the same controller, at rest, does what it is told.
+    fn reconnect(&mut self) {
+        let mut is_back = false;
+        for _ in 0..200 {
+            is_back = self.rig.reconnect().is_ok();
+            if is_back {
+                break;
+            }
+            self.pass();
+        }
+        assert!(is_back, "it came back");
+        self.newest = None;
+        self.until("a sample", |runner| runner.newest.is_some());
+        assert!(self.is_at_rest());
+        self.tell(RigCommand::EnableMotor);
+        self.tell(RigCommand::DefinePosition { pulses: 0 });
+        self.tell(to(100, 19.98));
+        self.until("there", |runner| {
+            runner.is_at_rest() && runner.newest.is_some_and(|reading| reading.pulses == 100)
+        });
     }
 
     /// A move, a stop, a halt; then the plug is pulled in mid-move.
@@ -169,7 +190,7 @@ impl Runner {
         assert!(self.rig.stats().answers > 10);
         self.tell(to(6000, 0.75));
         self.events.clear();
-        let order = served.orders.send("disconnect:60".into());
+        let order = served.orders.send("disconnect:2".into());
         order.expect("the emulator takes orders");
         self.until("lost", |runner| {
             matches!(runner.faults().first(), Some(Fault::LinkLost { .. }))
@@ -177,6 +198,13 @@ impl Runner {
         // Nothing hangs and nothing comes any more.
         self.rig.send(RigCommand::Stop);
         self.pass();
+        let Err(err) = self.rig.reconnect() else {
+            panic!("there is no plug");
+        };
+        assert!(!err.to_string().is_empty());
+        self.rig.send(RigCommand::Stop);
+        self.pass();
+        self.reconnect();
     }
 }
 
@@ -184,7 +212,7 @@ impl Runner {
 fn a_controller_on_a_network() {
     let at = At::Tcp(([127, 0, 0, 1], 0).into());
     let served = start(at, false, Nanos::ZERO);
-    Runner::open(&Place::Tcp(served.address.clone())).exercise(&served);
+    Runner::open(&Place::Tcp(served.address.clone()), &thesis()).exercise(&served);
 }
 
 #[test]
@@ -199,7 +227,7 @@ fn a_controller_on_a_serial_port_that_only_one_program_has() {
         baud: 115_200,
         has_handshake: false,
     };
-    let runner = Runner::open(&place);
+    let runner = Runner::open(&place, &thesis());
     let Err(err) = place.open() else {
         panic!("two programs have one port");
     };
@@ -219,7 +247,7 @@ fn a_converter_that_waits_is_measured() {
         baud: 115_200,
         has_handshake: false,
     };
-    let mut runner = Runner::open(&place);
+    let mut runner = Runner::open(&place, &thesis());
     runner.until("samples", |runner| runner.events.len() > 50);
     let stats = runner.rig.stats();
     assert!(stats.round_trip_max > Nanos::from_millis(8), "{stats:?}");

@@ -30,6 +30,6 @@ pub use path::{PathError, PathTracker};
 pub use phase::Phase;
 pub use profile::Profile;
 pub use raw::RawBytes;
-pub use reading::{AxisStatus, Reading};
+pub use reading::{Age, AxisStatus, Reading};
 pub use signal::SignalFacts;
 pub use thickness::{Thickness, ThicknessError, Touched, thickness};

@@ -1,5 +1,6 @@
 //! What a rig reports with every sample.
 
+use crate::Nanos;
 use crate::units::Volts;
 use serde::{Deserialize, Serialize};
 use std::ops::BitOr;
@@ -50,4 +51,16 @@ pub struct Reading {
     pub pulses: i64,
     /// State of the axis.
     pub status: AxisStatus,
+    /// How old it was when it reached the host, as far as the link tells.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub age: Option<Age>,
+}
+
+/// How long before its arrival at the host a sample was taken: what ties the controller's time to the host's.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Age {
+    /// The best estimate.
+    pub by: Nanos,
+    /// How far it may be wrong either way.
+    pub within: Nanos,
 }

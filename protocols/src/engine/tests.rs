@@ -131,6 +131,7 @@ impl Bench {
             volts: Volts(volts + noise),
             pulses: self.pulses,
             status: self.status,
+            age: None,
         }))
     }
 
@@ -386,6 +387,7 @@ fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
                 volts,
                 pulses: 0,
                 status,
+                age: None,
             };
             let effects = bench.give(Input::Reading(reading));
             if let Some(Effect::Record(Record::EndingStarted { reason, .. })) = effects.first() {
@@ -411,6 +413,7 @@ fn steps_are_pure() {
         volts: Volts(volts(1.0)),
         pulses: 0,
         status: AxisStatus::MOTOR_ON,
+        age: None,
     };
     let (a, b) = (
         step(state.clone(), bench.now, Input::Reading(reading)),

@@ -103,6 +103,8 @@ pub struct Fidelity {
     pub late: u64,
     /// The longest such delay in s.
     pub late_worst_s: f64,
+    /// The longest time from one sample to the next by the controller's clock, in s.
+    pub longest_gap_s: f64,
     /// What the time went to.
     pub time_use: TimeUse,
     /// Samples taken while something was measured.
@@ -115,6 +117,25 @@ impl Fidelity {
     /// The targets that were missed.
     pub fn missed(&self) -> impl Iterator<Item = &Achieved> {
         self.targets.iter().filter(|one| !one.is_within)
+    }
+}
+
+/// Samples that should have come between two samples so many ticks apart.
+///
+/// A rig that reports every tick misses each tick between. One that is asked for its samples gives them as the link
+/// allows: what comes within two scheduler slices of a desktop host, or half a sample late, is its way; in a longer gap
+/// all that its rate promises are missing.
+fn missing_in(ticks: u64, rig: &RigDescription) -> u64 {
+    let between = ticks.saturating_sub(1);
+    let per_sample = rig.ticks_per_sample;
+    if per_sample <= 1.0 {
+        return between;
+    }
+    let usual = (LATE_S / rig.tick().0).max(1.5 * per_sample);
+    if ticks as f64 <= usual {
+        0
+    } else {
+        (between as f64 / per_sample) as u64
     }
 }
 
@@ -226,7 +247,8 @@ impl FidelityMeter {
         self.found.time_use.add(row.phase, arrived);
         // A controller that restarted counts from zero again: nothing is known to be missing.
         if let Some(ticks) = self.last.and_then(|last| row.tick.checked_sub(last.tick)) {
-            self.found.dropped += ticks.saturating_sub(1);
+            self.found.dropped += missing_in(ticks, &self.rig);
+            self.found.longest_gap_s = self.found.longest_gap_s.max(ticks as f64 * tick_secs);
             let delay = arrived - ticks as f64 * tick_secs;
             if delay > LATE_S {
                 self.found.late += 1;
@@ -310,6 +332,33 @@ mod tests {
         assert!((hold.achieved - hold.target).abs() < 1e-9, "{hold:?}");
         let last = session.rows.last().unwrap().host.seconds().0;
         assert!((found.time_use.total_s() - last).abs() < 1e-6);
+    }
+
+    #[test]
+    fn a_rig_that_is_asked_for_its_samples_misses_what_its_rate_promises() {
+        let mut rig = recorded().manifest.rig.unwrap();
+        rig.tick_nanos = 1_000_000;
+        let missing = |per_sample: f64, ticks| {
+            let rig = RigDescription {
+                ticks_per_sample: per_sample,
+                ..rig.clone()
+            };
+            missing_in(ticks, &rig)
+        };
+        // Every tick: each between is missing.
+        assert_eq!([1, 2, 7].map(|ticks| missing(1.0, ticks)), [0, 1, 6]);
+        // A sample in two milliseconds over a link: two scheduler slices are its way.
+        assert_eq!([2, 20, 21].map(|ticks| missing(2.0, ticks)), [0, 0, 10]);
+        // Eighty a second, by themselves: one that is garbled leaves 25 ms.
+        assert_eq!(
+            [12, 13, 25, 38].map(|ticks| missing(12.5, ticks)),
+            [0, 0, 1, 2]
+        );
+        // Ten a second.
+        assert_eq!(
+            [100, 149, 200].map(|ticks| missing(100.0, ticks)),
+            [0, 0, 1]
+        );
     }
 
     #[test]

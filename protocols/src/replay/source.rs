@@ -83,5 +83,6 @@ pub(super) fn reading_of(row: &Row) -> Option<Reading> {
         volts: Volts(row.volts?),
         pulses: row.pulses?,
         status: AxisStatus(row.status),
+        age: row.age,
     })
 }

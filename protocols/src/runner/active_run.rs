@@ -282,6 +282,7 @@ impl ActiveRun {
         let row = Row {
             tick: reading.tick,
             host: now,
+            age: reading.age,
             counts: reading.counts,
             volts: Some(reading.volts.0),
             pulses: Some(reading.pulses),

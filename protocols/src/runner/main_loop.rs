@@ -8,9 +8,9 @@ use super::start::{Bench, RunRequest, StartError, start};
 use super::watch::HostWatch;
 use crate::engine::{Input, Operator};
 use arc_swap::ArcSwap;
-use palpate_drivers::{Rig, RigEventBody};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{Age, AxisStatus, Fault, Reading, RigCommand, RigDescription};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -18,6 +18,9 @@ use std::time::Duration;
 
 /// Grid of the watchdog: silence is judged this often in session time.
 const TICK: Nanos = Nanos::from_millis(10);
+
+/// How often a rig on wires is asked what has come: an interlock decides so late at most.
+const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
 
 /// How far time runs between looks at the requests, at full pace.
 const STRIDE_MAX: Nanos = Nanos::from_millis(100);
@@ -229,6 +232,7 @@ impl MainLoop {
     fn stride(&self) -> Nanos {
         match self.pace() {
             TimeScale::Max => STRIDE_MAX,
+            _ if !self.rig.is_virtual() => STRIDE_WIRED,
             TimeScale::Factor(factor) => {
                 Nanos(((TICK.0 as f64 * factor) as u64).clamp(1_000_000, STRIDE_MAX.0))
             }
@@ -241,7 +245,7 @@ impl MainLoop {
             let limit = self.next_tick.min(until);
             while let Some(event) = self.rig.next_event(limit) {
                 self.now = event.at;
-                self.on_event(event.body);
+                self.on_event(event);
             }
             self.now = limit;
             if limit == self.next_tick {
@@ -253,14 +257,21 @@ impl MainLoop {
         }
     }
 
-    fn on_event(&mut self, body: RigEventBody) {
-        match body {
+    fn on_event(&mut self, event: RigEvent) {
+        match event.body {
             // What is not a number goes no further: not to a plot, a fit or a file.
             RigEventBody::Reading(reading) if !reading.volts.is_finite() => {
                 let tick = reading.tick;
                 self.feed(Input::Fault(Fault::SignalInvalid { tick }));
             }
             RigEventBody::Reading(reading) => {
+                let reading = Reading {
+                    age: reading.age.or(event.taken.map(|taken| Age {
+                        by: event.at.since(taken.at),
+                        within: taken.uncertainty,
+                    })),
+                    ..reading
+                };
                 self.is_sample_seen = true;
                 // A clock that runs back is a controller that restarted, also between runs.
                 if self.reading.is_some_and(|last| reading.tick <= last.tick) {

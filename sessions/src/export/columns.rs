@@ -23,6 +23,8 @@ enum Field {
     Tick,
     Host,
     Status,
+    Age,
+    AgeWithin,
     /// One of [`Beside`], by number.
     Beside(usize),
     /// The number of the sample, in a table that holds every so many only.
@@ -61,13 +63,15 @@ const USUAL: [Field; 8] = [
 ];
 
 /// Columns that can be asked for by name.
-const MORE: [Field; 6] = [
+const MORE: [Field; 8] = [
     Field::SessionId,
     Field::Specimen,
     Field::Sample,
     Field::Tick,
     Field::Host,
     Field::Status,
+    Field::Age,
+    Field::AgeWithin,
 ];
 
 /// Columns that stand beside the session's own, such as corrected depths.
@@ -179,6 +183,20 @@ impl Field {
                 "whole number",
                 "bits of the axis' status",
                 "as received",
+            ),
+            Self::Age => (
+                "age_ns",
+                "ns",
+                "whole number",
+                "the sample was taken so long before it arrived; empty where the link does not tell",
+                "measured by the driver, sample by sample",
+            ),
+            Self::AgeWithin => (
+                "age_within_ns",
+                "ns",
+                "whole number",
+                "how far age_ns may be wrong either way; empty where the link does not tell",
+                "measured by the driver, sample by sample",
             ),
             // Named by those who make them.
             Self::Beside(_) | Self::EveryNth => ("", "", "", "", ""),
@@ -328,7 +346,9 @@ impl Cells {
             Field::Depth | Field::Force | Field::Signal | Field::Beside(_) => {
                 Self::MaybeNumbers(MutablePrimitiveArray::with_capacity(room))
             }
-            Field::Pulses => Self::MaybeWide(MutablePrimitiveArray::with_capacity(room)),
+            Field::Pulses | Field::Age | Field::AgeWithin => {
+                Self::MaybeWide(MutablePrimitiveArray::with_capacity(room))
+            }
             Field::Counts => Self::MaybeWhole(MutablePrimitiveArray::with_capacity(room)),
         }
     }
@@ -360,7 +380,14 @@ impl Cells {
                 }
                 _ => cells.extend(rows.map(|row| row.volts)),
             },
-            Self::MaybeWide(cells) => cells.extend(rows.map(|row| row.pulses)),
+            Self::MaybeWide(cells) => match field {
+                // No link is as slow as i64::MAX nanoseconds.
+                Field::Age => cells.extend(rows.map(|row| row.age.map(|age| age.by.0 as i64))),
+                Field::AgeWithin => {
+                    cells.extend(rows.map(|row| row.age.map(|age| age.within.0 as i64)))
+                }
+                _ => cells.extend(rows.map(|row| row.pulses)),
+            },
             Self::MaybeWhole(cells) => cells.extend(rows.map(|row| row.counts)),
         }
     }

@@ -5,7 +5,7 @@ use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use polars::prelude::{DataFrame, PolarsError, PolarsResult};
 
-/// Columns of the samples, all that a [`Row`] holds.
+/// Columns of the samples, all that a [`Row`] holds but how long the link may have taken.
 pub(super) const SAMPLE_COLUMNS: [&str; 12] = [
     "session_id",
     "t_s",
@@ -47,6 +47,7 @@ pub(super) fn rows(frame: &DataFrame) -> PolarsResult<Vec<Row>> {
         rows.push(Row {
             tick: tick.ok_or_else(|| missing("tick"))?,
             host: Nanos(host.ok_or_else(|| missing("host_ns"))?),
+            age: None,
             counts,
             volts,
             pulses,

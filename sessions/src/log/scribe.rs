@@ -236,6 +236,7 @@ mod tests {
         let row = Row {
             tick: number,
             host: Nanos(BATCH.0 * number),
+            age: None,
             counts: None,
             volts: Some(0.5),
             pulses: Some(0),

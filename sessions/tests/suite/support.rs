@@ -100,6 +100,7 @@ pub fn rows(count: usize, seed: u64) -> Vec<Row> {
             Row {
                 tick: 1000 + i as u64,
                 host: Nanos(1_000_000 * i as u64 + random.next() % 1000),
+                age: None,
                 counts: Some((volts * 3276.8) as i32),
                 volts: Some(volts),
                 pulses: Some((i / 7) as i64 - 3),

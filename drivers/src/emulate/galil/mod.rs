@@ -46,7 +46,7 @@ use errors::ErrorCode;
 use format::Format;
 use memory::Memory;
 use palpate_model::rig::HandAction;
-use palpate_model::{Nanos, Seconds};
+use palpate_model::{Nanos, Position, Seconds};
 use program::{Program, Thread};
 use record::Recorder;
 
@@ -256,6 +256,12 @@ impl GalilEmulator {
     #[must_use]
     pub fn is_running(&self, axis: usize) -> bool {
         self.axes.get(axis).is_some_and(Axis::is_running)
+    }
+
+    /// True position of the slide from home, whatever the counter says, for tests and demonstrations.
+    #[must_use]
+    pub fn slide(&self) -> Position {
+        self.plant.axis()
     }
 }
 

@@ -123,6 +123,7 @@ fn row(sample: &Sample, tick: u64) -> Row {
     Row {
         tick,
         host: Nanos(tick / 1000),
+        age: None,
         counts: None,
         volts: sample.signal,
         pulses: None,

@@ -1,0 +1,406 @@
+//! `palpate rig`: what is at the ports, whether a rig is as its file says, and what it reports. Nothing moves.
+
+use super::Failure;
+use super::output::Output;
+use super::rig::open_rig_file;
+use clap::{Args, Subcommand};
+use palpate_drivers::detect::{Found, ask};
+use palpate_drivers::serial::list_ports;
+use palpate_drivers::wire::{LinkStats, Place};
+use palpate_drivers::{Rig, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::command::position_from_pulses;
+use palpate_model::rig::{AxisStatus, Reading};
+use palpate_protocols::runner::driver_clock;
+use serde::Serialize;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// How often a line is printed.
+const TELL_EVERY: Nanos = Nanos::from_millis(500);
+/// Longest wait for the rig, so that Ctrl-C is heeded.
+const LOOK_EVERY: Nanos = Nanos::from_millis(20);
+
+/// What to do with rigs on wires.
+#[derive(Debug, Subcommand)]
+pub enum RigCommand {
+    /// List serial ports; with --ask, ask each which device is behind it
+    Detect(DetectArgs),
+    /// Open the rig of a file, compare its devices with it, and tell who they are and how fast the links; nothing moves
+    Check(CheckArgs),
+    /// Show what the rig of a file reports, until Ctrl-C; nothing moves
+    Monitor(MonitorArgs),
+}
+
+/// Arguments of `palpate rig detect`.
+#[derive(Debug, Args)]
+pub struct DetectArgs {
+    /// Open each port and ask: palpate writes `?`, which moves nothing. An Arduino starts anew when its port is opened
+    #[arg(long)]
+    ask: bool,
+    /// Ask here instead of at the ports of this computer: a port, or HOST:PORT of a device on a network; may be repeated
+    #[arg(long, value_name = "PORT|HOST:PORT")]
+    at: Vec<String>,
+    /// Bits a second of serial ports
+    #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
+    baud: u32,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate rig check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// The rig file
+    #[arg(value_name = "FILE.toml")]
+    file: String,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate rig monitor`.
+#[derive(Debug, Args)]
+pub struct MonitorArgs {
+    /// The rig file
+    #[arg(value_name = "FILE.toml")]
+    file: String,
+    /// End after so long
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    seconds: Option<f64>,
+    /// Print one JSON object at the end instead of lines
+    #[arg(long)]
+    json: bool,
+}
+
+fn seconds(text: &str) -> Result<f64, String> {
+    text.parse()
+        .ok()
+        .filter(|seconds: &f64| (0.1..=1e6).contains(seconds))
+        .ok_or_else(|| "give 0.1 to 1000000".to_owned())
+}
+
+impl RigCommand {
+    /// Whether one object is printed.
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Detect(args) => args.json,
+            Self::Check(args) => args.json,
+            Self::Monitor(args) => args.json,
+        }
+    }
+}
+
+/// Does it.
+pub(super) fn run(command: &RigCommand, output: &Output) -> Result<(), Failure> {
+    match command {
+        RigCommand::Detect(args) => detect(args, output),
+        RigCommand::Check(args) => check(args, output),
+        RigCommand::Monitor(args) => monitor(args, output),
+    }
+}
+
+#[derive(Serialize)]
+struct Port {
+    at: String,
+    description: String,
+    device: Option<&'static str>,
+    says: Option<String>,
+    error: Option<String>,
+}
+
+fn detect(args: &DetectArgs, output: &Output) -> Result<(), Failure> {
+    let mut ports: Vec<Port> = Vec::new();
+    let place = |at: &str, description: String| Port {
+        at: at.to_owned(),
+        description,
+        device: None,
+        says: None,
+        error: None,
+    };
+    if args.at.is_empty() {
+        for port in list_ports().map_err(|err| Failure::Failed(err.to_string()))? {
+            ports.push(place(&port.name, port.description));
+        }
+    } else {
+        ports.extend(args.at.iter().map(|at| place(at, String::new())));
+    }
+    let bar = output.count_bar(ports.len() as u64);
+    if args.ask || !args.at.is_empty() {
+        for port in &mut ports {
+            bar.set_message(port.at.clone());
+            match who_is_at(&port.at, args.baud) {
+                Ok(found) => {
+                    port.device = found.device();
+                    port.says = Some(found.to_string());
+                }
+                Err(sentence) => port.error = Some(sentence),
+            }
+            bar.inc(1);
+        }
+    }
+    bar.finish_and_clear();
+    output.result(
+        &serde_json::json!({ "command": "rig detect", "ports": ports }),
+        || detected(&ports),
+    );
+    Ok(())
+}
+
+fn who_is_at(at: &str, baud: u32) -> Result<Found, String> {
+    // A name with a number behind the last colon is an address; ports of Windows end in their colon.
+    let is_address = at
+        .rsplit_once(':')
+        .is_some_and(|(host, port)| !host.is_empty() && port.parse::<u16>().is_ok());
+    let place = if is_address {
+        Place::Tcp(at.to_owned())
+    } else {
+        Place::Serial {
+            port: at.to_owned(),
+            baud,
+            has_handshake: false,
+        }
+    };
+    let mut link = place.open().map_err(|err| err.to_string())?;
+    ask(link.as_mut(), &driver_clock()).map_err(|err| format!("the link failed: {err}"))
+}
+
+fn detected(ports: &[Port]) -> String {
+    if ports.is_empty() {
+        return "no serial port; plug in the device, or give --at HOST:PORT for one on a network"
+            .into();
+    }
+    let lines = ports.iter().map(|port| {
+        let words = [
+            Some(port.description.as_str()).filter(|words| !words.is_empty()),
+            port.says.as_deref(),
+            port.error.as_deref(),
+        ];
+        let words: Vec<&str> = words.into_iter().flatten().collect();
+        format!("{}  {}", port.at, words.join("; "))
+    });
+    lines.collect::<Vec<String>>().join("\n")
+}
+
+#[derive(Serialize)]
+struct LinkObject {
+    device: String,
+    round_trip_min_s: f64,
+    round_trip_mean_s: f64,
+    round_trip_max_s: f64,
+    jitter_s: f64,
+    answers: u64,
+    in_flight: usize,
+    resynchronised: u64,
+}
+
+fn links(rig: &dyn Rig) -> Vec<LinkObject> {
+    let object = |(device, stats): (String, LinkStats)| LinkObject {
+        device,
+        round_trip_min_s: stats.round_trip_min.seconds().0,
+        round_trip_mean_s: stats.round_trip_mean.seconds().0,
+        round_trip_max_s: stats.round_trip_max.seconds().0,
+        jitter_s: stats.jitter().seconds().0,
+        answers: stats.answers,
+        in_flight: stats.in_flight,
+        resynchronised: stats.resynchronised,
+    };
+    rig.links().into_iter().map(object).collect()
+}
+
+fn link_lines(links: &[LinkObject]) -> impl Iterator<Item = String> {
+    links.iter().map(|link| {
+        format!(
+            "link       {}: {:.2} ms there and back ({:.2} to {:.2}), jitter {:.2} ms, {} lost and found again",
+            link.device,
+            link.round_trip_mean_s * 1e3,
+            link.round_trip_min_s * 1e3,
+            link.round_trip_max_s * 1e3,
+            link.jitter_s * 1e3,
+            link.resynchronised
+        )
+    })
+}
+
+fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+    let (rig, _lock) = open_rig_file(&args.file)?;
+    let about = rig.description();
+    let links = links(rig.as_ref());
+    let object = serde_json::json!({ "command": "rig check", "rig": about, "links": links });
+    output.result(&object, || {
+        let mut lines = vec![
+            format!("rig        {}", about.name),
+            format!("is         {}", about.identity),
+            format!(
+                "axis       {} mm a pulse, travel {}, at most {}, {} mm/s2",
+                about.mm_per_pulse, about.travel, about.speed_max, about.acceleration.0
+            ),
+            format!(
+                "samples    one in {:.2} ms or less, within {:.2} ms of the command",
+                about.tick().0 * about.ticks_per_sample * 1e3,
+                about.pulse_lag.0 * 1e3
+            ),
+        ];
+        lines.extend(link_lines(&links));
+        lines.push("It is as its file says. Nothing has moved.".into());
+        lines.join("\n")
+    });
+    Ok(())
+}
+
+/// What came in a stretch of time.
+#[derive(Clone, Copy, Default)]
+struct Stretch {
+    samples: u64,
+    sum_v: f64,
+    min_v: f64,
+    max_v: f64,
+    age_max: Nanos,
+    longest_gap: u64,
+}
+
+impl Stretch {
+    fn take(&mut self, reading: &Reading, ticks: u64) {
+        let volts = reading.volts.0;
+        if self.samples == 0 {
+            (self.min_v, self.max_v) = (volts, volts);
+        }
+        self.samples += 1;
+        self.sum_v += volts;
+        self.min_v = self.min_v.min(volts);
+        self.max_v = self.max_v.max(volts);
+        self.age_max = self.age_max.max(reading.age_max.unwrap_or_default());
+        self.longest_gap = self.longest_gap.max(ticks);
+    }
+
+    fn add(&mut self, other: &Self) {
+        if other.samples == 0 {
+            return;
+        }
+        let is_first = self.samples == 0;
+        self.min_v = if is_first {
+            other.min_v
+        } else {
+            self.min_v.min(other.min_v)
+        };
+        self.max_v = if is_first {
+            other.max_v
+        } else {
+            self.max_v.max(other.max_v)
+        };
+        self.samples += other.samples;
+        self.sum_v += other.sum_v;
+        self.age_max = self.age_max.max(other.age_max);
+        self.longest_gap = self.longest_gap.max(other.longest_gap);
+    }
+
+    fn mean_v(&self) -> Option<f64> {
+        (self.samples > 0).then(|| self.sum_v / self.samples as f64)
+    }
+}
+
+fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
+    let (mut rig, _lock) = open_rig_file(&args.file)?;
+    let is_asked_to_end = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&is_asked_to_end);
+    ctrlc::set_handler(move || asked.store(true, Ordering::Relaxed)).map_err(Failure::failed)?;
+    let clock = driver_clock();
+    let length = args.seconds.map(|seconds| Nanos((seconds * 1e9) as u64));
+    let (mut whole, mut recent) = (Stretch::default(), Stretch::default());
+    let (mut newest, mut told_at): (Option<Reading>, Nanos) = (None, Nanos::ZERO);
+    let mut faults = Vec::new();
+    let end = loop {
+        let now = clock();
+        if is_asked_to_end.load(Ordering::Relaxed) || length.is_some_and(|length| now >= length) {
+            break now;
+        }
+        while let Some(event) = rig.next_event(clock() + LOOK_EVERY) {
+            match event.body {
+                RigEventBody::Reading(reading) => {
+                    let before = newest.map_or(reading.tick, |newest| newest.tick);
+                    recent.take(&reading, reading.tick.saturating_sub(before));
+                    newest = Some(reading);
+                }
+                RigEventBody::Ack(_) => {}
+                RigEventBody::Fault(fault) => faults.push(fault.to_string()),
+            }
+            if clock().since(told_at) >= TELL_EVERY {
+                break;
+            }
+        }
+        // What is exchanged is nobody's.
+        drop(rig.take_raw());
+        if let Some(fault) = faults.first() {
+            return Err(Failure::Failed(format!("{}: {fault}", args.file)));
+        }
+        let now = clock();
+        let since = now.since(told_at);
+        if since >= TELL_EVERY {
+            output.text_only(|| told(rig.as_ref(), newest.as_ref(), &recent, since));
+            whole.add(&recent);
+            (recent, told_at) = (Stretch::default(), now);
+        }
+    };
+    whole.add(&recent);
+    let links = links(rig.as_ref());
+    let tick = rig.description().tick().0;
+    let object = serde_json::json!({
+        "command": "rig monitor",
+        "rig": rig.description().name,
+        "seconds": end.seconds().0,
+        "samples": whole.samples,
+        "samples_per_s": whole.samples as f64 / end.seconds().0,
+        "signal_mean_V": whole.mean_v(),
+        "signal_min_V": (whole.samples > 0).then_some(whole.min_v),
+        "signal_max_V": (whole.samples > 0).then_some(whole.max_v),
+        "age_max_s": whole.age_max.seconds().0,
+        "longest_gap_s": whole.longest_gap as f64 * tick,
+        "pulses": newest.map(|reading| reading.pulses),
+        "position_mm": newest.map(|reading| place_mm(rig.as_ref(), &reading)),
+        "links": links,
+    });
+    output.result(&object, || {
+        let mut lines = vec![format!(
+            "samples    {} in {:.1} s, {:.1} a second, at most {:.2} ms apart",
+            whole.samples,
+            end.seconds().0,
+            whole.samples as f64 / end.seconds().0,
+            whole.longest_gap as f64 * tick * 1e3
+        )];
+        lines.extend(link_lines(&links));
+        lines.join("\n")
+    });
+    Ok(())
+}
+
+fn place_mm(rig: &dyn Rig, reading: &Reading) -> f64 {
+    position_from_pulses(reading.pulses, rig.description().mm_per_pulse).0
+}
+
+/// A line of what came lately. The counter's zero is wherever the device was switched on, until it is zeroed in a run.
+fn told(rig: &dyn Rig, newest: Option<&Reading>, recent: &Stretch, since: Nanos) -> String {
+    let (Some(reading), Some(mean)) = (newest, recent.mean_v()) else {
+        return "no sample".into();
+    };
+    let named = [
+        (AxisStatus::MOVING, "moving"),
+        (AxisStatus::HOME, "home switch"),
+        (AxisStatus::FORWARD_LIMIT, "far limit switch"),
+        (AxisStatus::REVERSE_LIMIT, "limit switch behind home"),
+        (AxisStatus::MOTOR_ON, "motor on"),
+    ];
+    let states = named
+        .into_iter()
+        .filter(|(bit, _)| reading.status.has(*bit))
+        .map(|(_, name)| name);
+    let states = states.collect::<Vec<&str>>().join(", ");
+    format!(
+        "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old  {states}",
+        recent.min_v,
+        recent.max_v,
+        place_mm(rig, reading),
+        recent.samples as f64 / since.seconds().0,
+        recent.age_max.seconds().0 * 1e3
+    )
+}

@@ -1,0 +1,422 @@
+//! An emulated Grbl 1.1h board with a slide on its X axis.
+//!
+//! Facts are those of the project's documents, gnea/grbl doc/markdown/{interface,commands,jogging,settings}.md, and of
+//! what its sources do (protocol.c, system.c, report.c, planner.c); nothing is copied. [`Grbl`] is the board alone,
+//! moved by [`super::bench::Bench`], which has the slide and the load cell.
+
+mod eeprom;
+mod gcode;
+mod homing;
+mod lines;
+mod planner;
+mod report;
+
+pub use eeprom::Eeprom;
+
+use super::DeviceFault;
+use super::bench::{EmulatedAxis, Switches};
+use gcode::Modes;
+use homing::Homing;
+use palpate_model::Nanos;
+use planner::{AXES, Place, Planner};
+use std::collections::VecDeque;
+
+/// `RX_BUFFER_SIZE` (serial.h).
+const RX_MAX: usize = 128;
+/// Longest line: `LINE_BUFFER_SIZE` 80 less its end (protocol.h).
+const LINE_MAX: usize = 79;
+/// A feed is at least this, in mm/min (`MINIMUM_FEED_RATE`, config.h).
+const FEED_MIN: f64 = 1.0;
+/// From the reset of an Uno to the first words of its program: its boot loader waits for a new one so long.
+const BOOT: Nanos = Nanos::from_millis(1_500);
+
+/// How the slide's switches are wired.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum HomeWiring {
+    /// Home and the far limit on the X limit pin.
+    #[default]
+    Limit,
+    /// Home on the probe pin, both limits on the X limit pin.
+    Probe,
+}
+
+/// What kind of board.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GrblSettings {
+    /// What it has stored.
+    pub eeprom: Eeprom,
+    /// Its switches.
+    pub home: HomeWiring,
+    /// Way of the slide for a step of the motor, in mm.
+    pub mm_per_step: f64,
+    /// The memory was never written: the first start says `error:7` and fills it.
+    pub is_unused: bool,
+}
+
+impl Default for GrblSettings {
+    fn default() -> Self {
+        Self {
+            eeprom: Eeprom::slide(),
+            home: HomeWiring::Limit,
+            mm_per_step: 0.0025,
+            is_unused: false,
+        }
+    }
+}
+
+/// Machine state (doc/markdown/interface.md).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum State {
+    Idle,
+    Run,
+    Jog,
+    Hold,
+    Alarm,
+    Home,
+    Check,
+    Sleep,
+}
+
+/// The board.
+#[derive(Clone, Debug)]
+pub struct Grbl {
+    settings: GrblSettings,
+    eeprom: Eeprom,
+    state: State,
+    /// After a hard or soft limit nothing but a reset is heard.
+    is_waiting_for_reset: bool,
+    is_cancelling: bool,
+    /// Silent until then.
+    boots_at: Option<Nanos>,
+    is_first_start: bool,
+    now: Nanos,
+    rx: VecDeque<u8>,
+    line: Vec<u8>,
+    is_comment: Option<u8>,
+    is_overlong: bool,
+    /// A line that waits for room in the planner.
+    waiting: Option<gcode::Motion>,
+    tx: Vec<u8>,
+    planner: Planner,
+    modes: Modes,
+    offset: Place,
+    probed: (Place, bool),
+    is_probing: bool,
+    homing: Option<Homing>,
+    steps: [i64; AXES],
+    /// What the counter reads less than it did, in mm, not told yet.
+    shift: f64,
+    speed: f64,
+    switches: Switches,
+    was_limit: bool,
+    is_asked: bool,
+    reports: report::Counters,
+    is_wrong: bool,
+}
+
+impl Grbl {
+    /// As it is switched on.
+    #[must_use]
+    pub fn new(settings: GrblSettings) -> Self {
+        let mut grbl = Self {
+            eeprom: settings.eeprom.clone(),
+            state: State::Idle,
+            is_waiting_for_reset: false,
+            is_cancelling: false,
+            boots_at: None,
+            is_first_start: settings.is_unused,
+            now: Nanos::ZERO,
+            rx: VecDeque::new(),
+            line: Vec::new(),
+            is_comment: None,
+            is_overlong: false,
+            waiting: None,
+            tx: Vec::new(),
+            planner: Planner::default(),
+            modes: Modes::default(),
+            offset: [0.0; AXES],
+            probed: ([0.0; AXES], false),
+            is_probing: false,
+            homing: None,
+            steps: [0; AXES],
+            shift: 0.0,
+            speed: 0.0,
+            switches: Switches::default(),
+            was_limit: false,
+            is_asked: false,
+            reports: report::Counters::default(),
+            is_wrong: false,
+            settings,
+        };
+        grbl.power_up();
+        grbl
+    }
+
+    /// Its supply has come, or the converter has reset it: the position is forgotten (main.c).
+    fn power_up(&mut self) {
+        self.steps = [0; AXES];
+        self.state = if self.eeprom.flag(22) {
+            State::Alarm
+        } else {
+            State::Idle
+        };
+        self.say_hello();
+    }
+
+    /// What follows every reset: the position stays, lines and blocks go.
+    fn say_hello(&mut self) {
+        self.rx.clear();
+        self.line.clear();
+        (self.is_comment, self.is_overlong) = (None, false);
+        self.waiting = None;
+        self.modes = Modes::default();
+        self.homing = None;
+        self.is_probing = false;
+        self.is_cancelling = false;
+        self.is_waiting_for_reset = false;
+        self.is_asked = false;
+        self.speed = 0.0;
+        self.reports = report::Counters::default();
+        self.planner.clear(self.machine());
+        if std::mem::take(&mut self.is_first_start) {
+            // Observed with 1.1h compiled for a PC: unused memory is reported, then listed.
+            self.say("error:7\r\n");
+            let listing = self.eeprom.listing();
+            self.say(&listing);
+        }
+        let hello = if self.is_wrong {
+            "\r\nGrbl 0.9j ['$' for help]\r\n"
+        } else {
+            "\r\nGrbl 1.1h ['$' for help]\r\n"
+        };
+        self.say(hello);
+        if self.eeprom.flag(21) && self.is_limit() {
+            self.say("[MSG:Check Limits]\r\n");
+            self.state = State::Alarm;
+        }
+        self.was_limit = self.is_limit();
+        if matches!(self.state, State::Alarm | State::Sleep) {
+            self.say("[MSG:'$H'|'$X' to unlock]\r\n");
+            self.state = State::Alarm;
+        } else {
+            self.state = State::Idle;
+        }
+    }
+
+    fn say(&mut self, text: &str) {
+        self.tx.extend_from_slice(text.as_bytes());
+    }
+
+    fn steps_per_mm(&self, axis: usize) -> f64 {
+        self.eeprom.get(100 + axis as u16).max(1e-3)
+    }
+
+    /// Where it is, in mm of the machine's coordinates.
+    fn machine(&self) -> Place {
+        std::array::from_fn(|axis| self.steps[axis] as f64 / self.steps_per_mm(axis))
+    }
+
+    fn limits(&self) -> [(f64, f64); AXES] {
+        std::array::from_fn(|axis| {
+            let axis = axis as u16;
+            (
+                self.eeprom.get(110 + axis) / 60.0,
+                self.eeprom.get(120 + axis),
+            )
+        })
+    }
+
+    fn is_limit(&self) -> bool {
+        let Switches {
+            is_home,
+            is_forward,
+            is_reverse,
+        } = self.switches;
+        match self.settings.home {
+            HomeWiring::Limit => is_home || is_reverse || is_forward,
+            HomeWiring::Probe => is_reverse || is_forward,
+        }
+    }
+
+    fn is_probe(&self) -> bool {
+        self.settings.home == HomeWiring::Probe && self.switches.is_home
+    }
+
+    fn is_moving(&self) -> bool {
+        matches!(self.state, State::Run | State::Jog | State::Home)
+            || (self.state == State::Hold && !self.planner.is_idle())
+    }
+
+    /// An alarm, after which the axis stands still at once.
+    fn alarm(&mut self, code: u8, is_critical: bool) {
+        self.say(&format!("ALARM:{code}\r\n"));
+        self.planner.clear(self.machine());
+        self.waiting = None;
+        self.homing = None;
+        self.is_probing = false;
+        self.is_cancelling = false;
+        self.speed = 0.0;
+        self.state = State::Alarm;
+        if is_critical {
+            self.say("[MSG:Reset to continue]\r\n");
+            self.is_waiting_for_reset = true;
+        }
+    }
+
+    /// Ctrl-X (motion_control.c, `mc_reset`).
+    fn reset(&mut self) {
+        if self.homing.is_some() {
+            self.alarm(6, false);
+        } else if self.is_moving() {
+            self.alarm(3, false);
+        }
+        self.say_hello();
+    }
+
+    /// A byte that is never queued; `false` for all others.
+    fn real_time(&mut self, byte: u8) -> bool {
+        match byte {
+            b'?' => self.is_asked = self.homing.is_none() && !self.is_waiting_for_reset,
+            0x18 => self.reset(),
+            _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
+            0x85 if self.state == State::Jog => {
+                self.is_cancelling = true;
+                self.planner.hold();
+            }
+            // A hold of a jog is its end (doc/markdown/jogging.md).
+            b'!' if self.state == State::Jog => {
+                self.is_cancelling = true;
+                self.planner.hold();
+            }
+            b'!' if self.state == State::Run || self.state == State::Idle => {
+                self.state = State::Hold;
+                self.planner.hold();
+            }
+            b'~' if self.state == State::Hold && self.planner.is_idle() => {
+                self.planner.resume();
+                self.state = State::Idle;
+                self.start();
+            }
+            b'!' | b'~' | 0x80.. => {}
+            _ => return false,
+        }
+        true
+    }
+
+    /// Blocks that wait begin (`protocol_auto_cycle_start`).
+    fn start(&mut self) {
+        if self.state == State::Idle && !self.planner.is_idle() {
+            self.state = State::Run;
+        }
+    }
+
+    /// The axis for a millisecond.
+    fn step(&mut self) {
+        if let Some(homing) = self.homing.take() {
+            self.home(homing);
+        } else if let Some(point) = self.planner.advance() {
+            for axis in 0..AXES {
+                self.steps[axis] = (point.place[axis] * self.steps_per_mm(axis)).round() as i64;
+            }
+            self.speed = point.speed;
+            if self.is_probing && self.is_probe() {
+                self.probed = (self.machine(), true);
+                self.planner.hold();
+            }
+        }
+        if self.homing.is_none() && self.planner.is_idle() {
+            self.speed = 0.0;
+            match self.state {
+                State::Jog | State::Run if self.is_cancelling || self.is_probing => {
+                    self.finish_early();
+                }
+                State::Jog | State::Run => self.state = State::Idle,
+                _ => {}
+            }
+        }
+        let is_limit = self.is_limit();
+        let is_closing = is_limit && !std::mem::replace(&mut self.was_limit, is_limit);
+        if is_closing && self.eeprom.flag(21) && self.homing.is_none() && self.state != State::Alarm
+        {
+            self.alarm(1, true);
+        }
+    }
+
+    /// A jog was cancelled, or a probing has ended.
+    fn finish_early(&mut self) {
+        self.planner.clear(self.machine());
+        self.is_cancelling = false;
+        self.state = State::Idle;
+        if std::mem::take(&mut self.is_probing) {
+            if self.probed.1 {
+                self.say_probe();
+                self.say("ok\r\n");
+            } else {
+                self.probed = (self.machine(), false);
+                self.say_probe();
+                self.alarm(5, false);
+                self.say("ok\r\n");
+            }
+        }
+    }
+}
+
+impl EmulatedAxis for Grbl {
+    fn receive(&mut self, now: Nanos, bytes: &[u8]) {
+        self.now = now;
+        if self.boots_at.is_some() {
+            // The boot loader takes them for itself.
+            return;
+        }
+        for byte in bytes {
+            if !self.real_time(*byte) && self.rx.len() < RX_MAX {
+                self.rx.push_back(*byte);
+            }
+        }
+        self.read_lines();
+    }
+
+    fn advance(&mut self, now: Nanos, switches: Switches) {
+        self.now = now;
+        self.switches = switches;
+        if let Some(at) = self.boots_at {
+            if now < at {
+                return;
+            }
+            self.boots_at = None;
+            self.power_up();
+        }
+        self.step();
+        self.read_lines();
+        if std::mem::take(&mut self.is_asked) {
+            self.say_status();
+        }
+    }
+
+    fn place_mm(&self) -> f64 {
+        self.steps[0] as f64 * self.settings.mm_per_step
+    }
+
+    fn transmit(&mut self) -> Vec<u8> {
+        std::mem::take(&mut self.tx)
+    }
+
+    fn take_shift(&mut self) -> f64 {
+        std::mem::take(&mut self.shift)
+    }
+
+    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        match fault {
+            DeviceFault::Reset if is_on => {
+                self.shift += self.place_mm();
+                self.tx.clear();
+                self.planner.clear([0.0; AXES]);
+                self.steps = [0; AXES];
+                self.state = State::Idle;
+                self.boots_at = Some(now + BOOT);
+            }
+            DeviceFault::WrongDevice => self.is_wrong = is_on,
+            _ => {}
+        }
+    }
+}

@@ -1,0 +1,132 @@
+//! Status reports and what the queries print (doc/markdown/interface.md; forms as in report.c).
+
+use super::planner::{AXES, Place};
+use super::{Grbl, RX_MAX, State};
+use std::fmt::Write;
+
+/// Reports between two that carry the offset or the overrides: 30 and 20 in motion, 10 at rest (config.h).
+const OFFSET_BUSY: u32 = 30;
+const OVERRIDES_BUSY: u32 = 20;
+const REST: u32 = 10;
+
+/// Reports still to come before the fields that come now and then.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Counters {
+    offset: u32,
+    overrides: u32,
+}
+
+fn list(place: &Place) -> String {
+    format!("{:.3},{:.3},{:.3}", place[0], place[1], place[2])
+}
+
+impl Grbl {
+    pub(super) fn say_status(&mut self) {
+        let name = match self.state {
+            State::Idle => "Idle",
+            State::Run => "Run",
+            State::Jog => "Jog",
+            State::Hold if self.planner.is_idle() => "Hold:0",
+            State::Hold => "Hold:1",
+            State::Alarm => "Alarm",
+            State::Home => "Home",
+            State::Check => "Check",
+            State::Sleep => "Sleep",
+        };
+        let inch = if self.eeprom.flag(13) {
+            1.0 / 25.4
+        } else {
+            1.0
+        };
+        let scaled = |place: Place| place.map(|mm| mm * inch);
+        let mask = self.eeprom.get(10) as u32;
+        let here = self.machine();
+        let mut text = if mask & 1 == 0 {
+            let work = std::array::from_fn(|axis| here[axis] - self.offset[axis]);
+            format!("<{name}|WPos:{}", list(&scaled(work)))
+        } else {
+            format!("<{name}|MPos:{}", list(&scaled(here)))
+        };
+        // Writing to a String cannot fail.
+        if mask & 2 != 0 {
+            let _ = write!(
+                text,
+                "|Bf:{},{}",
+                self.planner.free(),
+                RX_MAX - self.rx.len()
+            );
+        }
+        let _ = write!(text, "|FS:{:.0},0", self.speed * 60.0 * inch);
+        if self.is_probe() || self.is_limit() {
+            text.push_str("|Pn:");
+            if self.is_probe() {
+                text.push('P');
+            }
+            if self.is_limit() {
+                text.push('X');
+            }
+        }
+        let is_busy = self.is_moving();
+        let again = |busy| if is_busy { busy } else { REST };
+        if self.reports.offset == 0 {
+            self.reports.offset = again(OFFSET_BUSY);
+            // The overrides follow in the next report.
+            self.reports.overrides = self.reports.overrides.max(1);
+            let _ = write!(text, "|WCO:{}", list(&scaled(self.offset)));
+        } else if self.reports.overrides == 0 {
+            self.reports.overrides = again(OVERRIDES_BUSY);
+            text.push_str("|Ov:100,100,100");
+        }
+        self.reports.offset = self.reports.offset.saturating_sub(1);
+        self.reports.overrides = self.reports.overrides.saturating_sub(1);
+        text.push_str(">\r\n");
+        self.say(&text);
+    }
+
+    pub(super) fn say_probe(&mut self) {
+        let (place, is_found) = self.probed;
+        self.say(&format!(
+            "[PRB:{}:{}]\r\n",
+            list(&place),
+            u8::from(is_found)
+        ));
+    }
+
+    pub(super) fn say_offsets(&mut self) {
+        for name in [
+            "G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92",
+        ] {
+            let place = if name == "G92" {
+                self.offset
+            } else {
+                [0.0; AXES]
+            };
+            self.say(&format!("[{name}:{}]\r\n", list(&place)));
+        }
+        self.say("[TLO:0.000]\r\n");
+        self.say_probe();
+    }
+
+    pub(super) fn say_modes(&mut self) {
+        let motion = match self.modes.motion {
+            38 => "38.2".to_owned(),
+            other => other.to_string(),
+        };
+        let units = if self.modes.is_inch { 20 } else { 21 };
+        let distance = if self.modes.is_relative { 91 } else { 90 };
+        self.say(&format!(
+            "[GC:G{motion} G54 G17 G{units} G{distance} G94 M5 M9 T0 F{:.0} S0]\r\n",
+            self.modes.feed
+        ));
+    }
+
+    pub(super) fn say_build(&mut self) {
+        let version = if self.is_wrong {
+            "0.9j.20160303"
+        } else {
+            "1.1h.20190830"
+        };
+        let info = self.eeprom.build_info.clone();
+        self.say(&format!("[VER:{version}:{info}]\r\n[OPT:V,15,128]\r\n"));
+    }
+}

@@ -1,0 +1,266 @@
+//! How samples are taken: the link is measured, and record arrays are set up where they are worth it.
+
+use super::console::{ANSWER_MAX, Console};
+use super::model::GalilOpenError;
+use super::recording::{self, ARRAYS, Look, Plan};
+use super::sampling::Sampler;
+use super::session::Pace;
+use super::settings::{GalilSettings, Sampling};
+use crate::wire::LinkStats;
+use palpate_model::Nanos;
+
+/// Single questions by which the link is measured, and questions in a row that show what it carries.
+const SINGLE: usize = 10;
+const ROW: usize = 12;
+/// More questions would only wait in the controller's input buffer, before a stop.
+const IN_FLIGHT_MAX: usize = 8;
+/// Elements of each array, tried in turn: of 8000 elements that the smallest boards are said to have, half are left to
+/// others; at 512 a second a thousand hold two seconds.
+const RINGS: [i64; 3] = [1000, 500, 250];
+/// Questions by which the sample of element 0 is found, at least and at most.
+const ANCHORS: std::ops::Range<usize> = 16..96;
+/// `RC n` tried in turn: every second sample, every fourth, every eighth.
+const INTERVALS: std::ops::RangeInclusive<u32> = 1..=3;
+/// Bytes of an element in all four arrays, such as ` 4095, 2000, 15, 0` with its commas.
+const ELEMENT_BYTES: f64 = 20.0;
+/// Bytes of the answers that come with a fetch: a question's and four line ends.
+const FETCH_BYTES: f64 = 60.0;
+/// Share of what the link carries that fetching may take; the rest is for stops, the watchdog and jitter.
+const LOAD_MAX: f64 = 0.7;
+/// Between two fetches at least: two samples of 512 a second, and nobody needs younger ones.
+const FETCH_EVERY: Nanos = Nanos::from_millis(4);
+/// How old samples may be when they arrive: the shortest silence that stops a run (20 ms at speed), less what a computer
+/// with much else to do takes.
+const AGE_MAX: Nanos = Nanos::from_millis(15);
+
+/// What the link does.
+#[derive(Clone, Copy, Debug)]
+pub struct Measured {
+    /// Round trips.
+    pub stats: LinkStats,
+    /// From one answer to the next when many are asked in a row.
+    apart: Nanos,
+    /// Bytes of an answer.
+    answer_bytes: f64,
+}
+
+/// How long an answer takes alone, and how fast answers come in a row.
+pub fn measure(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+) -> Result<Measured, GalilOpenError> {
+    let question = Sampler::question(settings);
+    let mut stats = LinkStats::default();
+    for _ in 0..SINGLE {
+        let asked = console.now();
+        console.ask(&question)?;
+        stats.push(console.now().since(asked));
+    }
+    let start = console.now();
+    console.write(&format!("{question}\r").repeat(ROW))?;
+    let replies = console.replies(ROW, Nanos(ROW as u64 * ANSWER_MAX.0))?;
+    if replies.len() < ROW {
+        return Err(GalilOpenError::Silent);
+    }
+    let row = console.now().since(start);
+    let apart = Nanos((row.since(stats.round_trip_mean).0 / (ROW as u64 - 1)).max(1));
+    let bytes: usize = replies.iter().map(|reply| reply.bytes.len() + 3).sum();
+    Ok(Measured {
+        stats,
+        apart,
+        answer_bytes: bytes as f64 / ROW as f64,
+    })
+}
+
+impl Measured {
+    /// How to ask for samples one by one.
+    pub fn polling(&self, tick: Nanos) -> Pace {
+        // Sooner than a sample lasts, so that none is missed for jitter; samples told twice are dropped.
+        let every = self.apart.max(Nanos(tick.0 * 6 / 10));
+        let trip = self.stats.round_trip_mean;
+        let in_flight = (trip.0.div_ceil(every.0.max(1)) as usize + 1).clamp(2, IN_FLIGHT_MAX);
+        Pace {
+            every,
+            in_flight,
+            tick,
+        }
+    }
+
+    /// How to fetch elements of 2^n samples, and how old they are when they arrive; `None` when the link carries less.
+    fn fetching(&self, tick: Nanos, n: u32) -> Option<(Pace, Nanos)> {
+        let bytes_per_ns = self.answer_bytes / self.apart.0 as f64;
+        let interval = (tick.0 << n) as f64;
+        let left = LOAD_MAX * bytes_per_ns - ELEMENT_BYTES / interval;
+        if left <= 0.0 {
+            return None;
+        }
+        let every = Nanos((FETCH_BYTES / left) as u64)
+            .max(FETCH_EVERY)
+            .max(Nanos(self.stats.round_trip_mean.0 * 5 / 4));
+        let transfer = (every.0 as f64 / interval * ELEMENT_BYTES + FETCH_BYTES) / bytes_per_ns;
+        let age = Nanos(every.0 + 2 * self.stats.round_trip_mean.0 + transfer as u64);
+        let pace = Pace {
+            every,
+            in_flight: 1,
+            tick,
+        };
+        Some((pace, age))
+    }
+}
+
+/// How samples are taken from now on, in words too.
+pub struct Capture {
+    /// How to ask.
+    pub pace: Pace,
+    /// The recording, if there is one.
+    pub plan: Option<Plan>,
+    /// For the operator and the log.
+    pub words: String,
+}
+
+/// Chooses and starts it.
+pub fn set_up(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+    measured: &Measured,
+    tick: Nanos,
+) -> Result<Capture, GalilOpenError> {
+    let ms = |span: Nanos| span.0 as f64 * 1e-6;
+    let polled = |why: &str| {
+        let pace = measured.polling(tick);
+        let rate = 1e9 / pace.every.max(tick).0 as f64;
+        Capture {
+            pace,
+            plan: None,
+            words: format!("polled at up to {rate:.0} samples/s{why}"),
+        }
+    };
+    // A recording of whoever was here before takes the controller's time.
+    console.try_ask("RC 0")?;
+    if settings.sampling == Sampling::Poll {
+        return Ok(polled(""));
+    }
+    let fits = INTERVALS.filter_map(|n| Some((n, measured.fetching(tick, n)?)));
+    let chosen = fits
+        .clone()
+        .find(|(_, (_, age))| *age <= AGE_MAX)
+        .or_else(|| {
+            let is_forced = settings.sampling == Sampling::Record;
+            fits.clone().next().filter(|_| is_forced)
+        });
+    let Some((n, (pace, age))) = chosen else {
+        if settings.sampling == Sampling::Record {
+            return Err(GalilOpenError::NoRecording(
+                "the link is too slow for it".into(),
+            ));
+        }
+        return Ok(polled(
+            ", because recorded samples would be old when they come over this link",
+        ));
+    };
+    match start(console, settings, n)? {
+        Ok(plan) => Ok(Capture {
+            pace,
+            plan: Some(plan),
+            words: format!(
+                "recorded at {:.0} samples/s, each up to {:.0} ms old",
+                1e9 / (tick.0 << n) as f64,
+                ms(age).ceil()
+            ),
+        }),
+        Err(why) if settings.sampling == Sampling::Record => Err(GalilOpenError::NoRecording(why)),
+        Err(why) => Ok(polled(&format!(
+            ", because the controller does not record ({why})"
+        ))),
+    }
+}
+
+/// The letters of analog inputs 1 to 8 in `_AF` (DMC-1700/1800 user manual, page 159).
+const INPUTS: [char; 8] = ['X', 'Y', 'Z', 'W', 'E', 'F', 'G', 'H'];
+
+/// Starts a recording every 2^n samples; in words why there is none.
+fn start(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+    n: u32,
+) -> Result<Result<Plan, String>, GalilOpenError> {
+    for name in ARRAYS {
+        // Those of another ring, if palpate was here before.
+        console.try_ask(&format!("DA {name}[]"))?;
+    }
+    let mut ring = None;
+    for length in RINGS {
+        let arrays = ARRAYS.map(|name| format!("{name}[{length}]")).join(",");
+        if console.try_ask(&format!("DM {arrays}"))?.is_accepted {
+            ring = Some(length);
+            break;
+        }
+        for name in ARRAYS {
+            console.try_ask(&format!("DA {name}[]"))?;
+        }
+    }
+    let Some(ring) = ring else {
+        return Ok(Err("it has no room for arrays".into()));
+    };
+    let (a, input) = (settings.axis, INPUTS[usize::from(settings.input - 1) % 8]);
+    let arrays = ARRAYS.map(|name| format!("{name}[]")).join(",");
+    for command in [
+        format!("RA {arrays}"),
+        format!("RD _AF{input},_DE{a},_TS{a},_SC{a}"),
+        format!("RC {n},-{ring}"),
+    ] {
+        if !console.try_ask(&command)?.is_accepted {
+            let why = console.try_ask("TC1")?.text();
+            return Ok(Err(format!("it refuses {command}: {why}")));
+        }
+    }
+    anchor(console, settings, 1 << n, ring)
+}
+
+/// Which sample each element is of: the earliest `TIME` at which an element is the newest is that at which it was
+/// written.
+fn anchor(
+    console: &mut Console<'_>,
+    settings: &GalilSettings,
+    interval: i64,
+    ring: i64,
+) -> Result<Result<Plan, String>, GalilOpenError> {
+    let question = recording::question(settings);
+    let mut rough: Option<i64> = None;
+    let (mut least, mut most, mut count) = (i64::MAX, i64::MIN, 0);
+    while count < ANCHORS.end {
+        // Questions at one pace with the samples would always meet the same one.
+        for _ in 0..count % 4 {
+            console.number("TIME")?;
+        }
+        let reply = console.ask(&question)?;
+        let Some(look) = reply.numbers().as_deref().and_then(Look::read) else {
+            return Ok(Err(
+                "its answers have other numbers than were asked for".into()
+            ));
+        };
+        count += 1;
+        if rough.is_none() && look.next == 0 {
+            continue;
+        }
+        let rough = *rough.get_or_insert(look.time - (look.next - 1) * interval);
+        let linear = (look.time - rough).div_euclid(interval);
+        let half = ring / 2;
+        let off = (look.next - 1 - linear + half).rem_euclid(ring) - half;
+        if off.abs() > 2 {
+            return Ok(Err("it does not record as often as it was told".into()));
+        }
+        let newest = linear + off;
+        let base = look.time - newest * interval;
+        (least, most) = (least.min(base), most.max(base));
+        if count >= ANCHORS.start && most - least >= interval - 1 {
+            return Ok(Ok(Plan {
+                interval,
+                ring,
+                base: least,
+                first: newest + 1,
+            }));
+        }
+    }
+    Ok(Err("its clock and its recording do not fit".into()))
+}

@@ -1,0 +1,325 @@
+//! Record arrays: the controller takes samples by itself, palpate fetches them (`RA`, `RD`, `RC`, `QU`).
+//!
+//! The controller writes one element of each array every 2^n samples, round and round. `_RD` is the element that comes
+//! next and `TIME` the sample it is now, so that the sample of every element is known exactly: element k was taken at
+//! `base + k * 2^n`. Every later pair of `_RD` and `TIME` is checked against that.
+//!
+//! DMC-1700/1800 user manual, page 159: of a recorded `_TS` only bits 0 to 4 are valid. Whether the motor is on, and
+//! whether the axis moves when its stop code does not tell, is therefore taken from the question that comes with every
+//! fetch.
+
+use super::sampling::{self, signed, ts, whole};
+use super::settings::GalilSettings;
+use crate::rig::RigEventBody;
+use std::collections::VecDeque;
+
+/// Names of the arrays: signal, pulses, switches, stop code.
+pub const ARRAYS: [&str; 4] = ["plpf", "plpd", "plps", "plpc"];
+/// Elements that are about to be written over are not fetched any more.
+const MARGIN: i64 = 32;
+/// Elements of one array fetched at once: a stop is answered behind them.
+const CHUNK_MAX: i64 = 64;
+/// Samples from a command to the question behind it in the same line, on slow boards.
+const SETTING_MAX: i64 = 8;
+/// Stop codes of an axis under way: independent, PVT, contour, ECAM, vector (DMC-40x0 command reference, `SC`).
+const RUNNING: [u32; 5] = [0, 30, 50, 60, 100];
+
+/// A recording that runs, as it was found when it was started.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plan {
+    /// Samples from one element to the next: 2^n.
+    pub interval: i64,
+    /// Elements of an array.
+    pub ring: i64,
+    /// `TIME` of element 0, had it been there from the beginning.
+    pub base: i64,
+    /// The first element to be fetched.
+    pub first: i64,
+}
+
+/// An answer to the question while recording.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Look {
+    /// The numbers of a poll.
+    pub poll: [f64; 6],
+    /// `TIME`.
+    pub time: i64,
+    /// `_RD`.
+    pub next: i64,
+    commanded: f64,
+    is_moving: bool,
+    is_off: bool,
+}
+
+impl Look {
+    /// Reads the answer to [`question`].
+    pub fn read(numbers: &[f64]) -> Option<Self> {
+        let &[volts, given, commanded, switches, stop_code, next, time] = numbers else {
+            return None;
+        };
+        let bits = whole(switches)? as u32;
+        Some(Self {
+            poll: [volts, given, commanded, switches, stop_code, time],
+            time: i64::try_from(whole(time)?).ok()?,
+            next: i64::try_from(whole(next)?).ok()?,
+            commanded,
+            is_moving: bits & ts::MOVING != 0 || given != commanded,
+            is_off: bits & ts::MOTOR_OFF != 0,
+        })
+    }
+}
+
+/// What comes out, in the order of the controller's clock.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Out {
+    /// The numbers of a poll, and whether a motion was begun just before.
+    Sample([f64; 6], bool),
+    /// A report that belongs behind all samples before it.
+    Event(RigEventBody),
+}
+
+/// A report or a sample out of line, which waits for the samples before it.
+#[derive(Clone, Debug)]
+struct Waiting {
+    /// Not known before the next look.
+    time: Option<i64>,
+    out: Out,
+}
+
+/// Elements that were asked for.
+#[derive(Clone, Debug)]
+struct Chunk {
+    first: i64,
+    count: i64,
+    columns: Vec<Vec<f64>>,
+}
+
+/// A look does not fit the recording.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Stopped;
+
+/// A recording that is being fetched.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    plan: Plan,
+    /// The next element to be asked for, and the newest that there is.
+    next: i64,
+    newest: i64,
+    /// The newest look and the one before.
+    look: Option<Look>,
+    earlier: Option<Look>,
+    chunk: Option<Chunk>,
+    waiting: VecDeque<Waiting>,
+    /// Pulses of the newest sample given out, and whether the axis moved.
+    given: Option<f64>,
+    is_moving: bool,
+    /// The newest sample given out.
+    told: i64,
+    /// Elements that were written over before they were fetched.
+    pub lost: u64,
+}
+
+/// The question while recording: that of polls, and the next element before the clock.
+#[must_use]
+pub fn question(settings: &GalilSettings) -> String {
+    let (input, a) = (settings.input, settings.axis);
+    format!("MG @AN[{input}]{{F3.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
+}
+
+impl Recording {
+    /// Of a recording that was started.
+    #[must_use]
+    pub fn new(plan: Plan) -> Self {
+        Self {
+            next: plan.first,
+            newest: plan.first - 1,
+            plan,
+            look: None,
+            earlier: None,
+            chunk: None,
+            waiting: VecDeque::new(),
+            given: None,
+            is_moving: false,
+            told: i64::MIN,
+            lost: 0,
+        }
+    }
+
+    fn time_of(&self, element: i64) -> i64 {
+        self.plan.base + element * self.plan.interval
+    }
+
+    /// A report that belongs behind all samples that the controller has taken so far.
+    pub fn hold(&mut self, event: RigEventBody) {
+        self.waiting.push_back(Waiting {
+            time: None,
+            out: Out::Event(event),
+        });
+    }
+
+    /// Everything that waits, whatever samples are missing before it.
+    pub fn drain(&mut self) -> Vec<Out> {
+        let waiting = std::mem::take(&mut self.waiting);
+        waiting.into_iter().map(|waiting| waiting.out).collect()
+    }
+
+    /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits.
+    pub fn look(&mut self, look: Look, marked: Option<bool>) -> Result<(), Stopped> {
+        let expected = (look.time - self.plan.base).div_euclid(self.plan.interval);
+        // The clock may have gone on by a sample between `_RD` and `TIME`.
+        let behind = (expected - (look.next - 1)).rem_euclid(self.plan.ring);
+        let is_late =
+            behind == 1 && (look.time - self.plan.base).rem_euclid(self.plan.interval) == 0;
+        if behind != 0 && !is_late {
+            return Err(Stopped);
+        }
+        self.newest = expected - behind;
+        let oldest = self.newest - self.plan.ring + MARGIN;
+        if self.next < oldest {
+            self.lost += (oldest - self.next).unsigned_abs();
+            self.next = oldest;
+            self.chunk = None;
+        }
+        for waiting in self.waiting.iter_mut().filter(|one| one.time.is_none()) {
+            waiting.time = Some(look.time);
+        }
+        if let Some(is_begun) = marked {
+            self.waiting.push_back(Waiting {
+                time: Some(look.time),
+                out: Out::Sample(look.poll, is_begun),
+            });
+        }
+        self.earlier = self.look.replace(look);
+        Ok(())
+    }
+
+    /// The commands that fetch the next elements, if there are any; nothing while others are on their way.
+    pub fn fetch(&mut self) -> Option<Vec<String>> {
+        if self.chunk.is_some() || self.next > self.newest {
+            return None;
+        }
+        let first = self.next.rem_euclid(self.plan.ring);
+        let count = (self.newest - self.next + 1)
+            .min(CHUNK_MAX)
+            .min(self.plan.ring - first);
+        self.chunk = Some(Chunk {
+            first: self.next,
+            count,
+            columns: Vec::new(),
+        });
+        let last = first + count - 1;
+        let fetch = |name| format!("QU {name}[],{first},{last},1");
+        Some(ARRAYS.map(fetch).into())
+    }
+
+    /// Whether elements are on their way.
+    #[must_use]
+    pub fn is_fetching(&self) -> bool {
+        self.chunk.is_some()
+    }
+
+    /// Forgets a fetch whose answers were lost; it will be done again.
+    pub fn give_up_fetch(&mut self) {
+        self.chunk = None;
+    }
+
+    /// Takes one array's elements; `None` when they are not what was asked for. What is complete comes out.
+    pub fn take(&mut self, column: Vec<f64>, settings: &GalilSettings) -> Option<Vec<Out>> {
+        let chunk = self.chunk.as_mut()?;
+        if i64::try_from(column.len()) != Ok(chunk.count) {
+            return None;
+        }
+        chunk.columns.push(column);
+        if chunk.columns.len() < ARRAYS.len() {
+            return Some(Vec::new());
+        }
+        let chunk = self.chunk.take()?;
+        self.next = chunk.first + chunk.count;
+        let mut out = Vec::new();
+        for at in 0..chunk.count {
+            let time = self.time_of(chunk.first + at);
+            // `at` is below the length of every column.
+            let row = |column: usize| chunk.columns[column][at as usize];
+            self.come_out(time, &mut out);
+            if time > self.told && !self.belongs_behind(time, row(1)) {
+                let poll = self.sample(time, [row(0), row(1), row(2), row(3)], settings)?;
+                self.told = time;
+                out.push(Out::Sample(poll, false));
+            }
+        }
+        out.extend(self.settled());
+        Some(out)
+    }
+
+    /// What waits for no more elements, when all that there are were fetched.
+    pub fn settled(&mut self) -> Vec<Out> {
+        let mut out = Vec::new();
+        if self.next > self.newest
+            && let Some(look) = self.look
+        {
+            self.come_out(look.time, &mut out);
+        }
+        out
+    }
+
+    /// What waits for samples before `time`.
+    fn come_out(&mut self, time: i64, out: &mut Vec<Out>) {
+        let is_due = |one: &mut Waiting| one.time.is_some_and(|at| at <= time);
+        while let Some(waiting) = self.waiting.pop_front_if(is_due) {
+            if let (Out::Sample(poll, is_begun), Some(at)) = (&waiting.out, waiting.time) {
+                if at <= self.told {
+                    continue;
+                }
+                self.told = at;
+                self.given = Some(poll[1]);
+                let is_high = whole(poll[3]).is_some_and(|bits| bits as u32 & ts::MOVING != 0);
+                self.is_moving = *is_begun || is_high || poll[1] != poll[2];
+            }
+            out.push(waiting.out);
+        }
+    }
+
+    /// A counter that was set anew while the axis rested shows it a little before the sample behind the command, and
+    /// before its acknowledgement.
+    fn belongs_behind(&self, time: i64, given: f64) -> bool {
+        let is_set_now = |one: &Waiting| {
+            let Out::Sample(poll, _) = &one.out else {
+                return false;
+            };
+            one.time.is_some_and(|at| at - time <= SETTING_MAX) && poll[1] == given
+        };
+        !self.is_moving
+            && self.given.is_some_and(|last| last != given)
+            && self.waiting.iter().any(is_set_now)
+    }
+
+    /// The numbers that a poll would have given.
+    fn sample(
+        &mut self,
+        time: i64,
+        [signal, given, switches, stop_code]: [f64; 4],
+        settings: &GalilSettings,
+    ) -> Option<[f64; 6]> {
+        let look = self.look?;
+        let code = whole(stop_code)? as u32;
+        signed(given)?;
+        let was_moving = self.is_moving;
+        let is_near_motion = look.is_moving || self.earlier.is_some_and(|one| one.is_moving);
+        let is_moving = (RUNNING.contains(&code) && is_near_motion)
+            || (was_moving
+                && (given != look.commanded
+                    || (sampling::EARLY.contains(&code) && look.is_moving)))
+            || self.given.is_some_and(|last| last != given);
+        self.given = Some(given);
+        self.is_moving = is_moving;
+        let mut bits = whole(switches)? as u32 & 0x1f;
+        if is_moving {
+            bits |= ts::MOVING;
+        }
+        if look.is_off {
+            bits |= ts::MOTOR_OFF;
+        }
+        let volts = settings.range.volts_of_recorded(signal);
+        Some([volts, given, given, f64::from(bits), stop_code, time as f64])
+    }
+}

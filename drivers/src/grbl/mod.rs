@@ -1,0 +1,19 @@
+//! A Grbl 1.1 board with a slide on one of its axes.
+//!
+//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `connect.rs`, what happens once when the
+//! board is opened. The board has no load cell: [`crate::parts`] makes a rig of it and one.
+
+mod axis;
+mod connect;
+mod error;
+mod motion;
+pub mod protocol;
+mod session;
+mod settings;
+
+pub use axis::open;
+pub use connect::{Connected, GrblOpenError, connect};
+pub use error::{Alarm, Refusal};
+pub use motion::worst_case_mm;
+pub use session::{Session, SharedTrack};
+pub use settings::{Facts, GrblSettings, HomeSwitch};

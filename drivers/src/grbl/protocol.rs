@@ -1,0 +1,240 @@
+//! What Grbl 1.1 writes, line by line (gnea/grbl, doc/markdown/interface.md): answers, alarms, status reports, messages.
+//!
+//! Bytes in, [`Incoming`] out; nothing else. Forms that older firmware or other compile options give are read too where
+//! the documents allow them.
+
+use super::error::{Alarm, Refusal};
+
+/// Longer lines are none of Grbl's: its own are at most 80 characters and a status report about 120.
+pub const LINE_MAX: usize = 256;
+
+/// Status query (doc/markdown/commands.md, real-time commands).
+pub const QUERY: u8 = b'?';
+/// Soft reset.
+pub const RESET: u8 = 0x18;
+/// Jog cancel.
+pub const JOG_CANCEL: u8 = 0x85;
+
+/// Machine states.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum State {
+    /// At rest, ready.
+    Idle,
+    /// G-code moves.
+    Run,
+    /// A jog moves.
+    Jog,
+    /// Held, `true` when at rest.
+    Hold(bool),
+    /// Locked.
+    Alarm,
+    /// The safety door is or was open.
+    Door,
+    /// G-code is checked, nothing moves.
+    Check,
+    /// Looking for home by itself.
+    Home,
+    /// Asleep until a reset.
+    Sleep,
+}
+
+impl State {
+    fn parse(text: &str) -> Option<Self> {
+        let (name, part) = text.split_once(':').unwrap_or((text, ""));
+        Some(match name {
+            "Idle" => Self::Idle,
+            "Run" => Self::Run,
+            "Jog" => Self::Jog,
+            "Hold" => Self::Hold(part == "0"),
+            "Alarm" => Self::Alarm,
+            "Door" => Self::Door,
+            "Check" => Self::Check,
+            "Home" => Self::Home,
+            "Sleep" => Self::Sleep,
+            _ => return None,
+        })
+    }
+}
+
+/// A status report. Units are those of `$13`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Status {
+    /// What it does.
+    pub state: State,
+    /// Machine position of each axis, where it is told.
+    pub machine: Option<Vec<f64>>,
+    /// Work position of each axis, where it is told instead.
+    pub work: Option<Vec<f64>>,
+    /// Work coordinate offset, told now and then.
+    pub offset: Option<Vec<f64>>,
+    /// Pins that are closed: `X`, `Y`, `Z`, `P` and others.
+    pub pins: String,
+    /// Free blocks of the planner and free bytes of the input buffer.
+    pub free: Option<(u32, u32)>,
+}
+
+impl Status {
+    /// Reads what is between `<` and `>`.
+    #[must_use]
+    pub fn parse(text: &str) -> Option<Self> {
+        let mut fields = text.split('|');
+        let mut status = Self {
+            state: State::parse(fields.next()?)?,
+            machine: None,
+            work: None,
+            offset: None,
+            pins: String::new(),
+            free: None,
+        };
+        for field in fields {
+            // Fields may come in any order, and new ones may come.
+            let Some((name, values)) = field.split_once(':') else {
+                continue;
+            };
+            match name {
+                "MPos" => status.machine = Some(numbers(values)?),
+                "WPos" => status.work = Some(numbers(values)?),
+                "WCO" => status.offset = Some(numbers(values)?),
+                "Pn" => status.pins = values.to_owned(),
+                "Bf" => {
+                    let numbers = numbers(values)?;
+                    if let [blocks, bytes] = numbers[..] {
+                        status.free = Some((blocks.max(0.0) as u32, bytes.max(0.0) as u32));
+                    }
+                }
+                _ => {}
+            }
+        }
+        // The position is in every report.
+        (status.machine.is_some() || status.work.is_some()).then_some(status)
+    }
+
+    /// Whether a pin is closed.
+    #[must_use]
+    pub fn has_pin(&self, pin: char) -> bool {
+        self.pins.contains(pin)
+    }
+}
+
+/// Numbers with commas between them; `None` when one is none.
+fn numbers(text: &str) -> Option<Vec<f64>> {
+    text.split(',').map(number).collect()
+}
+
+fn number(text: &str) -> Option<f64> {
+    let text = text.trim();
+    let is_plain = |c: char| c.is_ascii_digit() || matches!(c, '.' | '-' | '+');
+    if !text.chars().all(is_plain) {
+        return None;
+    }
+    text.parse().ok().filter(|number: &f64| number.is_finite())
+}
+
+/// One line.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Incoming {
+    /// A line was done, or planned.
+    Ok,
+    /// A line was refused.
+    Refused(Refusal),
+    /// The machine is locked.
+    Alarm(Alarm),
+    /// An answer to [`QUERY`].
+    Status(Status),
+    /// It has started: the version.
+    Hello(String),
+    /// A numbered setting.
+    Setting(u16, f64),
+    /// What is between `[` and `]`.
+    Message(String),
+    /// Anything else, such as a startup line.
+    Other(String),
+    /// More than any line of Grbl.
+    Flood,
+}
+
+impl Incoming {
+    fn parse(line: &str) -> Self {
+        let other = || Self::Other(line.to_owned());
+        if line == "ok" {
+            return Self::Ok;
+        }
+        // Words without numbers are those of version 0.9 and of some compile options: "error: Bad number format".
+        if let Some(code) = line.strip_prefix("error:") {
+            return Self::Refused(Refusal::parse(code));
+        }
+        if let Some(code) = line.strip_prefix("ALARM:") {
+            return Self::Alarm(Alarm::parse(code));
+        }
+        if let Some(inner) = line.strip_prefix('<') {
+            let inner = inner.strip_suffix('>');
+            return inner
+                .and_then(Status::parse)
+                .map_or_else(other, Self::Status);
+        }
+        if let Some(inner) = line.strip_prefix('[') {
+            let inner = inner.strip_suffix(']');
+            return inner.map_or_else(other, |inner| Self::Message(inner.to_owned()));
+        }
+        if let Some(rest) = line.strip_prefix("Grbl ") {
+            let version = rest.split(' ').next().unwrap_or_default();
+            return Self::Hello(version.to_owned());
+        }
+        if let Some((key, value)) = line.strip_prefix('$').and_then(|rest| rest.split_once('=')) {
+            // Version 0.9 has a description behind the value.
+            let value = value.split(' ').next().and_then(number);
+            if let (Ok(key), Some(value)) = (key.parse(), value) {
+                return Self::Setting(key, value);
+            }
+        }
+        other()
+    }
+}
+
+/// Takes a line apart from the bytes before and behind it.
+#[derive(Clone, Debug, Default)]
+pub struct Parser {
+    line: Vec<u8>,
+    is_flooded: bool,
+}
+
+impl Parser {
+    /// Takes one byte.
+    pub fn take(&mut self, byte: u8) -> Option<Incoming> {
+        match byte {
+            b'\r' | b'\n' => {
+                let line = std::mem::take(&mut self.line);
+                if std::mem::take(&mut self.is_flooded) {
+                    return Some(Incoming::Flood);
+                }
+                let line = String::from_utf8_lossy(&line);
+                let line = line.trim();
+                (!line.is_empty()).then(|| Incoming::parse(line))
+            }
+            _ if self.line.len() >= LINE_MAX => {
+                self.is_flooded = true;
+                None
+            }
+            _ => {
+                self.line.push(byte);
+                None
+            }
+        }
+    }
+
+    /// Forgets half a line.
+    pub fn clear(&mut self) {
+        *self = Self::default();
+    }
+}
+
+/// An absolute jog in machine coordinates: axis letter, place in mm, speed in mm/min (doc/markdown/jogging.md).
+#[must_use]
+pub fn jog(axis: char, mm: f64, mm_per_min: f64) -> String {
+    // A tenth of a micrometre is below any step; Grbl reads at most eight digits.
+    format!("$J=G21G90G53{axis}{mm:.4}F{mm_per_min:.2}\n")
+}
+
+#[cfg(test)]
+#[path = "protocol_tests.rs"]
+mod tests;

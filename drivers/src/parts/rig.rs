@@ -1,0 +1,231 @@
+//! An axis and a load cell as one rig.
+
+use super::cell_line::{CellLine, TICK};
+use super::track::Track;
+use crate::cell::{CellDescription, CellDialogue};
+use crate::rig::{Rig, RigEvent, RigEventBody};
+use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
+use palpate_model::Nanos;
+use palpate_model::rig::{Ack, AxisStatus, Fault, RawBytes, RigCommand, RigDescription};
+use std::collections::VecDeque;
+use std::io;
+use std::sync::{Arc, Mutex, PoisonError};
+use std::time::Duration;
+
+/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
+/// catch up a quarter of a second.
+const BEHIND_MAX: Nanos = Nanos::from_millis(250);
+/// Two lines are listened to in turns of this length.
+const TURN: Nanos = Nanos::from_millis(1);
+
+/// An axis in progress, and what it writes its deeds into.
+pub struct Axis {
+    /// Its thread.
+    pub line: Line,
+    /// Where it was when.
+    pub track: Arc<Mutex<Track>>,
+    /// Bytes of the time before the thread had the link.
+    pub raw: Vec<RawBytes>,
+}
+
+/// An axis and a load cell.
+pub struct PartsRig {
+    description: RigDescription,
+    newtons_per_volt: Option<f64>,
+    axis: Line,
+    cell: Line,
+    track: Arc<Mutex<Track>>,
+    clock: HostClock,
+    /// The host's clock where ticks begin.
+    start: Nanos,
+    /// The host's clock where the caller's time is zero.
+    origin: Option<Nanos>,
+    newest: Nanos,
+    refused: VecDeque<Fault>,
+    first_raw: Vec<RawBytes>,
+    /// Taken from a line, not told yet.
+    from_axis: Option<RigEvent>,
+    from_cell: Option<RigEvent>,
+    /// What the axis' own pulses are more than the caller's.
+    zero: i64,
+    /// Motions of which a sample was told.
+    motions_shown: u64,
+}
+
+impl PartsRig {
+    /// Starts to listen to a cell beside an axis that was opened. `description` is the rig's as the axis knows it;
+    /// what the cell knows is filled in.
+    pub fn new(
+        mut description: RigDescription,
+        axis: Axis,
+        link: Box<dyn Link>,
+        dialogue: Box<dyn CellDialogue>,
+        cell: &CellDescription,
+        clock: HostClock,
+    ) -> io::Result<Self> {
+        let start = clock();
+        let line = CellLine::new(dialogue, cell.rate, Arc::clone(&axis.track), start);
+        let settings = LineSettings {
+            device: "cell".into(),
+            farewell: Vec::new(),
+        };
+        let cell_line = Line::start(link, line, Arc::clone(&clock), settings)?;
+        description.identity = format!("{}; {}", description.identity, cell.identity);
+        description.tick_nanos = TICK.0;
+        description.adc = Some(cell.adc);
+        description.noise_expected = cell.noise_expected;
+        let period = 1.0 / cell.rate;
+        // A computer with much else to do may get half of the samples.
+        description.ticks_per_sample = (period * 1e9 / TICK.0 as f64).max(1.0) / 0.5;
+        // The first sample of a motion is up to a period behind its beginning.
+        description.pulse_lag.0 += 1.5 * period;
+        Ok(Self {
+            description,
+            newtons_per_volt: cell.newtons_per_volt,
+            axis: axis.line,
+            cell: cell_line,
+            track: axis.track,
+            clock,
+            start,
+            origin: None,
+            newest: Nanos::ZERO,
+            refused: VecDeque::new(),
+            first_raw: axis.raw,
+            from_axis: None,
+            from_cell: None,
+            zero: 0,
+            motions_shown: 0,
+        })
+    }
+
+    /// Newtons of a volt, where the cell itself is calibrated.
+    #[must_use]
+    pub fn newtons_per_volt(&self) -> Option<f64> {
+        self.newtons_per_volt
+    }
+
+    /// How the links of axis and cell behave.
+    #[must_use]
+    pub fn stats(&self) -> [LinkStats; 2] {
+        [self.axis.stats(), self.cell.stats()]
+    }
+
+    /// The older of what has come from axis and cell, within `wait`; the axis first.
+    fn next(&mut self, until: Nanos, end: Nanos) -> Option<RigEvent> {
+        loop {
+            if self.from_axis.is_none() {
+                self.from_axis = self.axis.next_event(until, Duration::ZERO);
+            }
+            let left = if self.from_axis.is_some() {
+                Nanos::ZERO
+            } else {
+                end.since((self.clock)())
+            };
+            if self.from_cell.is_none() {
+                let wait = Duration::from_nanos(left.min(TURN).0);
+                self.from_cell = self.cell.next_event(until, wait);
+            }
+            let is_axis_first = match (&self.from_axis, &self.from_cell) {
+                (Some(axis), Some(cell)) => axis.at <= cell.at,
+                (Some(_), None) => true,
+                (None, Some(_)) => false,
+                (None, None) if left == Nanos::ZERO => return None,
+                (None, None) => continue,
+            };
+            return if is_axis_first {
+                self.from_axis.take()
+            } else {
+                self.from_cell.take()
+            };
+        }
+    }
+
+    /// Fills in what only both parts together know.
+    fn complete(&mut self, body: RigEventBody) -> RigEventBody {
+        match body {
+            RigEventBody::Reading(mut reading) => {
+                let taken = self.start + Nanos(reading.tick * TICK.0);
+                let placed = {
+                    let track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
+                    track.at(taken)
+                };
+                reading.pulses = placed.pulses.round() as i64 - self.zero;
+                reading.status = placed.status;
+                // A motion that began and ended between two samples is shown by the second.
+                if placed.motion > std::mem::replace(&mut self.motions_shown, placed.motion) {
+                    reading.status = reading.status | AxisStatus::MOVING;
+                }
+                RigEventBody::Reading(reading)
+            }
+            RigEventBody::Ack(Ack {
+                command: RigCommand::DefinePosition { pulses },
+            }) => {
+                let track = self.track.lock().unwrap_or_else(PoisonError::into_inner);
+                self.zero = track.at((self.clock)()).pulses.round() as i64 - pulses;
+                body
+            }
+            _ => body,
+        }
+    }
+
+    /// The caller's time of a moment of the host's clock; never before what was told already.
+    fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
+        let origin = self.origin.unwrap_or(at);
+        self.newest = at.since(origin).max(self.newest).min(until);
+        self.newest
+    }
+}
+
+impl Rig for PartsRig {
+    fn description(&self) -> &RigDescription {
+        &self.description
+    }
+
+    fn send(&mut self, command: RigCommand) {
+        if self.axis.send(command).is_err() {
+            self.refused.push_back(Fault::CommandRefused {
+                detail: "too many commands at once".into(),
+            });
+        }
+    }
+
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
+        let now = (self.clock)();
+        let origin = *self
+            .origin
+            .get_or_insert_with(|| Nanos(now.0.saturating_sub(until.0)));
+        // A caller whose time stood still, as while the computer slept, begins anew.
+        let behind = now.since(origin).since(until);
+        let origin = if behind > BEHIND_MAX {
+            Nanos(now.0.saturating_sub(until.0))
+        } else {
+            origin
+        };
+        self.origin = Some(origin);
+        if let Some(fault) = self.refused.pop_front() {
+            let at = self.told(now, until);
+            return Some(RigEvent::arrived(at, RigEventBody::Fault(fault)));
+        }
+        let end = origin + until;
+        let event = self.next(end, end)?;
+        let at = self.told(event.at, until);
+        let body = self.complete(event.body);
+        Some(RigEvent::arrived(at, body))
+    }
+
+    fn is_virtual(&self) -> bool {
+        false
+    }
+
+    fn take_raw(&mut self) -> Vec<RawBytes> {
+        let mut raw = std::mem::take(&mut self.first_raw);
+        raw.extend(self.axis.take_raw());
+        raw.extend(self.cell.take_raw());
+        raw.sort_by_key(|piece| piece.at);
+        let origin = self.origin.unwrap_or(Nanos::ZERO);
+        for piece in &mut raw {
+            piece.at = piece.at.since(origin);
+        }
+        raw
+    }
+}

@@ -1,0 +1,183 @@
+//! Where an axis was at a time, by the courses that were commanded and what was confirmed of them.
+//!
+//! The thread that talks to the axis writes it; samples of a load cell, which arrive later than they were taken, look
+//! the past up in it.
+
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Profile};
+use palpate_model::units::Seconds;
+use std::collections::VecDeque;
+
+/// Motions and states that are remembered: minutes of them. Samples are looked up a fraction of a second late.
+const PIECES_MAX: usize = 256;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Piece {
+    from: Nanos,
+    /// Pulses where it begins.
+    pulses: f64,
+    /// Its course, in pulses from there.
+    course: Option<(Profile, f64)>,
+    status: AxisStatus,
+    /// Counts motions.
+    motion: u64,
+}
+
+/// What an axis did.
+#[derive(Clone, Debug)]
+pub struct Track {
+    pieces: VecDeque<Piece>,
+    inputs: VecDeque<(Nanos, AxisStatus)>,
+    motion: u64,
+    /// Something else of the rig has failed: the axis is to stop.
+    pub is_stop_wanted: bool,
+}
+
+/// An axis at a time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Placed {
+    /// Pulses of its own counter.
+    pub pulses: f64,
+    /// Motion, switches, motor.
+    pub status: AxisStatus,
+    /// How many motions had begun.
+    pub motion: u64,
+}
+
+impl Track {
+    /// At rest.
+    #[must_use]
+    pub fn at_rest(pulses: i64) -> Self {
+        let mut track = Self {
+            pieces: VecDeque::new(),
+            inputs: VecDeque::new(),
+            motion: 0,
+            is_stop_wanted: false,
+        };
+        track.rest(Nanos::ZERO, pulses);
+        track
+    }
+
+    fn push(&mut self, piece: Piece) {
+        if self.pieces.len() >= PIECES_MAX {
+            self.pieces.pop_front();
+        }
+        self.pieces.push_back(piece);
+    }
+
+    /// It rests here from then on.
+    pub fn rest(&mut self, from: Nanos, pulses: i64) {
+        self.push(Piece {
+            from,
+            pulses: pulses as f64,
+            course: None,
+            status: AxisStatus(0),
+            motion: self.motion,
+        });
+    }
+
+    /// It moves from then on: a profile in mm from zero, and how many pulses a mm of it is.
+    pub fn moves(&mut self, from: Nanos, pulses: f64, profile: Profile, pulses_per_mm: f64) {
+        self.motion += 1;
+        self.push(Piece {
+            from,
+            pulses,
+            course: Some((profile, pulses_per_mm)),
+            status: AxisStatus::MOVING,
+            motion: self.motion,
+        });
+    }
+
+    /// From then on the motion under way is braked.
+    pub fn brakes(&mut self, from: Nanos) {
+        let Some(last) = self.pieces.back().copied() else {
+            return;
+        };
+        let Some((profile, pulses_per_mm)) = last.course else {
+            return;
+        };
+        let since = seconds(from, last.from);
+        let end = profile.stopped_at(since);
+        let here = profile.position(since).0 * pulses_per_mm;
+        self.push(Piece {
+            from,
+            // The braking begins where the profile is by then.
+            pulses: last.pulses,
+            course: Some((end, pulses_per_mm)),
+            status: AxisStatus::MOVING | AxisStatus::STOPPING,
+            motion: self.motion,
+        });
+        debug_assert!((end.position(Seconds(0.0)).0 * pulses_per_mm - here).abs() < 1e-6);
+    }
+
+    /// Switches and motor from then on.
+    pub fn inputs(&mut self, from: Nanos, status: AxisStatus) {
+        if self.inputs.back().is_some_and(|(_, last)| *last == status) {
+            return;
+        }
+        if self.inputs.len() >= PIECES_MAX {
+            self.inputs.pop_front();
+        }
+        self.inputs.push_back((from, status));
+    }
+
+    /// At a time.
+    #[must_use]
+    pub fn at(&self, time: Nanos) -> Placed {
+        let piece = self.pieces.iter().rev().find(|piece| piece.from <= time);
+        // Before all that is remembered: as it was first.
+        let piece = piece.or(self.pieces.front()).copied().unwrap_or(Piece {
+            from: Nanos::ZERO,
+            pulses: 0.0,
+            course: None,
+            status: AxisStatus(0),
+            motion: 0,
+        });
+        let way = piece.course.map_or(0.0, |(profile, pulses_per_mm)| {
+            profile.position(seconds(time, piece.from)).0 * pulses_per_mm
+        });
+        let inputs = self.inputs.iter().rev().find(|(from, _)| *from <= time);
+        let inputs = inputs.map_or(AxisStatus(0), |(_, status)| *status);
+        Placed {
+            pulses: piece.pulses + way,
+            status: piece.status | inputs,
+            motion: piece.motion,
+        }
+    }
+}
+
+fn seconds(time: Nanos, from: Nanos) -> Seconds {
+    Seconds(time.since(from).0 as f64 * 1e-9)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::units::{MmPerS, MmPerS2, Position};
+
+    #[test]
+    fn the_past_is_looked_up_as_it_was() {
+        let mut track = Track::at_rest(100);
+        let ms = Nanos::from_millis;
+        let profile = Profile::to_rest(Position(0.0), Position(10.0), MmPerS(2.0), MmPerS2(20.0));
+        track.inputs(ms(500), AxisStatus::MOTOR_ON);
+        track.moves(ms(1_000), 100.0, profile, -400.0);
+        track.brakes(ms(2_000));
+        track.rest(ms(2_500), -700);
+        assert_eq!(track.at(ms(400)).pulses, 100.0);
+        assert_eq!(track.at(ms(400)).status, AxisStatus(0));
+        let moving = track.at(ms(1_500));
+        // 0.1 mm while it gains speed, 0.4 s at 2 mm/s.
+        assert!(
+            (moving.pulses - (100.0 - 400.0 * 0.9)).abs() < 1e-6,
+            "{moving:?}"
+        );
+        assert_eq!(moving.status, AxisStatus::MOVING | AxisStatus::MOTOR_ON);
+        let braking = track.at(ms(2_050));
+        assert!(braking.status.has(AxisStatus::STOPPING));
+        assert!((braking.pulses - (100.0 - 400.0 * (1.9 + 0.075))).abs() < 1e-6);
+        let rest = track.at(ms(3_000));
+        assert_eq!((rest.pulses, rest.motion), (-700.0, 1));
+        assert!(!rest.status.has(AxisStatus::MOVING));
+    }
+}

@@ -1,0 +1,143 @@
+//! The keys of a Galil controller.
+
+use super::fields::Fields;
+use crate::galil::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
+use crate::wire::Place;
+use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
+
+/// Where the controller is, and how it is wired.
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
+    let place = place(fields);
+    let serial_number = fields.number("serial_number", 0.0, 1e15);
+    let axis = fields.text("axis").unwrap_or_else(|| "A".into());
+    let axis = match axis.as_bytes() {
+        [letter @ b'A'..=b'H'] => char::from(*letter),
+        _ => {
+            fields.mistake("axis", "an axis is a letter from A to H");
+            'A'
+        }
+    };
+    let input = fields.number("input", 1.0, 8.0).unwrap_or(1.0);
+    let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
+    let is_reversed = fields.choice(
+        "direction",
+        &[("forward", false), ("reverse", true)],
+        Some(false),
+    );
+    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
+    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
+    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
+    let motor_type = fields.choice(
+        "motor_type",
+        &[
+            ("active-low", MotorType::ActiveLow),
+            ("active-high", MotorType::ActiveHigh),
+        ],
+        Some(MotorType::ActiveLow),
+    );
+    let levels = [
+        ("active-low", Levels::ActiveLow),
+        ("active-high", Levels::ActiveHigh),
+    ];
+    let limits = fields.choice("limit_switches", &levels, Some(Levels::ActiveLow));
+    let home = fields.choice("home_switch", &levels, Some(Levels::ActiveLow));
+    let range = fields.choice(
+        "range",
+        &[
+            ("-10..10 V", AnalogRange::Bipolar10),
+            ("-5..5 V", AnalogRange::Bipolar5),
+            ("0..5 V", AnalogRange::Unipolar5),
+            ("0..10 V", AnalogRange::Unipolar10),
+        ],
+        Some(AnalogRange::Bipolar10),
+    );
+    let bits = fields.choice("converter", &[("12 bit", 12), ("16 bit", 16)], None);
+    let noise = fields.number("noise_v", 1e-9, 1.0);
+    let filter = fields.text("filter");
+    let has_watchdog = fields.flag("watchdog").unwrap_or(true);
+    let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
+    // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
+    let sample_us = fields.number("sample_us", 500.0, 1000.0);
+    let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
+    // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
+    if acceleration / mm_per_pulse < 1024.0 {
+        let least = 1024.0 * mm_per_pulse;
+        fields.mistake(
+            "acceleration_mm_s2",
+            &format!("the controller makes no less than {least:.4} mm/s2 with such pulses"),
+        );
+    }
+    let range = range?;
+    let bits = bits?;
+    let counts = f64::from(1_u32 << bits);
+    Some((
+        place?,
+        GalilSettings {
+            name,
+            axis,
+            // Between 1 and 8, both checked.
+            input: input as u8,
+            mm_per_pulse,
+            is_reversed: is_reversed?,
+            travel: Position(travel?),
+            speed_max: MmPerS(speed_max?),
+            acceleration: MmPerS2(acceleration),
+            motor_type: motor_type?,
+            limits: limits?,
+            home: home?,
+            range,
+            bits,
+            // Without better knowledge, a count of the converter.
+            noise: Volts(noise.unwrap_or(range.span().0 / counts)),
+            serial_number: serial_number.map(|number| number as u64),
+            has_watchdog,
+            filter,
+            sampling: sampling?,
+            sample_us: sample_us.map(|us| us as u16),
+        },
+    ))
+}
+
+const SAMPLINGS: [(&str, Sampling); 3] = [
+    ("auto", Sampling::Auto),
+    ("poll", Sampling::Poll),
+    ("record", Sampling::Record),
+];
+
+fn place(fields: &mut Fields) -> Option<Place> {
+    let (port, address) = (fields.text("port"), fields.text("address"));
+    let baud = fields.number("baud", 300.0, 4e6);
+    let has_handshake = fields.choice(
+        "handshake",
+        &[("none", false), ("rts-cts", true)],
+        Some(false),
+    );
+    match (port, address) {
+        (Some(port), None) => Some(Place::Serial {
+            port,
+            // The factory setting of boards with an USB port, and what gclib opens them with (gclib.h, `--baud`).
+            baud: baud.unwrap_or(115_200.0) as u32,
+            has_handshake: has_handshake?,
+        }),
+        (None, Some(address)) => {
+            if baud.is_some() {
+                fields.mistake("baud", "a controller on a network has no baud rate");
+            }
+            Some(Place::Tcp(address))
+        }
+        (Some(_), Some(_)) => {
+            fields.mistake(
+                "address",
+                "a device is at a port or at an address, not at both",
+            );
+            None
+        }
+        (None, None) => {
+            fields.mistake(
+                "port",
+                "where is the controller? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\"",
+            );
+            None
+        }
+    }
+}

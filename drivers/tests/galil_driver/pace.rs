@@ -1,0 +1,198 @@
+//! How fast and how punctual: over pseudo-terminals, in real time. What is counted is printed; nothing is asserted about
+//! speed but that nothing is lost without being told.
+//!
+//! `PALPATE_GALIL_SECONDS` and `PALPATE_STOPS` ask for more than the suite takes.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "how long things take is what is measured here"
+)]
+
+use crate::bench::{thesis, to};
+use crate::wires::{Runner, Served, start};
+use palpate_drivers::emulate::serve::Place as At;
+use palpate_drivers::galil::{GalilSettings, Sampling};
+use palpate_drivers::wire::Place;
+use palpate_drivers::{Rig, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{Reading, RigCommand};
+use std::time::Instant;
+
+fn asked(variable: &str, usual: usize) -> usize {
+    let given = std::env::var(variable).ok();
+    given.and_then(|text| text.parse().ok()).unwrap_or(usual)
+}
+
+fn on_pty(latency: Nanos) -> Option<(Served, Place)> {
+    if !std::path::Path::new("/dev/ptmx").exists() {
+        println!("skipped: there are no pseudo-terminals here");
+        return None;
+    }
+    let served = start(At::Pty(None), true, latency);
+    let place = Place::Serial {
+        port: served.address.clone(),
+        baud: 115_200,
+        has_handshake: false,
+    };
+    Some((served, place))
+}
+
+fn ms(span: Nanos) -> f64 {
+    span.0 as f64 * 1e-6
+}
+
+/// Takes samples for so many seconds; tells what came and gives the ticks that came and that there were.
+fn count(settings: &GalilSettings, latency: Nanos, what: &str) {
+    let Some((_served, place)) = on_pty(latency) else {
+        return;
+    };
+    let seconds = asked("PALPATE_GALIL_SECONDS", 2) as f64;
+    let mut runner = Runner::open(&place, settings);
+    let description = runner.rig.description().clone();
+    runner.until("a sample", |runner| runner.newest.is_some());
+    runner.tell(RigCommand::EnableMotor);
+    runner.pass();
+    let first = runner.newest.expect("a sample").tick;
+    runner.events.clear();
+    let tick = description.tick_nanos as f64 * 1e-9;
+    let last = first + (seconds / tick) as u64;
+    let (mut samples, mut gaps, mut newest) = (0_u64, 0_u64, first);
+    let (mut age_max, mut uncertainty_max) = (Nanos::ZERO, Nanos::ZERO);
+    let step = if settings.sampling == Sampling::Record {
+        2
+    } else {
+        1
+    };
+    // The time base: a straight line through the first and last times at which samples are said to have been taken.
+    let mut line: Vec<(u64, Nanos)> = Vec::new();
+    while newest < last {
+        runner.pass();
+        for event in std::mem::take(&mut runner.events) {
+            let RigEventBody::Reading(Reading { tick, .. }) = event.body else {
+                continue;
+            };
+            assert!(tick > newest);
+            samples += 1;
+            gaps += (tick - newest) / step - 1;
+            newest = tick;
+            let taken = event.taken.expect("its time is known");
+            age_max = age_max.max(event.at.since(taken.at));
+            uncertainty_max = uncertainty_max.max(taken.uncertainty);
+            line.push((tick, taken.at));
+        }
+        // Nobody else takes them, and they are many.
+        drop(runner.rig.take_raw());
+    }
+    let stats = runner.rig.stats();
+    let (begin, end) = (line[0], line[line.len() - 1]);
+    let slope = end.1.since(begin.1).0 as f64 / (end.0 - begin.0) as f64;
+    println!(
+        "{what}: {:.0} samples/s, {gaps} of {} not taken, {} lost; at most {:.1} ms old, +-{:.2} ms; \
+         {slope:.1} ns a tick of {}; questions off the clock by {:.2} ms at most, jitter of the link {:.2} ms; \
+         round trip {:.2} {:.2} {:.2} ms; {}",
+        samples as f64 / ((newest - first) as f64 * tick),
+        (newest - first) / step,
+        stats.lost,
+        ms(age_max),
+        ms(uncertainty_max),
+        description.tick_nanos,
+        ms(stats.deviation_max),
+        ms(stats.jitter()),
+        ms(stats.round_trip_min),
+        ms(stats.round_trip_mean),
+        ms(stats.round_trip_max),
+        description.identity,
+    );
+    assert!(runner.faults().is_empty());
+    // A question is answered between its beginning and its end.
+    assert!(stats.deviation_max.0 <= stats.jitter().0 + stats.round_trip_min.0 + uncertainty_max.0);
+    if settings.sampling == Sampling::Record {
+        assert!(gaps == 0 || stats.lost > 0);
+        assert_eq!(stats.lost, 0);
+    }
+}
+
+fn with(sampling: Sampling, sample_us: Option<u16>) -> GalilSettings {
+    GalilSettings {
+        sampling,
+        sample_us,
+        ..thesis()
+    }
+}
+
+#[test]
+fn recording_loses_nothing_over_a_serial_port() {
+    let record = |sample_us| with(Sampling::Record, sample_us);
+    count(&record(None), Nanos::ZERO, "recorded, TM 1000");
+    count(&record(Some(500)), Nanos::ZERO, "recorded, TM 500");
+}
+
+#[test]
+fn polling_over_a_serial_port() {
+    count(&with(Sampling::Poll, None), Nanos::ZERO, "polled, TM 1000");
+    count(
+        &with(Sampling::Poll, Some(500)),
+        Nanos::ZERO,
+        "polled, TM 500",
+    );
+}
+
+#[test]
+fn a_converter_with_a_latency_of_16_ms() {
+    let late = Nanos::from_millis(16);
+    count(&with(Sampling::Auto, None), late, "auto, 16 ms latency");
+    count(
+        &with(Sampling::Record, None),
+        late,
+        "recorded, 16 ms latency",
+    );
+}
+
+/// From the command entering the rig to its bytes being written, while samples come as fast as they can.
+#[test]
+fn stops_under_full_acquisition() {
+    let stops = asked("PALPATE_STOPS", 100);
+    for sampling in [Sampling::Record, Sampling::Poll] {
+        let Some((_served, place)) = on_pty(Nanos::ZERO) else {
+            return;
+        };
+        let mut runner = Runner::open(&place, &with(sampling, None));
+        runner.until("a sample", |runner| runner.newest.is_some());
+        runner.tell(RigCommand::EnableMotor);
+        runner.tell(to(9000, 0.75));
+        let mut late: Vec<u64> = Vec::with_capacity(stops);
+        for at in 0..stops {
+            // At any time of the acquisition's turn.
+            std::thread::sleep(std::time::Duration::from_micros(
+                300 + (at as u64 * 7919) % 3000,
+            ));
+            runner.events.clear();
+            drop(runner.rig.take_raw());
+            let before = runner.rig.now();
+            let start = Instant::now();
+            runner.rig.send(RigCommand::Stop);
+            runner.until("acknowledged", |runner| {
+                runner
+                    .events
+                    .iter()
+                    .any(|event| matches!(event.body, RigEventBody::Ack(_)))
+            });
+            assert!(start.elapsed().as_secs() < 10);
+            let written = runner
+                .rig
+                .take_raw()
+                .into_iter()
+                .find(|piece| piece.is_sent && piece.bytes.starts_with(b"STA;"))
+                .expect("the stop was written");
+            late.push(written.at.since(before).0);
+        }
+        late.sort_unstable();
+        let at = |share: f64| ms(Nanos(late[((late.len() - 1) as f64 * share) as usize]));
+        println!(
+            "{sampling:?}: {stops} stops, from the command to the wire {:.3} ms p50, {:.3} p99, {:.3} p99.9, {:.3} max",
+            at(0.5),
+            at(0.99),
+            at(0.999),
+            at(1.0)
+        );
+    }
+}
