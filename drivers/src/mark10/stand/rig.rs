@@ -112,7 +112,7 @@ impl Rig for StandRig {
         if let Some(fault) = self.refused.pop_front() {
             let at = self.told(now, until);
             let body = RigEventBody::Fault(fault);
-            return Some(RigEvent { at, body });
+            return Some(RigEvent::arrived(at, body));
         }
         let end = origin + until;
         let wait = Duration::from_nanos(end.since(now).0);

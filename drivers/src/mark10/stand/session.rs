@@ -351,6 +351,7 @@ impl StandSession {
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
             status,
+            age: None,
         };
         self.report(now, RigEventBody::Reading(reading));
     }
