@@ -99,6 +99,9 @@ pub enum DeviceError {
     /// A Galil controller.
     #[error(transparent)]
     Galil(#[from] GalilOpenError),
+    /// A device that speaks in lines: a gauge, a stand, an HX711 board.
+    #[error(transparent)]
+    Lines(#[from] crate::text::DeviceError),
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {

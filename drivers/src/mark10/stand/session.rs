@@ -1,5 +1,6 @@
 //! The dialogue with a stand that has been set up: one question at a time, stops before everything.
 
+use super::open::ConnectedStand;
 use super::protocol::{
     Crosshead, Force, Pair, STOP, Status, ask_limit, number, set_limit, set_speed,
 };
@@ -10,7 +11,7 @@ use crate::text::{Lines, Taken};
 use crate::wire::{Dialogue, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::command::{position_from_pulses, pulses_from_position};
-use palpate_model::rig::{Ack, AxisStatus, Fault, MoveTo, Profile, Reading, RigCommand};
+use palpate_model::rig::{Ack, Age, AxisStatus, Fault, MoveTo, Profile, Reading, RigCommand};
 use palpate_model::units::{Position, Seconds, Volts};
 use std::collections::VecDeque;
 
@@ -109,6 +110,8 @@ pub struct StandSession {
     /// Where it was commanded to rest.
     rests_at: Option<i64>,
     tick: Option<u64>,
+    /// Of the newest sample's time.
+    uncertainty: Nanos,
     counts: i32,
     attended: Option<Nanos>,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -118,13 +121,10 @@ pub struct StandSession {
 impl StandSession {
     /// With a stand that was set up just now.
     #[must_use]
-    pub fn new(
-        settings: StandSettings,
-        scale: GaugeScale,
-        pace: Pace,
-        stats: LinkStats,
-        now: Nanos,
-    ) -> Self {
+    pub fn new(settings: StandSettings, connected: &ConnectedStand, now: Nanos) -> Self {
+        let ConnectedStand {
+            scale, pace, stats, ..
+        } = *connected;
         Self {
             settings,
             scale,
@@ -148,6 +148,7 @@ impl StandSession {
             offset: 0,
             rests_at: None,
             tick: None,
+            uncertainty: Nanos::ZERO,
             counts: 0,
             attended: None,
             events: VecDeque::new(),
@@ -351,7 +352,12 @@ impl StandSession {
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
             status,
+            age: Some(Age {
+                by: now.since(at),
+                within: now.since(at),
+            }),
         };
+        self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
         self.report(now, RigEventBody::Reading(reading));
     }
 
@@ -653,5 +659,13 @@ impl Dialogue for StandSession {
 
     fn stats(&self) -> LinkStats {
         self.stats
+    }
+
+    fn host_time(&self, tick: u64) -> Option<Nanos> {
+        Some(Nanos(self.opened.0 + tick * TICK.0))
+    }
+
+    fn uncertainty(&self, _at: Nanos) -> Option<Nanos> {
+        Some(self.uncertainty)
     }
 }
