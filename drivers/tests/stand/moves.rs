@@ -231,6 +231,19 @@ fn samples_come_as_the_description_says() {
             per_sample < told && per_sample > 0.3 * told,
             "{per_sample} {told}"
         );
+        // In motion nothing else is asked: samples stay younger than the interlock allows at any speed, 20 ms, where the
+        // link lets them.
+        let moving = host
+            .readings
+            .iter()
+            .filter(|r| r.status.has(AxisStatus::MOVING));
+        let moving: Vec<u64> = moving.map(|r| r.tick).collect();
+        let gap = moving
+            .windows(2)
+            .map(|w| w[1] - w[0])
+            .max()
+            .expect("samples");
+        assert!(gap <= 5 + 2 * delay.0 / 1_000_000, "{gap} ms at {delay:?}");
         assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
         assert_eq!(host.newest().pulses, 200);
     }

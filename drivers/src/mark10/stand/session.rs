@@ -23,7 +23,7 @@ const ANSWER_MAX: Nanos = Nanos::from_millis(400);
 const QUIET: Nanos = Nanos::from_millis(40);
 /// So many lost answers in a row, and the link counts as dead.
 const LOST_MAX: u32 = 3;
-/// How often the crosshead's state is asked for, while it moves and while it rests.
+/// How often the crosshead's state is asked for, while it moves without a new travel and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
 const STATUS_RESTING: Nanos = Nanos::from_millis(300);
 /// A stop is repeated as often until the crosshead rests.
@@ -475,6 +475,18 @@ impl StandSession {
         self.rests_at.filter(near).unwrap_or(true_pulses)
     }
 
+    /// A crosshead whose travel grows moves; asking would only cost samples.
+    fn is_status_due(&self, now: Nanos) -> bool {
+        let (every, since) = if self.is_going() && self.stopped_at.is_none() {
+            (STATUS_MOVING, self.status_at.max(self.travel_changed))
+        } else if self.is_going() {
+            (STATUS_MOVING, self.status_at)
+        } else {
+            (STATUS_RESTING, self.status_at)
+        };
+        self.pace.has_status && now.since(since) >= every
+    }
+
     fn has_status_moved(&self) -> bool {
         self.status
             .is_some_and(|status| status.crosshead != Crosshead::Stopped)
@@ -622,12 +634,7 @@ impl Dialogue for StandSession {
             let is_there = going.target == going.from;
             return Some(if is_there { Vec::new() } else { text.into() });
         }
-        let every = if self.is_going() {
-            STATUS_MOVING
-        } else {
-            STATUS_RESTING
-        };
-        if self.pace.has_status && now.since(self.status_at) >= every {
+        if self.is_status_due(now) {
             self.status_at = now;
             return self.ask(now, "p", Asked::Status);
         }
