@@ -97,6 +97,17 @@ fn who_does_not_fit_is_told_in_words() {
     let err = refused(&stand(), &far);
     assert!(err.contains("999.99"), "{err}");
 
+    // One that makes another limit of -110.00 than it was told.
+    let clipped = stand();
+    let mut before = 0;
+    clipped.lock().spoil = Box::new(move |byte| {
+        let is_changed = before == b'-' && byte == b'1';
+        before = byte;
+        vec![if is_changed { b'0' } else { byte }]
+    });
+    let err = refused(&clipped, &usual());
+    assert!(err.contains("reads back -10"), "{err}");
+
     let silent = stand();
     silent.lock().is_deaf = true;
     let err = refused(&silent, &usual());
