@@ -295,6 +295,7 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
             ..EmulatedGaugeSettings::default()
         },
         is_without_control: false,
+        reaction: Nanos::ZERO,
     });
     let is_serial = args.wire.tcp.is_none();
     let mut ready = |at: &str| {

@@ -2,6 +2,7 @@
 
 mod analyse;
 mod analysis;
+mod asking;
 mod calibration;
 mod catalog;
 mod compliance;

@@ -1,6 +1,7 @@
 //! `palpate run`: a protocol without a window, on the same runner.
 
 use super::Failure;
+use super::asking::Asking;
 use super::output::Output;
 use super::programme;
 use super::protocol::ValueArgs;
@@ -272,6 +273,7 @@ pub(super) fn execute(
     request: RunRequest,
     output: &Output,
 ) -> Result<Arc<Snapshot>, Failure> {
+    let is_asked = request.answers == Answers::Operator;
     let (wake, woken) = sync_channel(1);
     let (reply, answer) = sync_channel(1);
     let first = Request::Run(Box::new(request), reply);
@@ -287,7 +289,8 @@ pub(super) fn execute(
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
         Err(_) => return Err(Failure::failed("the runner ended before the run began")),
     }
-    watch(&runner, &woken, output)
+    let asking = is_asked.then(|| Asking::start(runner.requests()));
+    watch(&runner, &woken, asking.transpose()?, output)
 }
 
 /// Who and what, as told by the arguments.
@@ -320,7 +323,12 @@ pub(super) fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
 }
 
 /// Draws progress until the run is over.
-fn watch(runner: &Runner, woken: &Receiver<()>, output: &Output) -> Result<Arc<Snapshot>, Failure> {
+fn watch(
+    runner: &Runner,
+    woken: &Receiver<()>,
+    mut asking: Option<Asking>,
+    output: &Output,
+) -> Result<Arc<Snapshot>, Failure> {
     let bar = output.bar(1000);
     loop {
         let is_alive = woken.recv_timeout(Duration::from_millis(500)).is_ok();
@@ -328,6 +336,9 @@ fn watch(runner: &Runner, woken: &Receiver<()>, output: &Output) -> Result<Arc<S
         let Some(view) = &snapshot.run else { continue };
         bar.set_position((view.fraction * 1000.0) as u64);
         bar.set_message(progress_text(view));
+        if let Some(asking) = &mut asking {
+            bar.suspend(|| asking.look(view.prompt.as_ref(), output));
+        }
         if view.outcome.is_some() {
             bar.finish_and_clear();
             return Ok(snapshot);

@@ -5,6 +5,7 @@ mod before;
 pub(super) use before::check;
 
 use super::Failure;
+use super::asking::Asking;
 use super::output::Output;
 use super::run::HowArgs;
 use crate::report::programme::Page;
@@ -118,6 +119,7 @@ pub(super) fn run(
     })
     .map_err(Failure::failed)?;
     super::run::stop_on_signals(&runner)?;
+    let asking = (answers == Answers::Operator).then(|| Asking::start(runner.requests()));
     let laboratory = Laboratory {
         runner: &runner,
         woken: &woken,
@@ -128,7 +130,8 @@ pub(super) fn run(
         answers,
         gate: &gate,
     };
-    let done = watch(&programme, &checksum(&text), laboratory, output)?;
+    let asking = asking.transpose()?;
+    let done = watch(&programme, &checksum(&text), laboratory, asking, output)?;
     drop(runner);
     leave(&programme, &folder, &done, output)
 }
@@ -138,6 +141,7 @@ fn watch(
     programme: &Programme,
     crc32: &str,
     laboratory: Laboratory<'_>,
+    mut asking: Option<Asking>,
     output: &Output,
 ) -> Result<Done, Failure> {
     let bar = output.bar(1000);
@@ -148,7 +152,12 @@ fn watch(
             so_far = format!("{} of {}: {task} {}", count.0 + 1, count.1, place.repeat);
             bar.set_position(1000 * u64::from(count.0) / u64::from(count.1.max(1)));
         }
-        Event::Running(view, left) => bar.set_message(format!("{so_far}  {}", going(view, left.0))),
+        Event::Running(view, left) => {
+            bar.set_message(format!("{so_far}  {}", going(view, left.0)));
+            if let Some(asking) = &mut asking {
+                bar.suspend(|| asking.look(view.prompt.as_ref(), output));
+            }
+        }
         Event::Finished(..) | Event::Calibrated(_) => {}
     });
     bar.finish_and_clear();
