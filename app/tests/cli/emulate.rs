@@ -8,7 +8,7 @@ use std::process::{Child, Command, Stdio};
 use std::time::Duration;
 
 /// Ends with the test, whatever happens.
-struct Emulator(Child);
+pub(super) struct Emulator(pub Child);
 
 impl Drop for Emulator {
     fn drop(&mut self) {
@@ -18,20 +18,32 @@ impl Drop for Emulator {
     }
 }
 
-#[test]
-fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
-    let child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+/// An emulated Galil controller on a port of this computer, and where.
+pub(super) fn emulate_galil(more: &[&str]) -> (Emulator, String) {
+    let (emulator, ready) = start(more);
+    let at = ready["at"].as_str().expect("a place").to_owned();
+    (emulator, at)
+}
+
+fn start(more: &[&str]) -> (Emulator, Value) {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
         .args(["emulate", "galil", "--tcp", "127.0.0.1:0", "--json"])
+        .args(more)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
-        .unwrap();
-    let mut emulator = Emulator(child);
+        .expect("palpate starts");
     let mut line = String::new();
-    let mut out = BufReader::new(emulator.0.stdout.take().unwrap());
-    out.read_line(&mut line).unwrap();
-    let ready: Value = serde_json::from_str(&line).unwrap();
+    let out = child.stdout.take().expect("it is piped");
+    BufReader::new(out).read_line(&mut line).expect("a line");
+    let ready = serde_json::from_str(&line).expect("an object");
+    (Emulator(child), ready)
+}
+
+#[test]
+fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
+    let (mut emulator, ready) = start(&[]);
     assert_eq!(
         (&ready["device"], &ready["model"]),
         (&"galil".into(), &"dmc4143".into())

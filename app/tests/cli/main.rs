@@ -18,6 +18,7 @@ mod rate;
 mod records;
 mod select;
 mod trade;
+mod wired;
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
