@@ -123,7 +123,7 @@ pub struct Recording {
 #[must_use]
 pub fn question(settings: &GalilSettings) -> String {
     let (input, a) = (settings.input, settings.axis);
-    format!("MG @AN[{input}]{{F3.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
+    format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
 }
 
 impl Recording {
