@@ -160,6 +160,34 @@ fn a_garbled_fetch_is_done_again() {
     }
 }
 
+/// Two seconds are kept; who comes later finds a gap, told and counted.
+#[test]
+fn a_computer_that_is_late_loses_only_what_was_written_over() {
+    for (late_ms, is_lost) in [(1_500, false), (3_000, true)] {
+        let mut host = enabled(&recorded());
+        host.pass(0.2);
+        let before = host.readings.len();
+        {
+            let mut wire = host.wire.lock();
+            wire.now = wire.now + Nanos::from_millis(late_ms);
+            let now = wire.now;
+            wire.emulator.advance(now);
+        }
+        host.pass(1.0);
+        let ticks: Vec<u64> = host.readings[before - 1..]
+            .iter()
+            .map(|one| one.tick)
+            .collect();
+        let missing: u64 = ticks
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) / 2 - 1)
+            .sum();
+        assert_eq!(missing > 0, is_lost, "{late_ms}");
+        assert_eq!(host.session.stats().lost, missing);
+        assert!(ticks.len() > 1_000, "{}", ticks.len());
+    }
+}
+
 #[test]
 fn a_recording_that_ends_is_told() {
     let mut host = enabled(&recorded());
