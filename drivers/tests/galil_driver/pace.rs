@@ -107,8 +107,8 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     // A question is answered between its beginning and its end.
     assert!(stats.deviation_max.0 <= stats.jitter().0 + stats.round_trip_min.0 + uncertainty_max.0);
     if settings.sampling == Sampling::Record {
-        assert!(gaps == 0 || stats.lost > 0);
-        assert_eq!(stats.lost, 0);
+        // A computer that stood still for seconds loses samples, and says so.
+        assert_eq!(gaps > 0, stats.lost > 0);
     }
 }
 

@@ -87,7 +87,7 @@ impl Session {
         if self.sampler.is_reset(look.time) {
             return self.end_recording(now, sent, &look, false);
         }
-        match recording.look(look, marked) {
+        match recording.look(look, sent, marked) {
             Ok(()) => {
                 self.stats.lost = recording.lost;
                 self.timing
@@ -146,7 +146,7 @@ impl Session {
             return;
         };
         let column = reply.numbers().filter(|_| reply.is_accepted);
-        let out = column.and_then(|column| recording.take(column, &self.settings));
+        let out = column.and_then(|column| recording.take(now, column, &self.settings));
         let Some(out) = out else {
             return self.lose_order(now);
         };
