@@ -126,6 +126,11 @@ pub trait Rig: Send {
         Vec::new()
     }
 
+    /// Newtons of a volt of its signal, where the load cell itself is calibrated as a force gauge is.
+    fn newtons_per_volt(&self) -> Option<f64> {
+        None
+    }
+
     /// How each link has behaved since it was opened, by the name of the device behind it. A rig without wires has none.
     fn links(&self) -> Vec<(String, LinkStats)> {
         Vec::new()

@@ -5,6 +5,7 @@ mod open;
 
 pub use dialogue::{GaugeDialogue, GaugeScale};
 pub use open::open;
+pub(crate) use open::{check, check_list, commands, filters};
 
 use palpate_model::units::Newtons;
 

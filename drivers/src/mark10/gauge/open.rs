@@ -40,10 +40,7 @@ pub fn open(
     console.write(&format!("AOUT{}\r", settings.per_second))?;
     let rate = measure(&mut console, scale, settings.per_second)?;
     let step = Volts(scale.volts_per_count());
-    let filters = [("FLTC", set.filter_displayed), ("FLTP", set.filter_current)]
-        .into_iter()
-        .filter_map(|(name, n)| n.map(|n| format!(", {name}{n}")))
-        .collect::<String>();
+    let filters = filters(&set);
     let description = CellDescription {
         identity: format!(
             "{model}firmware {}, {} to {}, {rate} readings a second{filters}",
@@ -179,6 +176,25 @@ fn set_up(
         console.drain(Nanos(QUIET.0 / 3))?;
     }
     let set = list(console)?.ok_or_else(|| unfit("it no longer answers LIST".into()))?;
+    check_list(&set, settings)?;
+    Ok(set)
+}
+
+/// What a gauge is told before it is read: each is silent when it is done.
+pub(crate) fn commands(settings: &GaugeSettings) -> Vec<String> {
+    let polarity = format!("IPOL{}", u8::from(settings.is_reversed));
+    let mut commands: Vec<String> = ["N", "CUR", "FULL", &polarity, "OPOL0", "AOFF0"]
+        .map(str::to_owned)
+        .into();
+    let filters = settings
+        .filter
+        .map(|n| [format!("FLTC{n}"), format!("FLTP{n}")]);
+    commands.extend(filters.into_iter().flatten());
+    commands
+}
+
+/// Whether a gauge is set as [`commands`] asked.
+pub(crate) fn check_list(set: &GaugeList, settings: &GaugeSettings) -> Result<(), DeviceError> {
     let wrong = |what: &str| unfit(format!("it does not take {what}; it says {}", set.line));
     if let Err(unit) = &set.unit {
         return Err(unfit(format!(
@@ -193,7 +209,8 @@ fn set_up(
     }
     let is_reversed = set.is_inverted.unwrap_or(settings.is_reversed);
     if is_reversed != settings.is_reversed {
-        return Err(wrong(&polarity));
+        let polarity = u8::from(settings.is_reversed);
+        return Err(wrong(&format!("IPOL{polarity}, the sign of pressing")));
     }
     if set.is_unsigned == Some(true) {
         return Err(wrong("OPOL0, readings with their signs"));
@@ -204,7 +221,15 @@ fn set_up(
     if !has_filters {
         return Err(wrong("FLTC and FLTP, its filters"));
     }
-    Ok(set)
+    Ok(())
+}
+
+/// Its filters in words, for the operator and the log.
+pub(crate) fn filters(set: &GaugeList) -> String {
+    [("FLTC", set.filter_displayed), ("FLTP", set.filter_current)]
+        .into_iter()
+        .filter_map(|(name, n)| n.map(|n| format!(", {name}{n}")))
+        .collect()
 }
 
 fn list(console: &mut TextConsole<'_>) -> Result<Option<GaugeList>, DeviceError> {

@@ -1,0 +1,413 @@
+//! A stand ESM301 or ESM303 with a gauge on it, as it answers (ESM301 user's guide, page 24; ESM303 user's guide, pages
+//! 31 and 32).
+//!
+//! Guesses, as the guides do not say: answers end with CR LF and have units; setting something is silent; `p` gives three
+//! groups of letters with blanks between; acceleration; a limit that is changed while the crosshead moves holds at once;
+//! unknown letters are passed over.
+
+use super::gauge::{EmulatedGauge, EmulatedGaugeSettings};
+use crate::emulate::cell::{EmulatedCell, Felt};
+use crate::emulate::{Device, DeviceFault, Plant};
+use crate::sim::SimSettings;
+use palpate_model::Nanos;
+use palpate_model::rig::HandAction;
+use palpate_model::units::Seconds;
+
+/// The plant and the gauge are looked at so often.
+const STEP: Nanos = Nanos::from_millis(1);
+/// Guessed acceleration of the crosshead, in mm/s².
+const ACCELERATION: f64 = 100.0;
+/// Slowest and fastest speed in mm/min: 0.5 to 1100 (a guess after the ESM303's brochure).
+const SPEED_MIN: f64 = 0.5;
+const SPEED_MAX: f64 = 1_100.0;
+const INCH: f64 = 25.4;
+/// Bytes that wait to be taken; more are lost, as on a line that nobody reads.
+const OUTPUT_MAX: usize = 4096;
+/// Longest time that is caught up in one go.
+const CATCH_UP: Nanos = Nanos::from_millis(2_000);
+
+/// What an emulated stand is like.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct EmulatedStandSettings {
+    /// Specimen, seed and so on, as of the simulated rig.
+    pub sim: SimSettings,
+    /// The gauge on it.
+    pub gauge: EmulatedGaugeSettings,
+    /// Without the option PC Control: letters that move or set something are passed over.
+    pub is_without_control: bool,
+    /// From a letter that moves the crosshead to its first step.
+    pub reaction: Nanos,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Mode {
+    Manual,
+    Limit,
+    Cycle,
+}
+
+/// The number of a letter that is still coming.
+#[derive(Clone, Debug)]
+struct Number {
+    letter: u8,
+    text: String,
+}
+
+/// The stand.
+pub struct EmulatedStand {
+    settings: EmulatedStandSettings,
+    plant: Plant,
+    gauge: EmulatedGauge,
+    now: Nanos,
+    is_to_gauge: bool,
+    number: Option<Number>,
+    mode: Mode,
+    is_inches: bool,
+    /// In mm/min.
+    speed: f64,
+    programmed: f64,
+    lower: f64,
+    upper: f64,
+    cycles: u16,
+    /// In mm upwards from where it was switched on.
+    position: f64,
+    zero: f64,
+    /// In mm/s, upwards.
+    velocity: f64,
+    /// 1 up, -1 down, 0 to rest.
+    way: f64,
+    /// It moves from then on.
+    moves_from: Nanos,
+    output: Vec<u8>,
+}
+
+impl EmulatedStand {
+    /// A stand in manual mode, its travel zero where it is.
+    #[must_use]
+    pub fn new(settings: EmulatedStandSettings) -> Self {
+        let tick = Seconds(STEP.0 as f64 * 1e-9);
+        Self {
+            plant: Plant::new(&settings.sim, tick),
+            gauge: EmulatedGauge::new(settings.gauge.clone()),
+            settings,
+            now: Nanos::ZERO,
+            is_to_gauge: false,
+            number: None,
+            mode: Mode::Manual,
+            is_inches: false,
+            speed: 60.0,
+            programmed: 60.0,
+            lower: -100.0,
+            upper: 100.0,
+            cycles: 0,
+            position: 0.0,
+            zero: 0.0,
+            velocity: 0.0,
+            way: 0.0,
+            moves_from: Nanos::ZERO,
+            output: Vec::new(),
+        }
+    }
+
+    /// What really is so, for tests: the plant behind it.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// Its own travel in mm, for tests.
+    #[must_use]
+    pub fn travel(&self) -> f64 {
+        self.position - self.zero
+    }
+
+    /// Whether the crosshead moves, for tests.
+    #[must_use]
+    pub fn is_moving(&self) -> bool {
+        self.velocity != 0.0
+    }
+
+    fn say(&mut self, text: &str) {
+        if self.output.len() + text.len() + 2 <= OUTPUT_MAX {
+            self.output.extend_from_slice(text.as_bytes());
+            self.output.extend_from_slice(b"\r\n");
+        }
+    }
+
+    fn length(&self, mm: f64) -> String {
+        let (value, decimals, unit) = if self.is_inches {
+            (mm / INCH, 3, "in")
+        } else {
+            (mm, 2, "mm")
+        };
+        let text = format!("{value:.decimals$} {unit}");
+        match text.strip_prefix('-') {
+            Some(rest) if rest.starts_with("0.00 ") || rest.starts_with("0.000 ") => rest.into(),
+            _ => text,
+        }
+    }
+
+    fn status(&self) -> String {
+        let crosshead = if self.velocity > 0.0 {
+            "U"
+        } else if self.velocity < 0.0 {
+            "D"
+        } else {
+            "S"
+        };
+        let mode = match self.mode {
+            Mode::Manual => "M",
+            Mode::Limit => "L",
+            Mode::Cycle => "C",
+        };
+        let switch = if self.plant.is_reverse_limit() {
+            " UL"
+        } else if self.plant.is_forward_limit() {
+            " DL"
+        } else {
+            ""
+        };
+        format!("{crosshead} {mode}{switch}")
+    }
+
+    fn take(&mut self, byte: u8) {
+        if self.is_to_gauge {
+            if byte == b'\\' {
+                self.is_to_gauge = false;
+            } else {
+                self.gauge.receive(self.now, &[byte]);
+                self.pass_on();
+            }
+            return;
+        }
+        if let Some(mut number) = self.number.take() {
+            number.text.push(char::from(byte));
+            if !self.is_whole(&number) {
+                self.number = Some(number);
+            } else {
+                self.set(&number);
+            }
+            return;
+        }
+        self.letter(byte);
+    }
+
+    /// Whether a number is complete or can no longer become one.
+    fn is_whole(&self, number: &Number) -> bool {
+        let digits = number.text.strip_prefix('-').unwrap_or(&number.text);
+        let length = match (number.letter, self.is_inches) {
+            (b'e', false) | (b'g' | b'h', _) => 6,
+            (b'e', true) => 5,
+            _ => 4,
+        };
+        digits.len() >= length || !digits.bytes().all(|b| b.is_ascii_digit() || b == b'.')
+    }
+
+    fn set(&mut self, number: &Number) {
+        let Ok(value) = number.text.parse::<f64>() else {
+            return;
+        };
+        let mm = if self.is_inches { value * INCH } else { value };
+        if self.settings.is_without_control {
+            return;
+        }
+        match number.letter {
+            b'e' if (SPEED_MIN..=SPEED_MAX).contains(&mm) => {
+                self.speed = mm;
+                self.programmed = mm;
+            }
+            b'g' => self.lower = mm,
+            b'h' => self.upper = mm,
+            b'f' => self.cycles = value as u16,
+            _ => {}
+        }
+    }
+
+    fn letter(&mut self, byte: u8) {
+        match byte {
+            b'/' => self.is_to_gauge = true,
+            b'n' => {
+                let force = self.gauge.displayed();
+                let travel = self.length(self.travel());
+                self.say(&format!("{force}\r\n{travel}"));
+            }
+            b'x' => {
+                let travel = self.length(self.travel());
+                self.say(&travel);
+            }
+            // Readings without slashes (ESM303 user's guide, page 32).
+            b'X' | b'?' => {
+                let force = self.gauge.displayed();
+                self.say(&force);
+            }
+            b'e' | b'f' | b'g' | b'h' => {
+                self.number = Some(Number {
+                    letter: byte,
+                    text: String::new(),
+                });
+            }
+            _ if self.settings.is_without_control => {}
+            _ => self.control(byte),
+        }
+    }
+
+    /// Letters of the option PC Control.
+    fn control(&mut self, byte: u8) {
+        match byte {
+            b'u' | b'd' => {
+                self.way = if byte == b'u' { 1.0 } else { -1.0 };
+                self.moves_from = self.now + self.settings.reaction;
+            }
+            b's' => self.way = 0.0,
+            b'i' => self.is_inches = false,
+            b'b' => self.is_inches = true,
+            b'z' => self.zero = self.position,
+            b'l' => self.mode = Mode::Limit,
+            b'm' => self.mode = Mode::Manual,
+            b'c' => self.mode = Mode::Cycle,
+            b'j' => self.speed = SPEED_MAX,
+            b'k' => self.speed = SPEED_MIN,
+            b'o' => self.speed = self.programmed,
+            b'a' => {
+                let text = if self.is_inches {
+                    format!("{:.2} in/min", self.speed / INCH)
+                } else {
+                    format!("{:.1} mm/min", self.speed)
+                };
+                self.say(&text);
+            }
+            b'v' => {
+                let text = self.length(self.upper);
+                self.say(&text);
+            }
+            b'w' => {
+                let text = self.length(self.lower);
+                self.say(&text);
+            }
+            b'p' => {
+                let text = self.status();
+                self.say(&text);
+            }
+            b'q' => self.say("0"),
+            b'r' => self.say(&self.cycles.to_string()),
+            _ => {}
+        }
+    }
+
+    /// How far it may still go, in mm, in the direction of `way`.
+    fn room(&self, way: f64) -> f64 {
+        let is_switched = if way > 0.0 {
+            self.plant.is_reverse_limit()
+        } else {
+            self.plant.is_forward_limit()
+        };
+        if is_switched {
+            return 0.0;
+        }
+        if self.mode == Mode::Manual {
+            return f64::INFINITY;
+        }
+        let end = if way > 0.0 { self.upper } else { self.lower };
+        (way * (end - self.travel())).max(0.0)
+    }
+
+    fn move_on(&mut self, dt: f64) {
+        let way = if self.velocity == 0.0 {
+            self.way
+        } else {
+            self.velocity.signum()
+        };
+        if way == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
+            return;
+        }
+        let room = self.room(way);
+        // The fastest speed from which it comes to rest in the room there is; steps of dt make it a little less.
+        let brake = ACCELERATION * dt;
+        let end_speed = (brake * brake / 4.0 + 2.0 * ACCELERATION * room).sqrt() - brake / 2.0;
+        let wanted = if self.way == way {
+            (self.speed / 60.0).min(end_speed)
+        } else {
+            0.0
+        };
+        let speed = self.velocity.abs();
+        let speed = if wanted > speed {
+            (speed + brake).min(wanted)
+        } else if room == 0.0 {
+            0.0
+        } else {
+            (speed - brake).max(wanted)
+        };
+        let step = (speed * dt).min(room);
+        self.position += way * step;
+        // Less than a tenth of its resolution is there.
+        let is_there = self.mode != Mode::Manual && room - step < 1e-3;
+        if is_there {
+            self.position += way * (room - step);
+        }
+        let is_over = is_there || speed == 0.0;
+        self.velocity = if is_over { 0.0 } else { way * speed };
+        if is_over && self.way == way {
+            self.way = 0.0;
+        }
+    }
+
+    fn pass_on(&mut self) {
+        let said = self.gauge.transmit();
+        let room = OUTPUT_MAX.saturating_sub(self.output.len());
+        self.output.extend(said.into_iter().take(room));
+    }
+
+    fn restart(&mut self) {
+        let fresh = Self::new(self.settings.clone());
+        self.zero = self.position;
+        (self.velocity, self.way) = (0.0, 0.0);
+        (self.mode, self.is_inches, self.is_to_gauge) = (Mode::Manual, false, false);
+        (self.speed, self.programmed) = (fresh.speed, fresh.programmed);
+        (self.lower, self.upper) = (fresh.lower, fresh.upper);
+        self.number = None;
+        self.output.clear();
+    }
+}
+
+impl Device for EmulatedStand {
+    fn receive(&mut self, now: Nanos, _channel: usize, bytes: &[u8]) {
+        self.advance(now);
+        for byte in bytes {
+            self.take(*byte);
+        }
+    }
+
+    fn advance(&mut self, now: Nanos) {
+        // Who was away for long finds it at rest where it would have been stopped by then, or two seconds on.
+        if now.since(self.now) > CATCH_UP {
+            self.now = Nanos(now.0 - CATCH_UP.0);
+        }
+        while self.now + STEP <= now {
+            self.now = self.now + STEP;
+            let dt = STEP.0 as f64 * 1e-9;
+            self.move_on(dt);
+            self.plant.advance(-self.position, Seconds(dt));
+            let felt = Felt {
+                volts: self.plant.volts(),
+                force: self.plant.force(),
+            };
+            self.gauge.advance(self.now, felt);
+            self.pass_on();
+        }
+    }
+
+    fn transmit(&mut self, _channel: usize) -> Vec<u8> {
+        std::mem::take(&mut self.output)
+    }
+
+    fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool) {
+        self.gauge.suffer(now, fault, is_on);
+        if fault == DeviceFault::Reset && is_on || fault == DeviceFault::WrongDevice {
+            self.restart();
+        }
+    }
+
+    fn by_hand(&mut self, _now: Nanos, action: HandAction) {
+        self.plant.by_hand(action);
+    }
+}

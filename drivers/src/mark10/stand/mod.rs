@@ -1,0 +1,68 @@
+//! The motorised stands ESM301 and ESM303 with a gauge on them, driven by a computer (option "PC Control").
+//!
+//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `open.rs`, what happens once. [`StandRig`]
+//! puts a session on a link.
+//!
+//! # How it moves
+//!
+//! Before every move the stand's own travel limit is set to the target and read back; then the crosshead is let go
+//! towards it. Whatever becomes of the link, the stand stops at the target by itself: the way to the target is the
+//! worst case. `s` stops it before.
+//!
+//! # Where it is
+//!
+//! The stand tells its travel some hundred times a second at best, and nobody says how it accelerates. So what is
+//! reported is the commanded course, from the sample in which the stand is first seen to move, as long as the
+//! stand's own travel agrees with it within [`REST_TOLERANCE_MM`] and the way of [`LAG`] at the speed of the move; if it
+//! does not, the stand's travel is reported, and the check of the path ends the run. What the stand told is in the log.
+
+mod open;
+pub mod protocol;
+mod rig;
+mod session;
+
+pub use open::{ConnectedStand, connect};
+pub use rig::StandRig;
+pub use session::{Pace, StandSession};
+
+use super::gauge::GaugeSettings;
+use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
+
+/// Smallest step of a travel limit, and so of a move.
+pub const MM_PER_PULSE: f64 = 0.01;
+/// How far from its target the stand may come to rest, in mm. A guess, to be measured on the device.
+pub const REST_TOLERANCE_MM: f64 = 0.05;
+/// By how long the stand may be behind or before the commanded course: two samples on a slow converter, and its
+/// acceleration. A guess, to be measured on the device.
+pub const LAG: Seconds = Seconds(0.15);
+/// And by which share of the way that is made its speed may be off. A guess.
+pub const SPEED_TOLERANCE: f64 = 0.005;
+
+/// What palpate has to know of a stand.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StandSettings {
+    /// Name of the rig, for the operator.
+    pub name: String,
+    /// End of the travel from home. Home is where the stand's travel reads zero.
+    pub travel: Position,
+    /// Fastest speed.
+    pub speed_max: MmPerS,
+    /// Acceleration of the commanded course; the stand's own is not known and cannot be set.
+    pub acceleration: MmPerS2,
+    /// Whether up is into the tissue; down without.
+    pub is_upwards: bool,
+    /// The gauge on it. Its `per_second` does not matter: the stand is asked.
+    pub gauge: GaugeSettings,
+}
+
+impl StandSettings {
+    /// Pulses from home, into the tissue, of the stand's travel, which grows upwards.
+    #[must_use]
+    pub fn pulses(&self, travel_hundredths: i64) -> i64 {
+        if self.is_upwards {
+            travel_hundredths
+        } else {
+            -travel_hundredths
+        }
+    }
+}
