@@ -21,7 +21,7 @@ const RINGS: [i64; 4] = [2000, 1000, 500, 250];
 /// Share of the elements that are free which arrays may take; the rest is for others.
 const ROOM_MAX: f64 = 0.5;
 /// Questions by which the sample of element 0 is found, at least and at most.
-const ANCHORS: std::ops::Range<usize> = 16..96;
+const ANCHORS: std::ops::Range<usize> = 16..400;
 /// `RC n` tried in turn: every second sample, every fourth, every eighth.
 const INTERVALS: std::ops::RangeInclusive<u32> = 1..=3;
 /// Bytes of an element in all four arrays, such as ` 4095, 2000, 15, 0` with its commas.
