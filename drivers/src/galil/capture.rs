@@ -16,11 +16,12 @@ const ROW: usize = 12;
 const ROWS: usize = 3;
 /// More questions would only wait in the controller's input buffer, before a stop.
 const IN_FLIGHT_MAX: usize = 8;
-/// Elements of each array, tried in turn: of 8000 elements that the smallest boards are said to have, half are left to
-/// others; at 512 a second a thousand hold two seconds.
-const RINGS: [i64; 3] = [1000, 500, 250];
+/// Elements of each array, tried in turn: at 512 a second two thousand hold four seconds.
+const RINGS: [i64; 4] = [2000, 1000, 500, 250];
+/// Share of the elements that are free which arrays may take; the rest is for others.
+const ROOM_MAX: f64 = 0.5;
 /// Questions by which the sample of element 0 is found, at least and at most.
-const ANCHORS: std::ops::Range<usize> = 16..96;
+const ANCHORS: std::ops::Range<usize> = 16..400;
 /// `RC n` tried in turn: every second sample, every fourth, every eighth.
 const INTERVALS: std::ops::RangeInclusive<u32> = 1..=3;
 /// Bytes of an element in all four arrays, such as ` 4095, 2000, 15, 0` with its commas.
@@ -174,7 +175,7 @@ pub fn set_up(
             ", because recorded samples would be old when they come over this link",
         ));
     };
-    match start(console, settings, n)? {
+    match start(console, settings, n, tick)? {
         Ok(plan) => Ok(Capture {
             pace,
             plan: Some(plan),
@@ -199,13 +200,19 @@ fn start(
     console: &mut Console<'_>,
     settings: &GalilSettings,
     n: u32,
+    tick: Nanos,
 ) -> Result<Result<Plan, String>, GalilOpenError> {
     for name in ARRAYS {
         // Those of another ring, if palpate was here before.
         console.try_ask(&format!("DA {name}[]"))?;
     }
+    // Elements that are free (DMC-40x0 command reference, `DM`); firmware that does not tell refuses what is too much.
+    let free = console.try_ask("DM ?")?;
+    let free = free.numbers().filter(|_| free.is_accepted);
+    let room = free.map_or(f64::INFINITY, |numbers| ROOM_MAX * numbers[0]);
     let mut ring = None;
-    for length in RINGS {
+    let fits = |length: &i64| (ARRAYS.len() as i64 * length) as f64 <= room;
+    for length in RINGS.into_iter().filter(fits) {
         let arrays = ARRAYS.map(|name| format!("{name}[{length}]")).join(",");
         if console.try_ask(&format!("DM {arrays}"))?.is_accepted {
             ring = Some(length);
@@ -230,7 +237,7 @@ fn start(
             return Ok(Err(format!("it refuses {command}: {why}")));
         }
     }
-    anchor(console, settings, 1 << n, ring)
+    anchor(console, settings, (1 << n, tick), ring)
 }
 
 /// Which sample each element is of: the earliest `TIME` at which an element is the newest is that at which it was
@@ -238,7 +245,7 @@ fn start(
 fn anchor(
     console: &mut Console<'_>,
     settings: &GalilSettings,
-    interval: i64,
+    (interval, tick): (i64, Nanos),
     ring: i64,
 ) -> Result<Result<Plan, String>, GalilOpenError> {
     let question = recording::question(settings);
@@ -275,6 +282,7 @@ fn anchor(
                 ring,
                 base: least,
                 first: newest + 1,
+                tick,
             }));
         }
     }

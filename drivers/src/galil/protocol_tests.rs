@@ -130,7 +130,7 @@ fn a_record_question_and_its_answer_belong_together() {
     use crate::galil::recording::{Look, question};
     use crate::galil::settings::tests::thesis;
     let text = question(&thesis());
-    assert_eq!(text, "MG @AN[1]{F3.4},_TDA,_RPA,_TSA,_SCA,_RD,TIME");
+    assert_eq!(text, "MG @AN[1]{F2.4},_TDA,_RPA,_TSA,_SCA,_RD,TIME");
     // With a stop before it, it still is a line.
     assert!(format!("STA;{text}\r").len() <= LINE_MAX);
     let answer = all(b" 0.3051 120 121 143 0 17 5000\r\n:");

@@ -11,14 +11,16 @@
 use super::sampling::{self, signed, ts, whole};
 use super::settings::GalilSettings;
 use crate::rig::RigEventBody;
+use palpate_model::Nanos;
 use std::collections::VecDeque;
 
 /// Names of the arrays: signal, pulses, switches, stop code.
 pub const ARRAYS: [&str; 4] = ["plpf", "plpd", "plps", "plpc"];
-/// Elements that are about to be written over are not fetched any more.
-const MARGIN: i64 = 32;
-/// Elements of one array fetched at once: a stop is answered behind them.
+/// Elements that will be written over in this share of the ring's time are not fetched any more.
+const MARGIN: i64 = 4;
+/// Elements of one array fetched at once: a stop is answered behind them. Of a small ring fewer.
 const CHUNK_MAX: i64 = 64;
+const CHUNKS_OF_A_RING: i64 = 8;
 /// Samples from a command to the question behind it in the same line, on slow boards.
 const SETTING_MAX: i64 = 8;
 /// Stop codes of an axis under way: independent, PVT, contour, ECAM, vector (DMC-40x0 command reference, `SC`).
@@ -35,6 +37,8 @@ pub struct Plan {
     pub base: i64,
     /// The first element to be fetched.
     pub first: i64,
+    /// Length of a sample of the controller.
+    pub tick: Nanos,
 }
 
 /// An answer to the question while recording.
@@ -107,6 +111,8 @@ pub struct Recording {
     newest: i64,
     /// The newest look and the one before.
     look: Option<Look>,
+    /// The controller answered it after this.
+    looked_at: Nanos,
     earlier: Option<Look>,
     chunk: Option<Chunk>,
     waiting: VecDeque<Waiting>,
@@ -123,7 +129,7 @@ pub struct Recording {
 #[must_use]
 pub fn question(settings: &GalilSettings) -> String {
     let (input, a) = (settings.input, settings.axis);
-    format!("MG @AN[{input}]{{F3.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
+    format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},_RD,TIME")
 }
 
 impl Recording {
@@ -135,6 +141,7 @@ impl Recording {
             newest: plan.first - 1,
             plan,
             look: None,
+            looked_at: Nanos::ZERO,
             earlier: None,
             chunk: None,
             waiting: VecDeque::new(),
@@ -164,7 +171,12 @@ impl Recording {
     }
 
     /// Takes an answer; a `marked` one becomes a sample of its own, behind what waits.
-    pub fn look(&mut self, look: Look, marked: Option<bool>) -> Result<(), Stopped> {
+    pub fn look(
+        &mut self,
+        look: Look,
+        asked_at: Nanos,
+        marked: Option<bool>,
+    ) -> Result<(), Stopped> {
         let expected = (look.time - self.plan.base).div_euclid(self.plan.interval);
         // The clock may have gone on by a sample between `_RD` and `TIME`.
         let behind = (expected - (look.next - 1)).rem_euclid(self.plan.ring);
@@ -174,7 +186,8 @@ impl Recording {
             return Err(Stopped);
         }
         self.newest = expected - behind;
-        let oldest = self.newest - self.plan.ring + MARGIN;
+        self.looked_at = asked_at;
+        let oldest = self.newest - self.plan.ring + self.plan.ring / MARGIN;
         if self.next < oldest {
             self.lost += (oldest - self.next).unsigned_abs();
             self.next = oldest;
@@ -201,6 +214,7 @@ impl Recording {
         let first = self.next.rem_euclid(self.plan.ring);
         let count = (self.newest - self.next + 1)
             .min(CHUNK_MAX)
+            .min(self.plan.ring / CHUNKS_OF_A_RING)
             .min(self.plan.ring - first);
         self.chunk = Some(Chunk {
             first: self.next,
@@ -223,8 +237,20 @@ impl Recording {
         self.chunk = None;
     }
 
+    /// Whether elements that came now may have been written over since it was known that they were there.
+    fn is_stale(&self, first: i64, now: Nanos) -> bool {
+        let since = now.since(self.looked_at).0 as f64;
+        let written = since / (self.plan.interval as f64 * self.plan.tick.0 as f64);
+        (self.newest - first) as f64 + written.ceil() + 1.0 >= self.plan.ring as f64
+    }
+
     /// Takes one array's elements; `None` when they are not what was asked for. What is complete comes out.
-    pub fn take(&mut self, column: Vec<f64>, settings: &GalilSettings) -> Option<Vec<Out>> {
+    pub fn take(
+        &mut self,
+        now: Nanos,
+        column: Vec<f64>,
+        settings: &GalilSettings,
+    ) -> Option<Vec<Out>> {
         let chunk = self.chunk.as_mut()?;
         if i64::try_from(column.len()) != Ok(chunk.count) {
             return None;
@@ -234,6 +260,11 @@ impl Recording {
             return Some(Vec::new());
         }
         let chunk = self.chunk.take()?;
+        if self.is_stale(chunk.first, now) {
+            // The next look tells from where on they are whole, and counts the others as lost.
+            self.newest = self.next - 1;
+            return Some(Vec::new());
+        }
         self.next = chunk.first + chunk.count;
         let mut out = Vec::new();
         for at in 0..chunk.count {

@@ -198,7 +198,8 @@ fn open(
     let session = Session::new(settings.clone(), &connected, clock());
     let line_settings = LineSettings {
         device,
-        farewell: format!("ST{}\r", settings.axis).into_bytes(),
+        // The recording ends too: whoever comes next finds a controller that does nothing.
+        farewell: format!("ST{};RC 0\r", settings.axis).into_bytes(),
     };
     let line = Line::start(link, session, Arc::clone(clock), line_settings)
         .map_err(|err| GalilOpenError::Thread(err.to_string()))?;

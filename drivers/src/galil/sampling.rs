@@ -59,7 +59,7 @@ impl Sampler {
     #[must_use]
     pub fn question(settings: &GalilSettings) -> String {
         let (input, a) = (settings.input, settings.axis);
-        format!("MG @AN[{input}]{{F3.4}},_TD{a},_RP{a},_TS{a},_SC{a},TIME")
+        format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},TIME")
     }
 
     /// Whether a clock that shows this has begun anew since the newest sample.

@@ -157,13 +157,14 @@ fn run(seed: u64) -> Result<(), String> {
         sampling: [Sampling::Poll, Sampling::Record][random.below(2)],
         ..thesis()
     };
-    let verdict = GalilRig::open(&place, &settings, clock())
-        .map_err(|err| err.to_string())
-        .and_then(|rig| {
-            drive(rig, &mut random, &mut story, &|order| {
-                drop(orders.try_send(order));
-            })
-        });
+    // A computer that stands still for a second may well hear no answer: who opens a rig tries again.
+    let open = || GalilRig::open(&place, &settings, clock());
+    let opened = open().or_else(|_| open()).or_else(|_| open());
+    let verdict = opened.map_err(|err| err.to_string()).and_then(|rig| {
+        drive(rig, &mut random, &mut story, &|order| {
+            drop(orders.try_send(order));
+        })
+    });
     // Whatever was still under way: two looks of the watchdog and the brake.
     std::thread::sleep(Duration::from_millis(1500));
     stop.store(true, Ordering::Relaxed);

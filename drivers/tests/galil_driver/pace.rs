@@ -37,6 +37,13 @@ fn on_pty(latency: Nanos, baud: Option<u32>) -> Option<(Served, Place)> {
     Some((served, place))
 }
 
+fn on_tcp() -> (Served, Place) {
+    let at = At::Tcp(([127, 0, 0, 1], 0).into());
+    let served = start(at, false, Nanos::ZERO, None);
+    let place = Place::Tcp(served.address.clone());
+    (served, place)
+}
+
 fn ms(span: Nanos) -> f64 {
     span.0 as f64 * 1e-6
 }
@@ -107,8 +114,8 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     // A question is answered between its beginning and its end.
     assert!(stats.deviation_max.0 <= stats.jitter().0 + stats.round_trip_min.0 + uncertainty_max.0);
     if settings.sampling == Sampling::Record {
-        assert!(gaps == 0 || stats.lost > 0);
-        assert_eq!(stats.lost, 0);
+        // A computer that stood still for seconds loses samples, and says so.
+        assert_eq!(gaps > 0, stats.lost > 0);
     }
 }
 
@@ -163,10 +170,22 @@ fn a_line_of_115200_baud() {
 #[test]
 fn stops_under_full_acquisition() {
     let stops = asked("PALPATE_STOPS", 100);
-    for sampling in [Sampling::Record, Sampling::Poll] {
-        let Some((_served, place)) = on_pty(Nanos::ZERO, None) else {
-            return;
+    let ways = [
+        (Sampling::Record, false),
+        (Sampling::Poll, false),
+        (Sampling::Record, true),
+        (Sampling::Poll, true),
+    ];
+    for (sampling, is_tcp) in ways {
+        let opened = if is_tcp {
+            Some(on_tcp())
+        } else {
+            on_pty(Nanos::ZERO, None)
         };
+        let Some((_served, place)) = opened else {
+            continue;
+        };
+        let over = if is_tcp { "TCP" } else { "a serial port" };
         let mut runner = Runner::open(&place, &with(sampling, None));
         runner.until("a sample", |runner| runner.newest.is_some());
         runner.tell(RigCommand::EnableMotor);
@@ -200,7 +219,7 @@ fn stops_under_full_acquisition() {
         late.sort_unstable();
         let at = |share: f64| ms(Nanos(late[((late.len() - 1) as f64 * share) as usize]));
         println!(
-            "{sampling:?}: {stops} stops, from the command to the wire {:.3} ms p50, {:.3} p99, {:.3} p99.9, {:.3} max",
+            "{sampling:?} over {over}: {stops} stops, from the command to the wire {:.3} ms p50, {:.3} p99, {:.3} p99.9, {:.3} max",
             at(0.5),
             at(0.99),
             at(0.999),

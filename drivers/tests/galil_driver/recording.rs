@@ -45,7 +45,7 @@ fn every_second_sample_comes_and_none_is_lost() {
         );
         assert_eq!(host.connected.description.ticks_per_sample, 2.0);
         let before = host.readings.len();
-        // The ring of a thousand goes round several times.
+        // The ring of two thousand goes round.
         host.pass(5.0);
         let readings = &host.readings[before..];
         assert!(
@@ -160,6 +160,34 @@ fn a_garbled_fetch_is_done_again() {
     }
 }
 
+/// Three quarters of four seconds are kept; who comes later finds a gap, told and counted.
+#[test]
+fn a_computer_that_is_late_loses_only_what_was_written_over() {
+    for (late_ms, is_lost) in [(2_000, false), (5_000, true)] {
+        let mut host = enabled(&recorded());
+        host.pass(0.2);
+        let before = host.readings.len();
+        {
+            let mut wire = host.wire.lock();
+            wire.now = wire.now + Nanos::from_millis(late_ms);
+            let now = wire.now;
+            wire.emulator.advance(now);
+        }
+        host.pass(1.0);
+        let ticks: Vec<u64> = host.readings[before - 1..]
+            .iter()
+            .map(|one| one.tick)
+            .collect();
+        let missing: u64 = ticks
+            .windows(2)
+            .map(|pair| (pair[1] - pair[0]) / 2 - 1)
+            .sum();
+        assert_eq!(missing > 0, is_lost, "{late_ms}");
+        assert_eq!(host.session.stats().lost, missing);
+        assert!(ticks.len() > 1_000, "{}", ticks.len());
+    }
+}
+
 #[test]
 fn a_recording_that_ends_is_told() {
     let mut host = enabled(&recorded());
@@ -213,7 +241,7 @@ fn all_models_record_and_a_full_memory_is_told() {
         assert!(host.connected.plan.is_some(), "{model}");
     }
     let wire = board(GalilModel::Dmc2143);
-    unseen(&mut wire.lock().emulator, Nanos::ZERO, b"DM rest[7900]\r");
+    unseen(&mut wire.lock().emulator, Nanos::ZERO, b"DM rest[7000]\r");
     let auto = GalilSettings {
         sampling: Sampling::Auto,
         ..thesis()

@@ -85,25 +85,30 @@ impl Session {
             return self.lose_order(now);
         };
         if self.sampler.is_reset(look.time) {
-            self.give_up_recording(now);
-            return self.on_sample(now, Some(sent), &look.poll, false);
+            return self.end_recording(now, sent, &look, false);
         }
-        match recording.look(look, marked) {
+        match recording.look(look, sent, marked) {
             Ok(()) => {
                 self.stats.lost = recording.lost;
                 self.timing
                     .push(look.time as u64, self.pace.tick, sent, now);
                 self.fetch(now);
             }
-            Err(_) => {
-                self.give_up_recording(now);
-                let detail = "the controller has stopped recording, and samples were lost; open the rig again";
-                let fault = Fault::CommandRefused {
-                    detail: detail.into(),
-                };
-                self.report(now, RigEventBody::Fault(fault));
-                self.on_sample(now, Some(sent), &look.poll, marked == Some(true));
-            }
+            Err(_) => self.end_recording(now, sent, &look, marked == Some(true)),
+        }
+    }
+
+    /// A recording that has ended by itself, because of a reset or for whatever else.
+    fn end_recording(&mut self, now: Nanos, sent: Nanos, look: &Look, is_begun: bool) {
+        self.give_up_recording(now);
+        self.on_sample(now, Some(sent), &look.poll, is_begun);
+        if !self.is_reset {
+            let detail =
+                "the controller has stopped recording, and samples were lost; open the rig again";
+            let fault = Fault::CommandRefused {
+                detail: detail.into(),
+            };
+            self.report(now, RigEventBody::Fault(fault));
         }
     }
 
@@ -141,7 +146,7 @@ impl Session {
             return;
         };
         let column = reply.numbers().filter(|_| reply.is_accepted);
-        let out = column.and_then(|column| recording.take(column, &self.settings));
+        let out = column.and_then(|column| recording.take(now, column, &self.settings));
         let Some(out) = out else {
             return self.lose_order(now);
         };

@@ -268,17 +268,16 @@ impl Dialogue for Session {
             // Often enough to see that the line has become quiet.
             return now + Nanos(QUIET.0 / 10);
         }
+        // While answers are on their way nothing is due; their bytes end the wait.
+        let is_waiting = self.samples_in_flight() >= self.pace.in_flight
+            || self.recording.as_ref().is_some_and(Recording::is_fetching);
         let due = match &self.beginning {
             Some((_, due)) => *due,
+            None if is_waiting => now + QUIET,
             None => self.asked_at.map_or(now, |at| at + self.pace.every),
         };
         let feed_due = self.sine.as_ref().and_then(Feed::due);
-        let due = feed_due.map_or(due, |feed| feed.min(due));
-        if self.samples_in_flight() < self.pace.in_flight || self.beginning.is_some() {
-            due.max(now)
-        } else {
-            now + QUIET
-        }
+        feed_due.map_or(due, |feed| feed.min(due)).max(now)
     }
 
     fn take_event(&mut self) -> Option<(Nanos, RigEventBody)> {
