@@ -80,12 +80,20 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).reconnect()
     }
 
+    fn link(&self) -> Option<&str> {
+        (**self).link()
+    }
+
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
     }
 
     fn by_hand(&mut self, action: HandAction) {
         (**self).by_hand(action);
+    }
+
+    fn newtons_per_volt(&self) -> Option<f64> {
+        (**self).newtons_per_volt()
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
@@ -123,7 +131,7 @@ mod tests {
         assert!(said(&file).contains("cannot be read"));
         std::fs::write(&file, b"\xff").unwrap();
         assert!(said(&file).contains("no text"));
-        std::fs::write(&file, "device = \"grbl\"").unwrap();
+        std::fs::write(&file, "device = \"marlin\"").unwrap();
         assert!(said(&file).contains("bench.toml, line 1: device"));
         let text = "device = \"galil\"\nport = \"/dev/there-is-no-such-port\"\nmm_per_pulse = 0.015\n\
             travel_mm = 150\nspeed_max_mm_s = 20\nacceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n";

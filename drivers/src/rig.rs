@@ -107,6 +107,12 @@ pub trait Rig: Send {
         Err(RigError::NotAgain)
     }
 
+    /// The link as it was measured when it was opened, in words for operator and log: latency, jitter, and how samples are
+    /// taken over it. It differs a little each time; what is the same stands in the identity.
+    fn link(&self) -> Option<&str> {
+        None
+    }
+
     /// Whether time is simulated, so that the caller may run it at any pace.
     fn is_virtual(&self) -> bool;
 
@@ -118,6 +124,11 @@ pub trait Rig: Send {
     /// wires has none. Must not wait.
     fn take_raw(&mut self) -> Vec<RawBytes> {
         Vec::new()
+    }
+
+    /// Newtons of a volt of its signal, where the load cell itself is calibrated as a force gauge is.
+    fn newtons_per_volt(&self) -> Option<f64> {
+        None
     }
 
     /// How each link has behaved since it was opened, by the name of the device behind it. A rig without wires has none.

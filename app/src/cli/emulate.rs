@@ -4,7 +4,14 @@ use super::Failure;
 use super::output::Output;
 use super::rig::BenchArgs;
 use clap::{Args, Subcommand};
+use palpate_drivers::emulate::bench::Bench;
+use palpate_drivers::emulate::cell::EmulatedCell;
 use palpate_drivers::emulate::galil::{GalilEmulator, GalilModel, GalilSettings};
+use palpate_drivers::emulate::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
+use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use palpate_drivers::emulate::mark10::{
+    EmulatedGauge, EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings,
+};
 use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
 use palpate_drivers::emulate::{Device, ScheduledFault};
 use palpate_model::Nanos;
@@ -24,6 +31,10 @@ const ORDERS_MAX: usize = 16;
 pub enum EmulateCommand {
     /// A Galil DMC controller: axis A the slide with the probe, analog input 1 the load cell
     Galil(GalilArgs),
+    /// A Grbl board with the slide on its X axis, and a load cell on a serial line of its own
+    Grbl(GrblArgs),
+    /// A Mark-10 stand ESM303 with a force gauge on it
+    Mark10(Mark10Args),
 }
 
 impl EmulateCommand {
@@ -31,6 +42,8 @@ impl EmulateCommand {
     pub fn is_json(&self) -> bool {
         match self {
             Self::Galil(args) => args.wire.json,
+            Self::Grbl(args) => args.wire.json,
+            Self::Mark10(args) => args.wire.json,
         }
     }
 }
@@ -82,6 +95,62 @@ pub struct GalilArgs {
     bench: BenchArgs,
 }
 
+/// Arguments of `palpate emulate grbl`.
+#[derive(Debug, Args)]
+pub struct GrblArgs {
+    #[command(flatten)]
+    wire: WireArgs,
+    /// Load cell beside it: hx711 or mark10
+    #[arg(long, default_value = "hx711")]
+    cell: CellKind,
+    /// Link to the pseudo-terminal of the load cell
+    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
+    cell_pty: Option<PathBuf>,
+    /// Home switch on the limit pin of the axis, or on the probe pin with limit switches on the limit pin: limit or probe
+    #[arg(long, default_value = "limit")]
+    home: HomePin,
+    /// A setting that the board has stored, NUMBER=VALUE such as 22=1; may be repeated
+    #[arg(long, value_name = "NUMBER=VALUE", value_parser = setting)]
+    setting: Vec<(u16, f64)>,
+    /// What $I= has stored, by which a board is told from others
+    #[arg(long, value_name = "TEXT", default_value = "")]
+    build_info: String,
+    #[command(flatten)]
+    bench: BenchArgs,
+}
+
+/// Arguments of `palpate emulate mark10`.
+#[derive(Debug, Args)]
+pub struct Mark10Args {
+    #[command(flatten)]
+    wire: WireArgs,
+    #[command(flatten)]
+    bench: BenchArgs,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum CellKind {
+    Hx711,
+    Mark10,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum HomePin {
+    Limit,
+    Probe,
+}
+
+fn setting(text: &str) -> Result<(u16, f64), String> {
+    let wrong = || "give NUMBER=VALUE, such as 22=1".to_owned();
+    let (number, value) = text.split_once('=').ok_or_else(wrong)?;
+    let number = number
+        .trim_start_matches('$')
+        .parse()
+        .map_err(|_| wrong())?;
+    let value = value.parse().ok().filter(|value: &f64| value.is_finite());
+    Ok((number, value.ok_or_else(wrong)?))
+}
+
 #[derive(Clone, Copy, Debug)]
 struct Converter(Option<u32>);
 
@@ -108,12 +177,21 @@ struct Ready<'a> {
     device: &'static str,
     model: String,
     at: &'a str,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    cell_at: Option<&'a str>,
     is_serial: bool,
 }
 
 /// Emulates until it is stopped.
 pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failure> {
-    let EmulateCommand::Galil(args) = command;
+    match command {
+        EmulateCommand::Galil(args) => galil(args, output),
+        EmulateCommand::Grbl(args) => grbl(args, output),
+        EmulateCommand::Mark10(args) => mark10(args, output),
+    }
+}
+
+fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
     let usual = if args.model.is_21x3() { None } else { Some(16) };
     let is_serial = args.wire.tcp.is_none();
     let mut device = GalilEmulator::new(GalilSettings {
@@ -131,25 +209,121 @@ pub(super) fn run(command: &EmulateCommand, output: &Output) -> Result<(), Failu
             device: "galil",
             model: args.model.to_string(),
             at,
+            cell_at: None,
             is_serial,
         };
         output.result(&object, || {
             format!("{} at {at}; Ctrl-C ends it", args.model)
         });
     };
-    emulate(&mut device, &args.wire, args.bench.seed, &mut ready, output)
+    emulate(
+        &mut device,
+        &args.wire,
+        None,
+        args.bench.seed,
+        &mut ready,
+        output,
+    )
+}
+
+fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
+    if args.wire.tcp.is_some() {
+        return Err(Failure::usage(
+            "a Grbl board and its load cell are serial devices; give --pty and --cell-pty",
+        ));
+    }
+    let mut eeprom = Eeprom::slide();
+    if args.home == HomePin::Probe {
+        // As the limit switches on the limit pin need it; every board takes it.
+        let _ = eeprom.set(21, 1.0);
+    }
+    for (number, value) in &args.setting {
+        eeprom.set(*number, *value).map_err(|code| {
+            Failure::usage(format!(
+                "the board would refuse --setting {number}={value} with error:{code}"
+            ))
+        })?;
+    }
+    eeprom.build_info.clone_from(&args.build_info);
+    let board = Grbl::new(GrblSettings {
+        eeprom,
+        home: match args.home {
+            HomePin::Limit => HomeWiring::Limit,
+            HomePin::Probe => HomeWiring::Probe,
+        },
+        ..GrblSettings::default()
+    });
+    let seed = args.bench.seed;
+    let (model, cell): (_, Box<dyn EmulatedCell>) = match args.cell {
+        CellKind::Hx711 => (
+            "hx711",
+            Box::new(EmulatedHx711::new(EmulatedHx711Settings::default())),
+        ),
+        CellKind::Mark10 => (
+            "mark10",
+            Box::new(EmulatedGauge::new(EmulatedGaugeSettings {
+                seed,
+                ..EmulatedGaugeSettings::default()
+            })),
+        ),
+    };
+    let mut device = Bench::new(&args.bench.settings(), Box::new(board), cell);
+    let mut ready = |places: &str| {
+        let (at, cell_at) = places.split_once(", ").unwrap_or((places, ""));
+        let object = Ready {
+            command: "emulate",
+            device: "grbl",
+            model: format!("1.1h with {model}"),
+            at,
+            cell_at: Some(cell_at),
+            is_serial: true,
+        };
+        output.result(&object, || {
+            format!("Grbl 1.1h at {at}, {model} at {cell_at}; Ctrl-C ends it")
+        });
+    };
+    let cell_link = Some(args.cell_pty.clone());
+    emulate(&mut device, &args.wire, cell_link, seed, &mut ready, output)
+}
+
+fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
+    let seed = args.bench.seed;
+    let mut device = EmulatedStand::new(EmulatedStandSettings {
+        sim: args.bench.settings(),
+        gauge: EmulatedGaugeSettings {
+            seed,
+            ..EmulatedGaugeSettings::default()
+        },
+        is_without_control: false,
+    });
+    let is_serial = args.wire.tcp.is_none();
+    let mut ready = |at: &str| {
+        let object = Ready {
+            command: "emulate",
+            device: "mark10",
+            model: "ESM303".into(),
+            at,
+            cell_at: None,
+            is_serial,
+        };
+        output.result(&object, || format!("ESM303 at {at}; Ctrl-C ends it"));
+    };
+    emulate(&mut device, &args.wire, None, seed, &mut ready, output)
 }
 
 fn emulate(
     device: &mut dyn Device,
     wire: &WireArgs,
+    cell_link: Option<Option<PathBuf>>,
     seed: u64,
     ready: &mut dyn FnMut(&str),
     output: &Output,
 ) -> Result<(), Failure> {
-    let place = match wire.tcp {
-        Some(address) => Place::Tcp(address),
-        None => Place::Pty(wire.pty.clone().flatten()),
+    let link = wire.pty.clone().flatten();
+    let place = match (wire.tcp, cell_link) {
+        (Some(address), _) => Place::Tcp(address),
+        (None, None) => Place::Pty(link),
+        (None, Some(cell)) => Place::Ptys(vec![link, cell]),
     };
     let options = ServeOptions {
         place,

@@ -12,7 +12,7 @@ use palpate_drivers::sim::{
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
-use palpate_model::units::Position;
+use palpate_model::units::{Newtons, Position, Volts};
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
@@ -180,24 +180,45 @@ pub fn open(args: &RigArgs) -> Result<OpenRig, Failure> {
 
 /// Opens the rig that a file describes.
 fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
-    let Some(calibration) = &args.calibration else {
-        return Err(Failure::usage(format!(
-            "which calibration has the load cell of {}? Give --calibration NAME or FILE",
-            args.rig
-        )));
-    };
     if args.time_scale != TimeScale::Factor(1.0) {
         return Err(Failure::usage(
             "--time-scale is for simulated rigs; leave it out",
         ));
     }
-    let source = Source::find(calibration)?;
+    // A wrong name is told before anything is opened.
+    let source = args.calibration.as_deref().map(Source::find).transpose()?;
     let (rig, locks) = open_rig_file(&args.rig)?;
-    let limits = Limits::for_travel(travel(args, rig.description().travel)?);
-    let doubts = source.doubts(&rig.description().name);
+    let description = rig.description();
+    let mut limits = Limits::for_travel(travel(args, description.travel)?);
+    let full_scale = description
+        .adc
+        .map(|adc| f64::from(adc.counts_max) * adc.volts_per_count);
+    let (calibration, doubts) = match (source, rig.newtons_per_volt(), full_scale) {
+        (Some(source), ..) => {
+            let doubts = source.doubts(&description.name);
+            (source.calibration, doubts)
+        }
+        (None, Some(newtons), Some(full_scale)) => {
+            // Its own calibration holds over its own range.
+            limits.volts_max = Volts(full_scale);
+            let own = Calibration::linear(
+                &description.name,
+                Volts(0.0),
+                1.0 / newtons,
+                Newtons(full_scale * newtons),
+            );
+            (own, Vec::new())
+        }
+        (None, ..) => {
+            return Err(Failure::usage(format!(
+                "which calibration has the load cell of {}? Give --calibration NAME or FILE",
+                args.rig
+            )));
+        }
+    };
     Ok(OpenRig {
         rig,
-        calibration: source.calibration,
+        calibration,
         doubts,
         limits,
         _locks: locks,

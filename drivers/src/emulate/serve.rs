@@ -32,6 +32,8 @@ const FAREWELL: Nanos = Nanos(500_000_000);
 pub enum Place {
     /// A pseudo-terminal, with a link to it by this name.
     Pty(Option<PathBuf>),
+    /// One pseudo-terminal for each channel of the device.
+    Ptys(Vec<Option<PathBuf>>),
     /// A TCP port; port 0 is any free one.
     Tcp(SocketAddr),
 }
@@ -54,7 +56,7 @@ pub struct ServeOptions {
 /// What happens to an emulated device.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Told {
-    /// Clients can connect here: a path or an address.
+    /// Clients can connect here: a path or an address, or one for each channel with commas between.
     Ready(String),
     /// A fault has begun or ended.
     Fault(Turn),
@@ -109,7 +111,8 @@ impl Line {
 }
 
 enum Plug {
-    Pty(Pty),
+    /// One a channel.
+    Ptys(Vec<Pty>),
     Tcp(TcpListener),
     /// A fault has pulled it.
     Pulled,
@@ -189,18 +192,8 @@ impl<'a> Server<'a> {
 
     fn plug_in(&mut self) -> Result<(), ServeError> {
         match &self.options.place {
-            Place::Pty(link) => {
-                let pty = Pty::open(link.as_deref()).map_err(|err| ServeError::Open {
-                    place: link.as_deref().map_or_else(
-                        || "a pseudo-terminal".to_owned(),
-                        |link| link.display().to_string(),
-                    ),
-                    detail: err.to_string(),
-                })?;
-                let path = link.as_ref().unwrap_or(&pty.path);
-                self.address = path.display().to_string();
-                self.plug = Plug::Pty(pty);
-            }
+            Place::Pty(link) => self.plug_in_ptys(std::slice::from_ref(link))?,
+            Place::Ptys(links) => self.plug_in_ptys(links)?,
             Place::Tcp(address) => {
                 let address = self.bound.unwrap_or(*address);
                 let open = || -> io::Result<(TcpListener, SocketAddr)> {
@@ -218,6 +211,26 @@ impl<'a> Server<'a> {
                 self.plug = Plug::Tcp(listener);
             }
         }
+        Ok(())
+    }
+
+    fn plug_in_ptys(&mut self, links: &[Option<PathBuf>]) -> Result<(), ServeError> {
+        let mut ptys = Vec::new();
+        let mut addresses = Vec::new();
+        for link in links.iter().take(self.lines.len()) {
+            let pty = Pty::open(link.as_deref()).map_err(|err| ServeError::Open {
+                place: link.as_deref().map_or_else(
+                    || "a pseudo-terminal".to_owned(),
+                    |link| link.display().to_string(),
+                ),
+                detail: err.to_string(),
+            })?;
+            let path = link.as_ref().unwrap_or(&pty.path);
+            addresses.push(path.display().to_string());
+            ptys.push(pty);
+        }
+        self.address = addresses.join(", ");
+        self.plug = Plug::Ptys(ptys);
         Ok(())
     }
 
@@ -259,11 +272,14 @@ impl<'a> Server<'a> {
                 watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN))
             }
             // Without a client a pseudo-terminal reports a hang-up again and again.
-            Plug::Pty(pty) if pty.has_client => {
-                let flags = flags(&self.lines[0]);
-                watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags));
+            Plug::Ptys(ptys) => {
+                for (pty, line) in ptys.iter().zip(&self.lines) {
+                    if pty.has_client {
+                        watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags(line)));
+                    }
+                }
             }
-            Plug::Pty(_) | Plug::Pulled => {}
+            Plug::Pulled => {}
         }
         for line in &self.lines {
             if let Some(stream) = &line.stream {
@@ -337,8 +353,9 @@ impl<'a> Server<'a> {
 
     /// What a client has sent, and whether it has gone.
     fn read(&mut self, channel: usize) -> (Vec<u8>, bool) {
-        if let Plug::Pty(pty) = &mut self.plug {
-            return (pty.read(), false);
+        if let Plug::Ptys(ptys) = &mut self.plug {
+            let bytes = ptys.get_mut(channel).map_or_else(Vec::new, Pty::read);
+            return (bytes, false);
         }
         let mut all = Vec::new();
         let Some(stream) = &mut self.lines[channel].stream else {
@@ -371,7 +388,11 @@ impl<'a> Server<'a> {
             return;
         }
         let sent = match (&mut self.plug, &mut line.stream) {
-            (Plug::Pty(pty), _) => pty.write(&line.unsent),
+            (Plug::Ptys(ptys), _) => match ptys.get_mut(channel) {
+                Some(pty) => pty.write(&line.unsent),
+                // The channel has no line of its own.
+                None => line.unsent.len(),
+            },
             (_, Some(stream)) => stream.write(&line.unsent).unwrap_or(0),
             // Nobody is there.
             (_, None) => line.unsent.len(),
@@ -391,10 +412,10 @@ impl<'a> Server<'a> {
                 .iter()
                 .all(|line| line.unsent.is_empty() && line.from_device.next_at().is_none());
             let is_read = match &mut self.plug {
-                Plug::Pty(pty) => {
+                Plug::Ptys(ptys) => ptys.iter_mut().all(|pty| {
                     pty.read();
                     !pty.has_client
-                }
+                }),
                 _ => true,
             };
             if is_sent && is_read {

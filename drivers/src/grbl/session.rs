@@ -216,6 +216,10 @@ impl Session {
             return;
         }
         self.cancel(now);
+        if self.locked.is_some() {
+            // It stands, and after a limit switch it answers nothing but a reset.
+            return self.acknowledge(now, number, command);
+        }
         self.stops.push((number, command, now));
     }
 
@@ -495,7 +499,8 @@ impl Session {
             return;
         }
         // The report is of a time between its question and now.
-        let (early, late) = (self.track().at(asked).pulses, self.track().at(now).pulses);
+        let early = self.track().at(asked).pulses;
+        let late = self.track().at(now).pulses;
         let here = self.pulses(steps) as f64;
         // Start and segments are known to some hundredths of a second; a garbled target is further off.
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
@@ -666,7 +671,9 @@ impl Dialogue for Session {
     }
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
-        (now.since(self.heard) > SILENCE_MAX).then(|| {
+        // A board that a limit switch has locked says nothing before it is reset, and nothing moves.
+        let is_silent = now.since(self.heard) > SILENCE_MAX && self.locked.is_none();
+        is_silent.then(|| {
             let silence = SILENCE_MAX.0 as f64 * 1e-9;
             format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
         })

@@ -2,8 +2,8 @@
 
 use super::cell_line::{CellLine, TICK};
 use super::track::Track;
-use crate::cell::{CellDescription, CellDialogue};
 use crate::rig::{Rig, RigEvent, RigEventBody};
+use crate::text::OpenedCell;
 use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, RawBytes, RigCommand, RigDescription};
@@ -59,15 +59,20 @@ impl PartsRig {
         mut description: RigDescription,
         axis: Axis,
         link: Box<dyn Link>,
-        dialogue: Box<dyn CellDialogue>,
-        cell: &CellDescription,
+        opened: OpenedCell,
         clock: HostClock,
     ) -> io::Result<Self> {
+        let OpenedCell {
+            description: cell,
+            dialogue,
+            raw,
+            farewell,
+        } = opened;
         let start = clock();
         let line = CellLine::new(dialogue, cell.rate, Arc::clone(&axis.track), start);
         let settings = LineSettings {
             device: "cell".into(),
-            farewell: Vec::new(),
+            farewell,
         };
         let cell_line = Line::start(link, line, Arc::clone(&clock), settings)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
@@ -90,24 +95,12 @@ impl PartsRig {
             origin: None,
             newest: Nanos::ZERO,
             refused: VecDeque::new(),
-            first_raw: axis.raw,
+            first_raw: [axis.raw, raw].concat(),
             from_axis: None,
             from_cell: None,
             zero: 0,
             motions_shown: 0,
         })
-    }
-
-    /// Newtons of a volt, where the cell itself is calibrated.
-    #[must_use]
-    pub fn newtons_per_volt(&self) -> Option<f64> {
-        self.newtons_per_volt
-    }
-
-    /// How the links of axis and cell behave.
-    #[must_use]
-    pub fn stats(&self) -> [LinkStats; 2] {
-        [self.axis.stats(), self.cell.stats()]
     }
 
     /// The older of what has come from axis and cell, within `wait`; the axis first.
@@ -215,6 +208,17 @@ impl Rig for PartsRig {
 
     fn is_virtual(&self) -> bool {
         false
+    }
+
+    fn newtons_per_volt(&self) -> Option<f64> {
+        self.newtons_per_volt
+    }
+
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        vec![
+            ("grbl".to_owned(), self.axis.stats()),
+            ("cell".to_owned(), self.cell.stats()),
+        ]
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {

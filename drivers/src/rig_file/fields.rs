@@ -1,4 +1,5 @@
-//! The keys of a file with their lines, taken one after the other; what is left over is a mistake too.
+//! The keys of a file with their lines, taken one after the other; what is left over is a mistake too. A key of a table
+//! is called `table.key`.
 
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
@@ -48,22 +49,28 @@ impl Fields {
                 err.message().trim().replace('\n', ", ")
             ),
         })?;
-        let all = document
-            .get_ref()
-            .iter()
-            .map(|(key, value)| Field {
-                key: key.get_ref().to_string(),
-                line: line_of(text, &key.span()),
-                value: match value.get_ref() {
-                    DeValue::String(text) => Value::Text(text.to_string()),
-                    DeValue::Integer(number) => as_number(&number.to_string()),
-                    DeValue::Float(number) => as_number(&number.to_string()),
-                    DeValue::Boolean(flag) => Value::Flag(*flag),
-                    _ => Value::Other,
-                },
-                is_taken: false,
-            })
-            .collect();
+        let mut all = Vec::new();
+        for (key, value) in document.get_ref().iter() {
+            let (name, line) = (key.get_ref().to_string(), line_of(text, &key.span()));
+            match value.get_ref() {
+                DeValue::Table(table) => {
+                    for (key, value) in table.iter() {
+                        all.push(Field {
+                            key: format!("{name}.{}", key.get_ref()),
+                            line: line_of(text, &key.span()),
+                            value: value_of(value.get_ref()),
+                            is_taken: false,
+                        });
+                    }
+                }
+                value => all.push(Field {
+                    key: name,
+                    line,
+                    value: value_of(value),
+                    is_taken: false,
+                }),
+            }
+        }
         Ok(Self {
             all,
             mistakes: Vec::new(),
@@ -170,6 +177,16 @@ impl Fields {
         }
         self.mistakes.sort_by_key(|mistake| mistake.line);
         self.mistakes
+    }
+}
+
+fn value_of(value: &DeValue<'_>) -> Value {
+    match value {
+        DeValue::String(text) => Value::Text(text.to_string()),
+        DeValue::Integer(number) => as_number(&number.to_string()),
+        DeValue::Float(number) => as_number(&number.to_string()),
+        DeValue::Boolean(flag) => Value::Flag(*flag),
+        _ => Value::Other,
     }
 }
 

@@ -1,13 +1,14 @@
 //! The keys of a Galil controller.
 
 use super::fields::Fields;
+use super::place::place;
 use crate::galil::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
-    let place = place(fields);
+    let place = place(fields, "", true);
     let serial_number = fields.number("serial_number", 0.0, 1e15);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {
@@ -103,41 +104,3 @@ const SAMPLINGS: [(&str, Sampling); 3] = [
     ("poll", Sampling::Poll),
     ("record", Sampling::Record),
 ];
-
-fn place(fields: &mut Fields) -> Option<Place> {
-    let (port, address) = (fields.text("port"), fields.text("address"));
-    let baud = fields.number("baud", 300.0, 4e6);
-    let has_handshake = fields.choice(
-        "handshake",
-        &[("none", false), ("rts-cts", true)],
-        Some(false),
-    );
-    match (port, address) {
-        (Some(port), None) => Some(Place::Serial {
-            port,
-            // The factory setting of boards with an USB port, and what gclib opens them with (gclib.h, `--baud`).
-            baud: baud.unwrap_or(115_200.0) as u32,
-            has_handshake: has_handshake?,
-        }),
-        (None, Some(address)) => {
-            if baud.is_some() {
-                fields.mistake("baud", "a controller on a network has no baud rate");
-            }
-            Some(Place::Tcp(address))
-        }
-        (Some(_), Some(_)) => {
-            fields.mistake(
-                "address",
-                "a device is at a port or at an address, not at both",
-            );
-            None
-        }
-        (None, None) => {
-            fields.mistake(
-                "port",
-                "where is the controller? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\"",
-            );
-            None
-        }
-    }
-}

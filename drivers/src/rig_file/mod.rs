@@ -1,16 +1,24 @@
 //! The description of a rig as a file: what is wired to what, which no device can tell.
 //!
 //! Text in, a [`RigFile`] or every mistake with its line out; [`RigFile::open`] then opens the devices. The keys are
-//! described in `docs/guide/galil.md`.
+//! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
 
+mod cell;
 mod fields;
 mod galil;
+mod grbl;
+mod place;
+mod stand;
 
+pub use cell::CellFile;
 pub use fields::Mistake;
 
 use crate::galil::{GalilOpenError, GalilRig, GalilSettings};
+use crate::grbl::{GrblOpenError, GrblSettings};
+use crate::mark10::{StandRig, StandSettings};
+use crate::parts::PartsRig;
 use crate::rig::Rig;
-use crate::wire::{HostClock, Place};
+use crate::wire::{HostClock, Place, WireError};
 use fields::Fields;
 use std::fmt;
 use thiserror::Error;
@@ -28,6 +36,24 @@ pub enum RigFile {
         place: Place,
         /// How it is wired.
         settings: GalilSettings,
+    },
+    /// A slide on a Grbl board, and a load cell on a wire of its own.
+    Grbl {
+        /// Where the board is.
+        place: Place,
+        /// How it is wired.
+        settings: GrblSettings,
+        /// Where the cell is.
+        cell_place: Place,
+        /// What it is.
+        cell: CellFile,
+    },
+    /// A Mark-10 stand with its gauge on one line.
+    Stand {
+        /// Where it is.
+        place: Place,
+        /// What it is.
+        settings: StandSettings,
     },
 }
 
@@ -78,7 +104,10 @@ impl RigFile {
     #[must_use]
     pub fn places(&self) -> Vec<&Place> {
         match self {
-            Self::Galil { place, .. } => vec![place],
+            Self::Galil { place, .. } | Self::Stand { place, .. } => vec![place],
+            Self::Grbl {
+                place, cell_place, ..
+            } => vec![place, cell_place],
         }
     }
 
@@ -87,6 +116,24 @@ impl RigFile {
         match self {
             Self::Galil { place, settings } => {
                 Ok(Box::new(GalilRig::open(place, settings, clock.clone())?))
+            }
+            Self::Grbl {
+                place,
+                settings,
+                cell_place,
+                cell,
+            } => {
+                let axis_link = place.open()?;
+                let mut cell_link = cell_place.open()?;
+                let (description, axis) = crate::grbl::open(axis_link, settings, clock)?;
+                let opened = cell.open(cell_link.as_mut(), clock)?;
+                let rig = PartsRig::new(description, axis, cell_link, opened, clock.clone());
+                Ok(Box::new(
+                    rig.map_err(|err| DeviceError::Thread(err.to_string()))?,
+                ))
+            }
+            Self::Stand { place, settings } => {
+                Ok(Box::new(StandRig::open(place, settings, clock.clone())?))
             }
         }
     }
@@ -99,16 +146,63 @@ pub enum DeviceError {
     /// A Galil controller.
     #[error(transparent)]
     Galil(#[from] GalilOpenError),
-    /// A device that speaks in lines: a gauge, a stand, an HX711 board.
+    /// A Grbl board.
     #[error(transparent)]
-    Lines(#[from] crate::text::DeviceError),
+    Grbl(#[from] GrblOpenError),
+    /// A load cell or a stand.
+    #[error(transparent)]
+    Text(#[from] crate::text::DeviceError),
+    /// A port cannot be opened.
+    #[error(transparent)]
+    Wire(#[from] WireError),
+    /// No thread for it.
+    #[error("the operating system gives no thread for a link ({0})")]
+    Thread(String),
+}
+
+#[derive(Clone, Copy)]
+enum Device {
+    Galil,
+    Grbl,
+    Stand,
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
-    fields.choice("device", &[("galil", ())], None);
+    let devices = [
+        ("galil", Device::Galil),
+        ("grbl", Device::Grbl),
+        ("mark10-stand", Device::Stand),
+    ];
+    let device = fields.choice("device", &devices, None)?;
     let name = fields.text("name").unwrap_or_else(|| stem(file));
-    let (place, settings) = galil::read(name, fields)?;
-    Some(RigFile::Galil { place, settings })
+    match device {
+        Device::Galil => {
+            let (place, settings) = galil::read(name, fields)?;
+            Some(RigFile::Galil { place, settings })
+        }
+        Device::Grbl => {
+            // Both are read, so that the mistakes of both are told.
+            let (axis, cell) = (grbl::read(name, fields), cell::read(fields));
+            let ((place, settings), (cell_place, cell)) = (axis?, cell?);
+            if place == cell_place {
+                fields.mistake(
+                    "cell.port",
+                    "the board is at this port; the load cell has another",
+                );
+                return None;
+            }
+            Some(RigFile::Grbl {
+                place,
+                settings,
+                cell_place,
+                cell,
+            })
+        }
+        Device::Stand => {
+            let (place, settings) = stand::read(name, fields)?;
+            Some(RigFile::Stand { place, settings })
+        }
+    }
 }
 
 /// The file's name without folders and ending.

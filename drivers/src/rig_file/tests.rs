@@ -1,5 +1,5 @@
 use super::*;
-use crate::galil::AnalogRange;
+use crate::galil::{AnalogRange, Sampling};
 
 const THESIS: &str = r#"# The slide of the source thesis
 device = "galil"
@@ -14,6 +14,7 @@ converter = "16 bit"
 fn galil(file: &str, text: &str) -> (Place, GalilSettings) {
     match RigFile::parse(file, text).unwrap() {
         RigFile::Galil { place, settings } => (place, settings),
+        other => panic!("{other:?}"),
     }
 }
 
@@ -42,6 +43,7 @@ fn what_is_not_said_is_usual() {
     assert_eq!(galil.range, AnalogRange::Bipolar10);
     assert_eq!(galil.noise.0, 20.0 / 65_536.0);
     assert!(galil.has_watchdog && !galil.is_reversed);
+    assert_eq!((galil.sampling, galil.sample_us), (Sampling::Auto, None));
 }
 
 #[test]
@@ -60,6 +62,8 @@ noise_v = 0.002
 filter = "RC low-pass, 100 Hz"
 serial_number = 1820
 watchdog = false
+sampling = "record"
+sample_us = 500
 "#;
     let (place, galil) = galil("x.toml", &text);
     assert_eq!(place, Place::Tcp("10.0.0.5:23".into()));
@@ -69,6 +73,8 @@ watchdog = false
     assert_eq!(galil.serial_number, Some(1820));
     assert_eq!(galil.filter.as_deref(), Some("RC low-pass, 100 Hz"));
     assert!(!galil.has_watchdog);
+    assert_eq!(galil.sampling, Sampling::Record);
+    assert_eq!(galil.sample_us, Some(500));
 }
 
 #[test]
@@ -99,7 +105,7 @@ fn what_does_not_go_together_is_told() {
     assert!(mistakes(&nowhere)[0].1.contains("where is the controller"));
     let slow = THESIS.replace("61.44", "5");
     assert!(mistakes(&slow)[0].1.contains("no less than 15.36"));
-    let other = THESIS.replace("\"galil\"", "\"grbl\"");
+    let other = THESIS.replace("\"galil\"", "\"marlin\"");
     assert!(mistakes(&other)[0].1.contains("give \"galil\""));
 }
 
@@ -111,10 +117,67 @@ fn what_is_no_rig_file_is_told() {
             .1
             .contains("no rig file")
     );
-    assert!(mistakes("").len() > 3);
+    assert_eq!(mistakes("").len(), 1);
+    assert!(mistakes("device = \"galil\"").len() > 3);
     assert!(
         mistakes(&THESIS.replace("150", "inf"))[0]
             .1
             .contains("travel_mm")
     );
+}
+
+const PARTS: &str = r#"device = "grbl"
+port = "/dev/ttyACM0"
+mm_per_pulse = 0.0025
+travel_mm = 150
+speed_max_mm_s = 20
+acceleration_mm_s2 = 60
+home_switch = "probe"
+
+[cell]
+device = "hx711"
+port = "/dev/ttyACM1"
+"#;
+
+#[test]
+fn a_rig_of_parts_has_two_places() {
+    let file = RigFile::parse("bench.toml", PARTS).unwrap();
+    let ports: Vec<String> = file.places().iter().map(ToString::to_string).collect();
+    assert_eq!(
+        ports,
+        ["/dev/ttyACM0 at 115200 baud", "/dev/ttyACM1 at 115200 baud"]
+    );
+    let gauge = PARTS.replace("hx711", "mark10") + "capacity_n = 25\nfilter = 4\n";
+    let RigFile::Grbl { cell, settings, .. } = RigFile::parse("bench.toml", &gauge).unwrap() else {
+        panic!("no parts");
+    };
+    assert!(!settings.is_unlocking && settings.axis == 'X');
+    let CellFile::Mark10(gauge) = cell else {
+        panic!("{cell:?}");
+    };
+    assert_eq!((gauge.capacity.0, gauge.filter), (25.0, Some(4)));
+}
+
+#[test]
+fn mistakes_of_both_parts_are_told() {
+    let text = PARTS
+        .replace("\"probe\"", "\"none\"")
+        .replace("\"hx711\"", "\"mark10\"")
+        + "board = \"A\"\nreadings_per_second = 60\n";
+    let told = mistakes(&text);
+    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [0, 7, 12, 13], "{told:?}");
+    assert!(told[0].1.contains("cell.capacity_n: is missing"));
+    assert!(told[2].1.contains("'cell.board' means nothing"));
+    let one = PARTS.replace("ttyACM1", "ttyACM0");
+    assert!(mistakes(&one)[0].1.contains("another"));
+}
+
+#[test]
+fn a_stand_is_one_device() {
+    let text = "device = \"mark10-stand\"\nport = \"/dev/ttyUSB0\"\ntravel_mm = 300\nspeed_max_mm_s = 10\n\
+        acceleration_mm_s2 = 100\n[cell]\ncapacity_n = 25\n";
+    let file = RigFile::parse("stand.toml", text).unwrap();
+    assert!(matches!(file, RigFile::Stand { .. }), "{file:?}");
+    assert_eq!(file.places().len(), 1);
 }

@@ -155,6 +155,11 @@ impl Rig for StandRig {
         false
     }
 
+    fn newtons_per_volt(&self) -> Option<f64> {
+        // The gauge tells newtons, each of which counts as a volt.
+        Some(1.0)
+    }
+
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.first_raw);
         raw.extend(self.line.iter().flat_map(Line::take_raw));

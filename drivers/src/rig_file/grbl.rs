@@ -1,0 +1,46 @@
+//! The keys of a Grbl board.
+
+use super::fields::Fields;
+use super::place::place;
+use crate::grbl::{GrblSettings, HomeSwitch};
+use crate::wire::Place;
+use palpate_model::units::{MmPerS, MmPerS2, Position};
+
+/// Where the board is, and how it is wired.
+pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
+    // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
+    let place = place(fields, "", true);
+    let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
+    let axis = fields.choice("axis", &axes, Some('X'));
+    let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
+    let is_reversed = fields.choice(
+        "direction",
+        &[("forward", false), ("reverse", true)],
+        Some(false),
+    );
+    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
+    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
+    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
+    let home = fields.choice(
+        "home_switch",
+        &[("limit", HomeSwitch::Limit), ("probe", HomeSwitch::Probe)],
+        None,
+    );
+    let build_info = fields.text("build_info");
+    let is_unlocking = fields.flag("unlock").unwrap_or(false);
+    Some((
+        place?,
+        GrblSettings {
+            name,
+            axis: axis?,
+            mm_per_pulse: mm_per_pulse?,
+            is_reversed: is_reversed?,
+            travel: Position(travel?),
+            speed_max: MmPerS(speed_max?),
+            acceleration: MmPerS2(acceleration?),
+            home: home?,
+            build_info,
+            is_unlocking,
+        },
+    ))
+}

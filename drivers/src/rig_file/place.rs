@@ -1,0 +1,61 @@
+//! The keys that say where a device is.
+
+use super::fields::Fields;
+use crate::wire::Place;
+
+/// Reads `port`, `baud`, `handshake` and, for a device that can be on a network, `address`, behind a table's name and a
+/// dot or nothing.
+pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Option<Place> {
+    let key = |name: &str| format!("{table}{name}");
+    let port = fields.text(&key("port"));
+    let address = if has_network {
+        fields.text(&key("address"))
+    } else {
+        None
+    };
+    let baud = fields.number(&key("baud"), 300.0, 4e6);
+    let has_handshake = fields.choice(
+        &key("handshake"),
+        &[("none", false), ("rts-cts", true)],
+        Some(false),
+    );
+    match (port, address) {
+        (Some(port), None) => Some(Place::Serial {
+            port,
+            // The factory setting of Galil boards with an USB port, and what gclib opens them with (gclib.h, `--baud`);
+            // that of Grbl 1.1 (doc/markdown/interface.md), of Mark-10 stands, and of the sketch for HX711 boards.
+            baud: baud.unwrap_or(115_200.0) as u32,
+            has_handshake: has_handshake?,
+        }),
+        (None, Some(address)) => {
+            if baud.is_some() {
+                fields.mistake(&key("baud"), "a controller on a network has no baud rate");
+            }
+            Some(Place::Tcp(address))
+        }
+        (Some(_), Some(_)) => {
+            fields.mistake(
+                &key("address"),
+                "a device is at a port or at an address, not at both",
+            );
+            None
+        }
+        (None, None) => {
+            let network = if has_network {
+                " or address = \"192.168.1.10:23\""
+            } else {
+                ""
+            };
+            let what = if table.is_empty() {
+                "controller"
+            } else {
+                "load cell"
+            };
+            fields.mistake(
+                &key("port"),
+                &format!("where is the {what}? Give port = \"/dev/ttyUSB0\"{network}"),
+            );
+            None
+        }
+    }
+}

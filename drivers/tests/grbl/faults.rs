@@ -1,0 +1,151 @@
+//! What goes wrong ends with the axis at rest and in words.
+
+use crate::bench::{Host, slide, to, wired};
+use palpate_drivers::emulate::DeviceFault;
+use palpate_drivers::emulate::bench::EmulatedAxis;
+use palpate_drivers::emulate::grbl::{self, HomeWiring};
+use palpate_drivers::grbl::{GrblSettings, HomeSwitch};
+use palpate_drivers::wire::Dialogue;
+use palpate_model::Nanos;
+use palpate_model::random::SplitMix;
+use palpate_model::rig::{Fault, RigCommand};
+
+#[test]
+fn a_cut_cable_stops_the_axis_within_the_stated_way() {
+    for (speed, after) in [(20.0, 0.3), (20.0, 1.0), (0.75, 1.0), (9.0, 0.05)] {
+        let mut host = Host::new(&slide());
+        host.tell(to(40_000, speed));
+        host.pass(after);
+        let mut wire = host.wire.lock();
+        let before = wire.board.place_mm();
+        wire.is_cut = true;
+        wire.pass(Nanos::from_millis(5_000));
+        let way = wire.board.place_mm() - before;
+        assert!(
+            way > 0.0 && way <= host.connected.worst_case_mm,
+            "{speed}: {way}"
+        );
+        wire.pass(Nanos::from_millis(1_000));
+        assert_eq!(wire.board.place_mm() - before, way);
+    }
+}
+
+#[test]
+fn a_host_that_hangs_stops_the_axis() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 9.0));
+    host.pass(0.5);
+    host.is_attended = false;
+    host.pass(1.5);
+    let there = host.truth();
+    host.pass(1.0);
+    assert_eq!((host.truth(), host.pulses()), (there, there));
+    assert!(
+        host.faults[0].to_string().contains("half a second"),
+        "{:?}",
+        host.faults
+    );
+}
+
+#[test]
+fn silence_counts_as_death() {
+    let mut host = Host::new(&slide());
+    host.wire.lock().spoil = Box::new(|_| Vec::new());
+    host.until("dead", |host| host.session.is_dead(host.now()).is_some());
+}
+
+#[test]
+fn a_limit_switch_that_locks_the_board_is_told() {
+    let mut eeprom = grbl::Eeprom::slide();
+    eeprom.set(21, 1.0).expect("it takes it");
+    let wire = wired(grbl::GrblSettings {
+        eeprom,
+        home: HomeWiring::Probe,
+        ..grbl::GrblSettings::default()
+    });
+    let mut host = Host::on(
+        wire,
+        &GrblSettings {
+            home: HomeSwitch::Probe,
+            ..slide()
+        },
+    );
+    host.tell(to(90_000, 20.0));
+    host.until("a fault", |host| !host.faults.is_empty());
+    let said = host.faults[0].to_string();
+    assert!(
+        said.contains("ALARM:1") && said.contains("limit switch"),
+        "{said}"
+    );
+    assert!(host.refused(to(0, 5.0)).contains("ALARM:1"));
+    host.tell(RigCommand::Stop);
+}
+
+#[test]
+fn a_reset_is_noticed_and_nothing_moves_after_it() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 9.0));
+    host.pass(0.5);
+    {
+        let mut wire = host.wire.lock();
+        // Short, as Ctrl-X of somebody else.
+        let now = wire.now;
+        wire.board.receive(now, &[0x18]);
+    }
+    host.until("noticed", |host| {
+        host.faults
+            .iter()
+            .any(|fault| *fault == Fault::ControllerReset)
+    });
+    host.pass(0.5);
+    let there = host.truth();
+    assert!(host.refused(to(0, 5.0)).contains("open the rig again"));
+    host.pass(1.0);
+    assert_eq!(host.truth(), there);
+}
+
+#[test]
+fn a_drop_of_the_supply_is_noticed() {
+    let mut host = Host::new(&slide());
+    {
+        let mut wire = host.wire.lock();
+        let now = wire.now;
+        wire.board.suffer(now, DeviceFault::Reset, true);
+    }
+    host.until("noticed", |host| {
+        host.faults.contains(&Fault::ControllerReset) || host.session.is_dead(host.now()).is_some()
+    });
+}
+
+#[test]
+fn spoilt_bytes_end_at_rest_and_never_without_a_word() {
+    for seed in 0..60 {
+        let mut host = Host::new(&slide());
+        let mut random = SplitMix::seeded(seed);
+        let kind = seed % 3;
+        host.ask(to(6_000, 9.0));
+        host.pass(0.3);
+        host.wire.lock().spoil = Box::new(move |byte| match (random.below(25), kind) {
+            (0, 0) => vec![random.below(256) as u8],
+            (0, 1) => vec![],
+            (0, _) => vec![byte, byte],
+            _ => vec![byte],
+        });
+        for _ in 0..4_000 {
+            if host.session.is_dead(host.now()).is_some() {
+                break;
+            }
+            host.turn().expect("the wire is whole");
+        }
+        host.wire.lock().spoil = Box::new(|byte| vec![byte]);
+        host.pass(1.0);
+        let there = host.truth();
+        host.pass(1.0);
+        assert_eq!(host.truth(), there, "seed {seed}: it still moves");
+        let is_done = there == 6_000.0 && host.pulses() == 6_000.0;
+        assert!(
+            is_done || !host.faults.is_empty(),
+            "seed {seed}: {there} and no word"
+        );
+    }
+}

@@ -1,0 +1,153 @@
+//! A board is looked at before it is used, and nothing of it is changed.
+
+use crate::bench::{slide, try_connect, wired};
+use palpate_drivers::emulate::DeviceFault;
+use palpate_drivers::emulate::bench::EmulatedAxis;
+use palpate_drivers::emulate::grbl::{self, Eeprom};
+use palpate_drivers::grbl::{GrblOpenError, GrblSettings, HomeSwitch};
+use palpate_model::Nanos;
+
+fn board(values: &[(u16, f64)]) -> grbl::GrblSettings {
+    let mut settings = grbl::GrblSettings::default();
+    for (number, value) in values {
+        settings.eeprom.set(*number, *value).expect("it takes it");
+    }
+    settings
+}
+
+fn refused(values: &[(u16, f64)], settings: &GrblSettings) -> String {
+    let wire = wired(board(values));
+    let err = try_connect(&wire, settings).expect_err("refused");
+    assert_eq!(wire.lock().board.place_mm(), 0.0);
+    err.to_string()
+}
+
+#[test]
+fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
+    for (number, value, words) in [
+        (100, 250.0, "$100=400.000"),
+        (110, 600.0, "$110=1200.000"),
+        (120, 10.0, "$120=60.000"),
+        (1, 25.0, "$1=255"),
+        (13, 1.0, "$13=0"),
+        (21, 1.0, "$21=0"),
+        (10, 0.0, "$10=1"),
+    ] {
+        let said = refused(&[(number, value)], &slide());
+        assert!(
+            said.contains(words) && said.contains(&format!("${number}={value}")),
+            "{said}"
+        );
+    }
+    let probe = GrblSettings {
+        home: HomeSwitch::Probe,
+        ..slide()
+    };
+    assert!(refused(&[], &probe).contains("$21=1"));
+}
+
+#[test]
+fn a_locked_board_is_unlocked_only_when_the_rig_file_says_so() {
+    let locked = [(22, 1.0)];
+    let said = refused(&locked, &slide());
+    assert!(said.contains("unlock = true"), "{said}");
+    let wire = wired(board(&locked));
+    let settings = GrblSettings {
+        is_unlocking: true,
+        ..slide()
+    };
+    try_connect(&wire, &settings).expect("it connects");
+    assert!(String::from_utf8_lossy(&wire.lock().sent).contains("$X\n"));
+}
+
+#[test]
+fn a_board_that_starts_is_waited_for() {
+    let wire = wired(grbl::GrblSettings {
+        is_unused: true,
+        ..grbl::GrblSettings::default()
+    });
+    {
+        let mut wire = wire.lock();
+        let now = wire.now;
+        wire.board.suffer(now, DeviceFault::Reset, true);
+    }
+    let connected = try_connect(&wire, &slide()).expect("it connects");
+    assert!(
+        connected.identity.contains("1.1h"),
+        "{}",
+        connected.identity
+    );
+    assert!(connected.stats.round_trip_min >= Nanos(6_000_000));
+}
+
+#[test]
+fn a_jog_of_somebody_else_is_ended() {
+    let wire = wired(grbl::GrblSettings::default());
+    {
+        let mut wire = wire.lock();
+        let now = wire.now;
+        wire.board.receive(now, b"$J=G91X50F600\n$J=G9");
+        wire.pass(Nanos::from_millis(500));
+        assert!(wire.board.place_mm() > 1.0);
+    }
+    let connected = try_connect(&wire, &slide()).expect("it connects");
+    let truth = (wire.lock().board.place_mm() / 0.0025).round();
+    assert_eq!(connected.facts.steps as f64, truth);
+    assert!(truth < 4_000.0);
+}
+
+#[test]
+fn another_board_is_noticed() {
+    let mut own = grbl::GrblSettings::default();
+    own.eeprom.build_info = "LEFT".into();
+    let settings = GrblSettings {
+        build_info: Some("RIGHT".into()),
+        ..slide()
+    };
+    let err = try_connect(&wired(own), &settings).expect_err("refused");
+    assert!(matches!(err, GrblOpenError::OtherBoard { .. }), "{err}");
+    let wire = wired(grbl::GrblSettings::default());
+    {
+        let mut wire = wire.lock();
+        wire.board
+            .suffer(Nanos::ZERO, DeviceFault::WrongDevice, true);
+        wire.board.receive(Nanos::ZERO, &[0x18]);
+    }
+    let err = try_connect(&wire, &slide()).expect_err("refused");
+    assert!(err.to_string().contains("0.9j"), "{err}");
+}
+
+#[test]
+fn nobody_and_somebody_else_are_told() {
+    let wire = wired(grbl::GrblSettings::default());
+    wire.lock().spoil = Box::new(|_| Vec::new());
+    assert_eq!(
+        try_connect(&wire, &slide()).unwrap_err(),
+        GrblOpenError::Silent
+    );
+    let wire = wired(grbl::GrblSettings::default());
+    wire.lock().spoil = Box::new(|byte| {
+        if byte == b'\n' {
+            vec![byte]
+        } else {
+            vec![b'A' + byte % 16]
+        }
+    });
+    let err = try_connect(&wire, &slide()).unwrap_err();
+    assert!(matches!(err, GrblOpenError::NotGrbl { .. }), "{err}");
+    let wire = wired(grbl::GrblSettings::default());
+    wire.lock().is_cut = true;
+    assert!(matches!(
+        try_connect(&wire, &slide()),
+        Err(GrblOpenError::Lost { .. })
+    ));
+    let eeprom = Eeprom::factory();
+    let err = try_connect(
+        &wired(grbl::GrblSettings {
+            eeprom,
+            ..grbl::GrblSettings::default()
+        }),
+        &slide(),
+    );
+    assert!(matches!(err, Err(GrblOpenError::SetOtherwise { .. })));
+}

@@ -1,0 +1,10 @@
+//! The Grbl driver against the emulated board: in simulated time, and over real wires.
+
+#[path = "grbl/bench.rs"]
+mod bench;
+#[path = "grbl/faults.rs"]
+mod faults;
+#[path = "grbl/moves.rs"]
+mod moves;
+#[path = "grbl/opening.rs"]
+mod opening;
