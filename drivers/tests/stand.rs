@@ -10,3 +10,5 @@ mod moves;
 mod opening;
 #[path = "stand/streams.rs"]
 mod streams;
+#[path = "stand/wires.rs"]
+mod wires;

@@ -294,8 +294,7 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
             seed,
             ..EmulatedGaugeSettings::default()
         },
-        is_without_control: false,
-        reaction: Nanos::ZERO,
+        ..EmulatedStandSettings::default()
     });
     let is_serial = args.wire.tcp.is_none();
     let mut ready = |at: &str| {

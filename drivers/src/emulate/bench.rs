@@ -104,7 +104,7 @@ impl Device for Bench {
             self.plant.advance(self.axis.place_mm(), STEP_SECS);
             let felt = Felt {
                 volts: self.plant.volts(),
-                force: self.plant.force(),
+                force: self.plant.on_cell(),
             };
             self.cell.advance(self.now, felt);
         }

@@ -16,6 +16,7 @@ pub struct Plant {
     /// True position of the axis.
     axis: Position,
     force: Newtons,
+    on_cell: Newtons,
     volts: Volts,
     fault: Option<CellFault>,
 }
@@ -44,6 +45,7 @@ impl Plant {
             counter_zero,
             axis: counter_zero,
             force: Newtons(0.0),
+            on_cell: Newtons(0.0),
             volts: Volts(0.0),
             fault: None,
         };
@@ -56,6 +58,7 @@ impl Plant {
         self.axis = self.counter_zero.moved_by(counted_mm);
         let felt = self.bench.advance(self.axis, dt);
         self.force = felt.on_probe;
+        self.on_cell = felt.on_cell;
         let volts = self.cell.signal(felt.on_cell);
         self.volts = match self.fault {
             None => volts,
@@ -84,6 +87,12 @@ impl Plant {
     #[must_use]
     pub fn force(&self) -> Newtons {
         self.force
+    }
+
+    /// Force on the cell at the newest step: that on the probe, and weights that a person has put on.
+    #[must_use]
+    pub fn on_cell(&self) -> Newtons {
+        self.on_cell
     }
 
     /// True position of the axis, in mm from the edge of the home switch.
@@ -142,6 +151,7 @@ mod tests {
         plant.by_hand(HandAction::LoadCell { mass_g: 400.0 });
         plant.advance(at, dt);
         assert!(plant.volts().0 > free.0 + 0.05 && plant.force().0 == 0.0);
+        assert!((plant.on_cell().0 - 0.4 * 9.80665).abs() < 0.01);
         plant.spoil(Some(CellFault::Stuck));
         let stuck = plant.volts();
         plant.advance(at - 5.0, dt);

@@ -1,13 +1,16 @@
 //! Random bytes: no panic, bounded memory, equal events however they are cut.
 
+use super::bench::CellBench;
 use palpate_drivers::cell::{CellDialogue, CellSample};
+use palpate_drivers::emulate::DeviceFault;
 use palpate_drivers::emulate::cell::{EmulatedCell, Felt};
 use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
-use palpate_drivers::hx711::Hx711Dialogue;
 use palpate_drivers::hx711::protocol::{Header, Message, line};
-use palpate_drivers::mark10::gauge::{GaugeDialogue, GaugeScale};
+use palpate_drivers::hx711::{self, Hx711Dialogue, Hx711Settings};
+use palpate_drivers::mark10::gauge::{self, GaugeDialogue, GaugeScale, GaugeSettings};
 use palpate_drivers::mark10::protocol::ForceUnit;
+use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 use rand_distr::{Distribution, StandardUniform};
@@ -173,6 +176,66 @@ fn streams_of_random_bytes_do_no_harm_however_they_are_cut() {
         assert!(said.contains(answer), "{said}");
     }
     println!("{streams} streams of random bytes");
+}
+
+/// Says whatever comes to its mind, at any time.
+struct Babbler(Dice);
+
+impl EmulatedCell for Babbler {
+    fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
+    fn advance(&mut self, _now: Nanos, _felt: Felt) {}
+    fn transmit(&mut self) -> Vec<u8> {
+        if self.0.below(20) == 0 {
+            self.0.stream()
+        } else {
+            Vec::new()
+        }
+    }
+    fn suffer(&mut self, _now: Nanos, _fault: DeviceFault, _is_on: bool) {}
+}
+
+#[test]
+fn opening_comes_to_an_end_whoever_answers() {
+    for seed in 0..60 {
+        let babbler = || CellBench::new(Babbler(Dice(Pcg64::new(seed, 29))));
+        let name = "cell".into();
+        let bench = babbler();
+        let opened = hx711::open(
+            &mut bench.clone(),
+            &bench.clock(),
+            &Hx711Settings::default(),
+            &name,
+        );
+        check(&bench, opened, seed);
+        let bench = babbler();
+        let opened = gauge::open(
+            &mut bench.clone(),
+            &bench.clock(),
+            &GaugeSettings::default(),
+            &name,
+        );
+        check(&bench, opened, seed);
+    }
+}
+
+/// Half a minute is the end of anybody's patience; what was opened is sensible, what was not is told.
+fn check(bench: &CellBench<Babbler>, opened: Result<OpenedCell, DeviceError>, seed: u128) {
+    let passed = bench.clock()().since(Nanos::from_millis(1_000));
+    assert!(
+        passed < Nanos::from_millis(30_000),
+        "seed {seed}: {passed:?}"
+    );
+    match opened {
+        Ok(cell) => {
+            let found = cell.description;
+            assert!(
+                found.rate > 0.0 && found.rate.is_finite(),
+                "seed {seed}: {found:?}"
+            );
+            assert!(found.adc.volts_per_count > 0.0);
+        }
+        Err(err) => assert!(err.to_string().len() > 20, "seed {seed}: {err}"),
+    }
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! Random bytes to both sides: no panic, bounded memory, equal events however they are cut.
 
-use super::bench::{Host, to};
+use super::bench::{Host, Shared, to, usual};
 use palpate_drivers::emulate::Device;
 use palpate_drivers::emulate::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_drivers::mark10::stand::protocol::{Pair, Status, number, travel};
@@ -162,5 +162,31 @@ fn a_session_takes_anything_and_the_stand_stays_in_its_travel() {
         assert!(!host.wire.lock().emulator.is_moving());
         let travel = host.travel();
         assert!(travel > -15.01 && travel < 0.01, "seed {seed}: {travel}");
+    }
+}
+
+#[test]
+fn opening_comes_to_an_end_whoever_answers() {
+    for seed in 0..60 {
+        let wire = Shared::new(EmulatedStandSettings::default());
+        let mut babbler = Dice(Pcg64::new(seed, 31));
+        wire.lock().spoil = Box::new(move |byte| match babbler.below(12) {
+            0 => babbler.stream(),
+            _ => vec![byte],
+        });
+        let opened = wire.connect(&usual());
+        let passed = wire.lock().now;
+        assert!(
+            passed < Nanos::from_millis(30_000),
+            "seed {seed}: {passed:?}"
+        );
+        match opened {
+            Ok(connected) => {
+                let found = connected.description;
+                assert!(found.ticks_per_sample.is_finite() && found.ticks_per_sample >= 1.0);
+            }
+            Err(err) => assert!(err.to_string().len() > 20, "seed {seed}: {err}"),
+        }
+        assert!(!wire.lock().emulator.is_moving());
     }
 }

@@ -389,7 +389,7 @@ impl Device for EmulatedStand {
             self.plant.advance(-self.position, Seconds(dt));
             let felt = Felt {
                 volts: self.plant.volts(),
-                force: self.plant.force(),
+                force: self.plant.on_cell(),
             };
             self.gauge.advance(self.now, felt);
             self.pass_on();
