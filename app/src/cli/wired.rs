@@ -270,7 +270,9 @@ impl Stretch {
         self.sum_v += volts;
         self.min_v = self.min_v.min(volts);
         self.max_v = self.max_v.max(volts);
-        self.age_max = self.age_max.max(reading.age.map_or(Nanos::ZERO, |age| age.by));
+        self.age_max = self
+            .age_max
+            .max(reading.age.map_or(Nanos::ZERO, |age| age.by));
         self.longest_gap = self.longest_gap.max(ticks);
     }
 

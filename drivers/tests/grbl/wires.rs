@@ -230,7 +230,7 @@ fn a_cell_that_falls_silent_stops_the_axis() {
     client.tell(RigCommand::MoveTo(to(40_000, 5.0)));
     client.until("moving", Client::is_moving);
     // Nothing comes from either device for as long as the cell may be silent, and from the board shorter than it may be.
-    served.orders.send("mute:0.8".into()).expect("it listens");
+    served.orders.send("mute:0.7".into()).expect("it listens");
     client.until("told", |client| {
         client
             .faults
