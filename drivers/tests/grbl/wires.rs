@@ -14,16 +14,17 @@ use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
+use std::io::Write;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::mpsc::{Sender, channel};
+use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 struct Served {
     stop: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
-    orders: Sender<String>,
+    orders: SyncSender<String>,
     places: Vec<String>,
 }
 
@@ -40,28 +41,32 @@ impl Drop for Served {
 fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
-    let (orders, received) = channel();
-    let (tell, told) = channel();
-    let thread = std::thread::spawn(move || {
-        let cell: Box<dyn EmulatedCell> = if is_gauge {
-            Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default()))
-        } else {
-            Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
-        };
-        let board = Grbl::new(GrblSettings::default());
-        let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
-        let options = ServeOptions {
-            place: Place::Ptys(vec![None, None]),
-            baud: None,
-            latency: Nanos::ZERO,
-            faults,
-            seed: 1,
-        };
-        let mut listener = |said| drop(tell.send(said));
-        if let Err(err) = serve(&mut device, &options, &received, &asked, &mut listener) {
-            println!("skipped: {err}");
-        }
-    });
+    let (orders, received) = sync_channel(4);
+    let (tell, told) = sync_channel(64);
+    let thread = std::thread::Builder::new()
+        .name("emulator".into())
+        .spawn(move || {
+            let cell: Box<dyn EmulatedCell> = if is_gauge {
+                Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default()))
+            } else {
+                Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
+            };
+            let board = Grbl::new(GrblSettings::default());
+            let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
+            let options = ServeOptions {
+                place: Place::Ptys(vec![None, None]),
+                baud: None,
+                latency: Nanos::ZERO,
+                faults,
+                seed: 1,
+            };
+            let mut listener = |said| drop(tell.try_send(said));
+            let served = serve(&mut device, &options, &received, &asked, &mut listener);
+            if let Err(err) = served {
+                writeln!(std::io::stderr(), "skipped: {err}").expect("standard error is open");
+            }
+        })
+        .expect("a thread");
     let Ok(Told::Ready(places)) = told.recv_timeout(Duration::from_secs(20)) else {
         return None;
     };
@@ -71,6 +76,11 @@ fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
         orders,
         places: places.split(", ").map(str::to_owned).collect(),
     })
+}
+
+#[expect(clippy::disallowed_methods, reason = "real wires take real time")]
+fn now() -> Instant {
+    Instant::now()
 }
 
 /// The rig of a rig file, with a test's clock.
@@ -92,11 +102,11 @@ impl Client {
              acceleration_mm_s2 = 60\nhome_switch = \"limit\"\n[cell]\nport = \"{cell_port}\"\n{cell}\n"
         );
         let file = RigFile::parse("bench.toml", &text).expect("a rig file");
-        let start = Instant::now();
+        let start = now();
         let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
         Self {
             rig: file.open(&clock).expect("it opens"),
-            start: Instant::now(),
+            start: now(),
             readings: Vec::new(),
             acks: Vec::new(),
             faults: Vec::new(),
@@ -115,9 +125,9 @@ impl Client {
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        let end = Instant::now() + Duration::from_secs(30);
+        let end = now() + Duration::from_secs(30);
         while !is_so(self) {
-            assert!(Instant::now() < end, "{what} never: {:?}", self.faults);
+            assert!(now() < end, "{what} never: {:?}", self.faults);
             self.turn();
         }
     }
