@@ -80,6 +80,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).reconnect()
     }
 
+    fn link(&self) -> Option<&str> {
+        (**self).link()
+    }
+
     fn is_virtual(&self) -> bool {
         (**self).is_virtual()
     }

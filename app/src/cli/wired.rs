@@ -257,6 +257,7 @@ struct Stretch {
     min_v: f64,
     max_v: f64,
     age_max: Nanos,
+    within_max: Nanos,
     longest_gap: u64,
 }
 
@@ -270,9 +271,10 @@ impl Stretch {
         self.sum_v += volts;
         self.min_v = self.min_v.min(volts);
         self.max_v = self.max_v.max(volts);
-        self.age_max = self
-            .age_max
-            .max(reading.age.map_or(Nanos::ZERO, |age| age.by));
+        if let Some(age) = reading.age {
+            self.age_max = self.age_max.max(age.by);
+            self.within_max = self.within_max.max(age.within);
+        }
         self.longest_gap = self.longest_gap.max(ticks);
     }
 
@@ -294,6 +296,7 @@ impl Stretch {
         self.samples += other.samples;
         self.sum_v += other.sum_v;
         self.age_max = self.age_max.max(other.age_max);
+        self.within_max = self.within_max.max(other.within_max);
         self.longest_gap = self.longest_gap.max(other.longest_gap);
     }
 
@@ -357,6 +360,7 @@ fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
         "signal_min_V": (whole.samples > 0).then_some(whole.min_v),
         "signal_max_V": (whole.samples > 0).then_some(whole.max_v),
         "age_max_s": whole.age_max.seconds().0,
+        "age_within_s": whole.within_max.seconds().0,
         "longest_gap_s": whole.longest_gap as f64 * tick,
         "pulses": newest.map(|reading| reading.pulses),
         "position_mm": newest.map(|reading| place_mm(rig.as_ref(), &reading)),
@@ -398,11 +402,12 @@ fn told(rig: &dyn Rig, newest: Option<&Reading>, recent: &Stretch, since: Nanos)
         .map(|(_, name)| name);
     let states = states.collect::<Vec<&str>>().join(", ");
     format!(
-        "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old  {states}",
+        "{mean:9.4} V ({:.4} to {:.4})  {:9.3} mm  {:6.1} samples/s, up to {:.2} ms old within {:.2}  {states}",
         recent.min_v,
         recent.max_v,
         place_mm(rig, reading),
         recent.samples as f64 / since.seconds().0,
-        recent.age_max.seconds().0 * 1e3
+        recent.age_max.seconds().0 * 1e3,
+        recent.within_max.seconds().0 * 1e3
     )
 }

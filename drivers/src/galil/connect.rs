@@ -44,6 +44,8 @@ pub struct Connected {
     pub pace: Pace,
     /// The link as it was measured.
     pub stats: LinkStats,
+    /// The same in words: latency, jitter, and what was made of it.
+    pub link: String,
     /// The recording that was started, if one was.
     pub plan: Option<Plan>,
     /// Whether the watchdog's program runs.
@@ -78,7 +80,12 @@ pub fn connect(
     // From here on only the signal has decimals, and its form is said with it: short answers are fast ones.
     console.try_ask("VF 10.0")?;
     let measured = capture::measure(&mut console, settings)?;
-    let Capture { pace, plan, words } = capture::set_up(&mut console, settings, &measured, tick)?;
+    let Capture {
+        pace,
+        plan,
+        words,
+        measured: how,
+    } = capture::set_up(&mut console, settings, &measured, tick)?;
     let stats = LinkStats {
         in_flight: pace.in_flight,
         ..measured.stats
@@ -93,17 +100,19 @@ pub fn connect(
         format!("{watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost");
     let ms = |span: Nanos| span.0 as f64 * 1e-6;
     let link = format!(
-        "an answer takes {:.1} to {:.1} ms, samples {words}",
+        "an answer takes {:.1} to {:.1} ms; {how}",
         ms(stats.round_trip_min),
         ms(stats.round_trip_max)
     );
-    let words = format!("{safety}; {link}");
+    // Whatever changes from one opening to the next stays out of the identity, by which repeats are compared.
+    let words = format!("{safety}, {words}");
     let description = describe(settings, &board, acceleration, (pace, plan), &words, tm);
     Ok(Connected {
         board,
         description,
         pace,
         stats,
+        link,
         plan,
         has_watchdog,
         worst_case_mm,

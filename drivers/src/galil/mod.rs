@@ -1,7 +1,7 @@
 //! A Galil DMC controller on a serial line or a network, with a pulse-driven slide on one axis and the load cell on an
 //! analog input.
 //!
-//! Read [`protocol`] first, then `session.rs`, the dialogue in progress, then `connect.rs`, what happens once when the
+//! Read [`protocol`] first, then `session`, the dialogue in progress, then `connect.rs`, what happens once when the
 //! controller is opened. [`GalilRig`] puts a session on a link.
 
 mod capture;
@@ -14,7 +14,6 @@ pub mod protocol;
 mod recording;
 mod rig;
 mod sampling;
-mod search;
 mod session;
 mod settings;
 mod sine;

@@ -18,7 +18,7 @@ fn reply(text: &str, is_accepted: bool) -> Incoming {
 /// What a controller sent, and what it means.
 type Transcript = (&'static str, &'static [u8], &'static [(&'static str, bool)]);
 
-const TRANSCRIPTS: [Transcript; 9] = [
+const TRANSCRIPTS: [Transcript; 25] = [
     // DMC-1700/1800 user manual, page 79: "the DMC-1700/1800 returns a : if the instruction was accepted".
     ("accepted", b":", &[("", true)]),
     // Page 79: "a ? if the instruction was not accepted"; page 80: TC1 tells why.
@@ -57,7 +57,90 @@ const TRANSCRIPTS: [Transcript; 9] = [
         b" 1.0000, 2.0000\r\n\x1a:",
         &[(" 1.0000, 2.0000", true)],
     ),
+    // The same with delimiter 0: a carriage return between values.
+    (
+        "QU a[],0,1,0",
+        b" 1.0000\r\n 2.0000\r\n\x1a:",
+        &[(" 1.0000\r\n 2.0000", true)],
+    ),
+    // DMC-1700/1800 user manual, page 80: TC and TC0 tell the number alone.
+    ("refused, then TC0", b"?1\r\n:", &[("", false), ("1", true)]),
+    // TC1 of a limit switch (DMC-40x0 command reference, `TC`).
+    (
+        "BGA, then TC1",
+        b"?22 Begin not possible due to Limit Switch\r\n:",
+        &[
+            ("", false),
+            ("22 Begin not possible due to Limit Switch", true),
+        ],
+    ),
+    // galil-io of TMT: an empty line gives a prompt.
+    ("an empty line", b":", &[("", true)]),
+    // DMC-1700/1800 user manual, page 84; galil-io of TMT: several axes are parted by a comma and a blank.
+    ("TP AB", b" 100, 200\r\n:", &[(" 100, 200", true)]),
+    // DMC-1400 user manual, page 211: TS of an axis, with leading zeros.
+    ("TS A", b"015\r\n:", &[("015", true)]),
+    // ESRF BLISS 2.4.0: a program's version, in variable format.
+    ("MG version", b" 0.2000\r\n:", &[(" 0.2000", true)]),
+    // The same, a DMC-30010: 73422 was set, the multiple of 1024 below it comes back.
+    (
+        "AC 73422;MG _ACA",
+        b": 72704.0000\r\n:",
+        &[("", true), (" 72704.0000", true)],
+    ),
+    // galil-io of TMT: `MG a,b,c` gives one line.
+    (
+        "MG a,b,c",
+        b" 1.0000 2.0000 3.0000\r\n:",
+        &[(" 1.0000 2.0000 3.0000", true)],
+    ),
+    // `GalilController.cpp` of EPICS: WH tells the handle, or the serial port.
+    ("WH, network", b"IHA\r\n:", &[("IHA", true)]),
+    ("WH, serial", b"RS232\r\n:", &[("RS232", true)]),
+    // The same: TH, one line for each handle.
+    (
+        "TH",
+        b"CONTROLLER IP ADDRESS 169,254,33,110 ETHERNET ADDRESS 00-50-4C-20-6C-01\r\nIHC AVAILABLE\r\n:",
+        &[(
+            "CONTROLLER IP ADDRESS 169,254,33,110 ETHERNET ADDRESS 00-50-4C-20-6C-01\r\nIHC AVAILABLE",
+            true,
+        )],
+    ),
+    // The same: what begins with a limit's operand reads 1 while the switch is open.
+    ("MG _LFA", b" 1.0000\r\n:", &[(" 1.0000", true)]),
+    // `GalilConnector.cpp` of EPICS: a download gives a prompt for `\` and one for `DL`, and a `?` before them for every
+    // line that is refused.
+    ("DL", b"::", &[("", true), ("", true)]),
+    (
+        "DL with a wrong line",
+        b"?::",
+        &[("", false), ("", true), ("", true)],
+    ),
+    // The same: an upload ends with control-Z, some firmware with `\` before it.
+    (
+        "UL",
+        b"#A\r\nWT 250\r\nJP #A\r\n\x1a:",
+        &[("#A\r\nWT 250\r\nJP #A", true)],
+    ),
 ];
+
+/// What the driver writes while it records, byte for byte: DMC-1700/1800 user manual, page 159, gives the arguments.
+#[test]
+fn a_record_question_and_its_answer_belong_together() {
+    use crate::galil::recording::{Look, question};
+    use crate::galil::settings::tests::thesis;
+    let text = question(&thesis());
+    assert_eq!(text, "MG @AN[1]{F3.4},_TDA,_RPA,_TSA,_SCA,_RD,TIME");
+    // With a stop before it, it still is a line.
+    assert!(format!("STA;{text}\r").len() <= LINE_MAX);
+    let answer = all(b" 0.3051 120 121 143 0 17 5000\r\n:");
+    let [Incoming::Reply(reply)] = answer.as_slice() else {
+        panic!("{answer:?}");
+    };
+    let look = Look::read(&reply.numbers().unwrap()).unwrap();
+    assert_eq!((look.time, look.next), (5000, 17));
+    assert_eq!(look.poll, [0.3051, 120.0, 121.0, 143.0, 0.0, 5000.0]);
+}
 
 #[test]
 fn transcripts_are_understood_split_at_every_byte() {
@@ -169,8 +252,10 @@ fn a_refusal_tells_what_to_do() {
 
 #[test]
 fn random_bytes_never_panic_and_memory_is_bounded() {
+    let streams = std::env::var("PALPATE_STREAMS").ok();
+    let streams = streams.and_then(|text| text.parse().ok()).unwrap_or(2_000);
     let mut random = SplitMix::seeded(7);
-    for round in 0..2_000 {
+    for round in 0..streams {
         let mut parser = Parser::default();
         let length = 1 + random.below(300);
         let bytes: Vec<u8> = (0..length).map(|_| random.below(256) as u8).collect();
@@ -189,7 +274,9 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
         assert_eq!(got, parts);
         for incoming in got {
             if let Incoming::Reply(reply) = incoming {
-                let _ = (reply.numbers(), reply.text(), error_of(&reply));
+                let numbers = reply.numbers().unwrap_or_default();
+                assert!(numbers.iter().all(|number| number.is_finite()));
+                let _ = (reply.text(), error_of(&reply));
             }
         }
     }

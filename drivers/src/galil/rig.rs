@@ -164,6 +164,10 @@ impl Rig for GalilRig {
         Ok(())
     }
 
+    fn link(&self) -> Option<&str> {
+        Some(&self.connected.link)
+    }
+
     fn is_virtual(&self) -> bool {
         false
     }

@@ -132,11 +132,9 @@ impl RigFile {
                     rig.map_err(|err| DeviceError::Thread(err.to_string()))?,
                 ))
             }
-            Self::Stand { place, settings } => Ok(Box::new(StandRig::open(
-                place.open()?,
-                settings,
-                clock.clone(),
-            )?)),
+            Self::Stand { place, settings } => {
+                Ok(Box::new(StandRig::open(place, settings, clock.clone())?))
+            }
         }
     }
 }

@@ -1,5 +1,5 @@
 use super::*;
-use crate::galil::AnalogRange;
+use crate::galil::{AnalogRange, Sampling};
 
 const THESIS: &str = r#"# The slide of the source thesis
 device = "galil"
@@ -43,6 +43,7 @@ fn what_is_not_said_is_usual() {
     assert_eq!(galil.range, AnalogRange::Bipolar10);
     assert_eq!(galil.noise.0, 20.0 / 65_536.0);
     assert!(galil.has_watchdog && !galil.is_reversed);
+    assert_eq!((galil.sampling, galil.sample_us), (Sampling::Auto, None));
 }
 
 #[test]
@@ -61,6 +62,8 @@ noise_v = 0.002
 filter = "RC low-pass, 100 Hz"
 serial_number = 1820
 watchdog = false
+sampling = "record"
+sample_us = 500
 "#;
     let (place, galil) = galil("x.toml", &text);
     assert_eq!(place, Place::Tcp("10.0.0.5:23".into()));
@@ -70,6 +73,8 @@ watchdog = false
     assert_eq!(galil.serial_number, Some(1820));
     assert_eq!(galil.filter.as_deref(), Some("RC low-pass, 100 Hz"));
     assert!(!galil.has_watchdog);
+    assert_eq!(galil.sampling, Sampling::Record);
+    assert_eq!(galil.sample_us, Some(500));
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Why a device that speaks in lines cannot be used, in words.
 
+use crate::wire::WireError;
 use std::io;
 use thiserror::Error;
 
@@ -7,6 +8,9 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DeviceError {
+    /// It cannot be reached.
+    #[error(transparent)]
+    Wire(#[from] WireError),
     /// Nothing comes.
     #[error("the {device} does not answer; {hint}")]
     Silent {

@@ -3,7 +3,9 @@
 use crate::bench::{Host, thesis, to};
 use palpate_drivers::emulate::Device;
 use palpate_drivers::emulate::faults::DeviceFault;
+use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
+use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};
 
@@ -24,7 +26,7 @@ fn silence_of_the_host_stops_the_axis_within_the_worst_case() {
     let mut wire = host.wire.lock();
     let mut now = wire.now;
     for _ in 0..3_000 {
-        now = now + palpate_model::Nanos::from_millis(1);
+        now = now + Nanos::from_millis(1);
         wire.emulator.advance(now);
     }
     assert!(!wire.emulator.is_running(0));
@@ -129,5 +131,74 @@ fn spoilt_bytes_are_got_over() {
         assert!(host.newest().status.has(AxisStatus::MOTOR_ON));
         let now = host.now();
         assert_eq!(host.session.is_dead(now), None);
+    }
+}
+
+/// Whatever comes, in any form of answers: no panic, and nothing piles up.
+#[test]
+fn random_bytes_never_break_the_dialogue() {
+    const PIECES: [&[u8]; 14] = [
+        b":",
+        b"?",
+        b"::",
+        b" 0.3050 120 120 15 1 9000\r\n:",
+        b" 0.3050 120 120 15 1 17 9000\r\n:",
+        b" 9.9999 120 -120 143 0 999999999 4294967295\r\n:",
+        b" 1, 2, 3\r\n\x1a:",
+        b" 1\r\n\x1a:",
+        b"22 Begin not possible due to Limit Switch\r\n:",
+        b" 27181\r\n:",
+        b"\xbf\xb5\xb5\x8d\x8a",
+        b"nan 1e999 - 5\r\n:",
+        b"\x00\xff\r\n",
+        b" 666 4096 4096 6000\r\n: 6000\r\n:",
+    ];
+    let streams = std::env::var("PALPATE_STREAMS").ok();
+    let streams = streams.and_then(|text| text.parse().ok());
+    let streams: usize = streams.unwrap_or(2_000);
+    for sampling in [Sampling::Poll, Sampling::Record] {
+        let mut host = Host::new(&GalilSettings {
+            sampling,
+            ..thesis()
+        });
+        host.pass(0.1);
+        let start = host.now();
+        let mut random = SplitMix::seeded(11);
+        for _ in 0..streams / 2 {
+            let mut session = host.session.clone();
+            let mut now = start;
+            for _ in 0..1 + random.below(30) {
+                now = now + Nanos::from_millis(random.below(40) as u64);
+                session.attended(now);
+                if random.below(4) == 0 {
+                    let command = match random.below(4) {
+                        0 => RigCommand::Stop,
+                        1 => RigCommand::EnableMotor,
+                        2 => RigCommand::DefinePosition { pulses: 5 },
+                        _ => to(random.below(5000) as i64, 4.98),
+                    };
+                    session.command(now, command);
+                }
+                let mut lines = 0;
+                while let Some(line) = session.take_line(now) {
+                    assert!(line.len() <= 80);
+                    lines += 1;
+                    assert!(lines < 200, "it never has enough");
+                }
+                let mut bytes = PIECES[random.below(PIECES.len())].to_vec();
+                if random.below(3) == 0 {
+                    let at = random.below(bytes.len());
+                    bytes[at] = random.below(256) as u8;
+                }
+                session.received(now, &bytes);
+                let mut events = 0;
+                while session.take_event().is_some() {
+                    events += 1;
+                    assert!(events < 2_000);
+                }
+                assert!(session.next_at(now) >= now);
+                let _ = (session.is_dead(now), session.stats());
+            }
+        }
     }
 }

@@ -4,7 +4,7 @@ use crate::bench::{Host, clock_of, thesis, try_connect, wired};
 use palpate_drivers::emulate::Device;
 use palpate_drivers::emulate::faults::DeviceFault;
 use palpate_drivers::emulate::galil::{self, GalilModel};
-use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, connect};
+use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, Sampling, connect};
 use palpate_drivers::wire::pair;
 use palpate_model::Nanos;
 
@@ -149,4 +149,20 @@ fn nobody_on_the_wire_is_told() {
         &"galil".into(),
     );
     assert!(matches!(lost, Err(GalilOpenError::Lost { .. })));
+}
+
+/// Repeats are compared by it.
+#[test]
+fn the_identity_is_the_same_each_time() {
+    for sampling in [Sampling::Poll, Sampling::Record] {
+        let settings = GalilSettings {
+            sampling,
+            ..thesis()
+        };
+        let wire = wired(galil::GalilSettings::default());
+        let first = try_connect(&wire, &settings).unwrap();
+        let second = try_connect(&wire, &settings).unwrap();
+        assert_eq!(first.description.identity, second.description.identity);
+        assert!(first.link.contains("an answer takes"), "{}", first.link);
+    }
 }

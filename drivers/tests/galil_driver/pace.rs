@@ -4,7 +4,8 @@
 //! `PALPATE_GALIL_SECONDS` and `PALPATE_STOPS` ask for more than the suite takes.
 #![expect(
     clippy::disallowed_methods,
-    reason = "how long things take is what is measured here"
+    clippy::print_stdout,
+    reason = "how long things take is what is measured here, and told"
 )]
 
 use crate::bench::{thesis, to};
@@ -22,12 +23,12 @@ fn asked(variable: &str, usual: usize) -> usize {
     given.and_then(|text| text.parse().ok()).unwrap_or(usual)
 }
 
-fn on_pty(latency: Nanos) -> Option<(Served, Place)> {
+fn on_pty(latency: Nanos, baud: Option<u32>) -> Option<(Served, Place)> {
     if !std::path::Path::new("/dev/ptmx").exists() {
         println!("skipped: there are no pseudo-terminals here");
         return None;
     }
-    let served = start(At::Pty(None), true, latency);
+    let served = start(At::Pty(None), true, latency, baud);
     let place = Place::Serial {
         port: served.address.clone(),
         baud: 115_200,
@@ -41,8 +42,8 @@ fn ms(span: Nanos) -> f64 {
 }
 
 /// Takes samples for so many seconds; tells what came and gives the ticks that came and that there were.
-fn count(settings: &GalilSettings, latency: Nanos, what: &str) {
-    let Some((_served, place)) = on_pty(latency) else {
+fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: &str) {
+    let Some((_served, place)) = on_pty(latency, baud) else {
         return;
     };
     let seconds = asked("PALPATE_GALIL_SECONDS", 2) as f64;
@@ -58,7 +59,7 @@ fn count(settings: &GalilSettings, latency: Nanos, what: &str) {
     let (mut samples, mut gaps, mut newest) = (0_u64, 0_u64, first);
     let (mut age_max, mut uncertainty_max) = (Nanos::ZERO, Nanos::ZERO);
     let step = if settings.sampling == Sampling::Record {
-        2
+        description.ticks_per_sample as u64
     } else {
         1
     };
@@ -100,7 +101,7 @@ fn count(settings: &GalilSettings, latency: Nanos, what: &str) {
         ms(stats.round_trip_min),
         ms(stats.round_trip_mean),
         ms(stats.round_trip_max),
-        description.identity,
+        runner.rig.link().unwrap_or(""),
     );
     assert!(runner.faults().is_empty());
     // A question is answered between its beginning and its end.
@@ -122,23 +123,27 @@ fn with(sampling: Sampling, sample_us: Option<u16>) -> GalilSettings {
 #[test]
 fn recording_loses_nothing_over_a_serial_port() {
     let record = |sample_us| with(Sampling::Record, sample_us);
-    count(&record(None), Nanos::ZERO, "recorded, TM 1000");
-    count(&record(Some(500)), Nanos::ZERO, "recorded, TM 500");
+    count(&record(None), (Nanos::ZERO, None), "recorded, TM 1000");
+    count(&record(Some(500)), (Nanos::ZERO, None), "recorded, TM 500");
 }
 
 #[test]
 fn polling_over_a_serial_port() {
-    count(&with(Sampling::Poll, None), Nanos::ZERO, "polled, TM 1000");
+    count(
+        &with(Sampling::Poll, None),
+        (Nanos::ZERO, None),
+        "polled, TM 1000",
+    );
     count(
         &with(Sampling::Poll, Some(500)),
-        Nanos::ZERO,
+        (Nanos::ZERO, None),
         "polled, TM 500",
     );
 }
 
 #[test]
 fn a_converter_with_a_latency_of_16_ms() {
-    let late = Nanos::from_millis(16);
+    let late = (Nanos::from_millis(16), None);
     count(&with(Sampling::Auto, None), late, "auto, 16 ms latency");
     count(
         &with(Sampling::Record, None),
@@ -147,12 +152,19 @@ fn a_converter_with_a_latency_of_16_ms() {
     );
 }
 
+#[test]
+fn a_line_of_115200_baud() {
+    let slow = (Nanos::ZERO, Some(115_200));
+    count(&with(Sampling::Auto, None), slow, "auto, 115200 baud");
+    count(&with(Sampling::Record, None), slow, "recorded, 115200 baud");
+}
+
 /// From the command entering the rig to its bytes being written, while samples come as fast as they can.
 #[test]
 fn stops_under_full_acquisition() {
     let stops = asked("PALPATE_STOPS", 100);
     for sampling in [Sampling::Record, Sampling::Poll] {
-        let Some((_served, place)) = on_pty(Nanos::ZERO) else {
+        let Some((_served, place)) = on_pty(Nanos::ZERO, None) else {
             return;
         };
         let mut runner = Runner::open(&place, &with(sampling, None));

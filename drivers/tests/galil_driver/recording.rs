@@ -40,7 +40,7 @@ fn every_second_sample_comes_and_none_is_lost() {
         });
         let identity = host.connected.description.identity.clone();
         assert!(
-            identity.contains(&format!("recorded at {rate:.0} samples/s")),
+            identity.contains(&format!("{rate:.0} samples/s recorded")),
             "{identity}"
         );
         assert_eq!(host.connected.description.ticks_per_sample, 2.0);
@@ -219,10 +219,10 @@ fn all_models_record_and_a_full_memory_is_told() {
         ..thesis()
     };
     let host = Host::on(wire.clone(), &auto);
-    let identity = &host.connected.description.identity;
+    let link = &host.connected.link;
     assert!(
-        identity.contains("polled") && identity.contains("no room for arrays"),
-        "{identity}"
+        link.contains("polled") && link.contains("no room for arrays"),
+        "{link}"
     );
     let Err(err) = crate::bench::try_connect(&wire, &recorded()) else {
         panic!("it records");

@@ -26,7 +26,7 @@ pub struct Served {
     thread: Option<JoinHandle<()>>,
 }
 
-pub fn start(place: At, is_serial: bool, latency: Nanos) -> Served {
+pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> Served {
     let (orders, received) = sync_channel(16);
     let (sender, told) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
@@ -40,7 +40,7 @@ pub fn start(place: At, is_serial: bool, latency: Nanos) -> Served {
             });
             let options = ServeOptions {
                 place,
-                baud: None,
+                baud,
                 latency,
                 faults: Vec::new(),
                 seed: 1,
@@ -146,7 +146,7 @@ impl Runner {
     /// The plug is put back: the same controller, at rest, does what it is told.
     fn reconnect(&mut self) {
         let mut is_back = false;
-        for _ in 0..200 {
+        for _ in 0..2_000 {
             is_back = self.rig.reconnect().is_ok();
             if is_back {
                 break;
@@ -205,13 +205,25 @@ impl Runner {
         self.rig.send(RigCommand::Stop);
         self.pass();
         self.reconnect();
+        // The same after a drop of its supply.
+        self.events.clear();
+        let order = served.orders.send("reset".into());
+        order.expect("the emulator takes orders");
+        self.until("noticed", |runner| {
+            let is_over = |fault: &Fault| {
+                // A network connection goes with it.
+                matches!(fault, Fault::ControllerReset | Fault::LinkLost { .. })
+            };
+            runner.faults().into_iter().any(is_over)
+        });
+        self.reconnect();
     }
 }
 
 #[test]
 fn a_controller_on_a_network() {
     let at = At::Tcp(([127, 0, 0, 1], 0).into());
-    let served = start(at, false, Nanos::ZERO);
+    let served = start(at, false, Nanos::ZERO, None);
     Runner::open(&Place::Tcp(served.address.clone()), &thesis()).exercise(&served);
 }
 
@@ -221,7 +233,10 @@ fn a_controller_on_a_serial_port_that_only_one_program_has() {
         println!("skipped: there are no pseudo-terminals here");
         return;
     }
-    let served = start(At::Pty(None), true, Nanos::ZERO);
+    // Put back, it may be another pseudo-terminal, under the same name.
+    let folder = tempfile::tempdir().expect("a folder");
+    let at = At::Pty(Some(folder.path().join("galil")));
+    let served = start(at, true, Nanos::ZERO, None);
     let place = Place::Serial {
         port: served.address.clone(),
         baud: 115_200,
@@ -241,7 +256,7 @@ fn a_converter_that_waits_is_measured() {
         println!("skipped: there are no pseudo-terminals here");
         return;
     }
-    let served = start(At::Pty(None), true, Nanos::from_millis(16));
+    let served = start(At::Pty(None), true, Nanos::from_millis(16), None);
     let place = Place::Serial {
         port: served.address.clone(),
         baud: 115_200,

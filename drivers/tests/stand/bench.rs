@@ -155,13 +155,7 @@ impl Host {
         let settings = usual();
         let connected = wire.connect(&settings).expect("it connects");
         let now = wire.lock().now;
-        let session = StandSession::new(
-            settings,
-            connected.scale,
-            connected.pace,
-            connected.stats,
-            now,
-        );
+        let session = StandSession::new(settings, &connected, now);
         wire.lock().sent.clear();
         Self {
             path: PathTracker::new(&connected.description),

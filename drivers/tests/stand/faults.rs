@@ -106,8 +106,8 @@ fn garbled_answers_are_not_taken() {
         count += 1;
         vec![if count % 97 == 0 { byte ^ 0x80 } else { byte }]
     });
-    host.pass(5.0);
-    assert!(host.readings.len() > 20, "{}", host.readings.len());
+    host.pass(10.0);
+    assert!(host.readings.len() > 100, "{}", host.readings.len());
     assert!(
         host.readings
             .iter()
@@ -163,4 +163,35 @@ fn a_cut_wire_leaves_it_at_its_target() {
             _ => unreachable!("it is a move"),
         })]
     );
+}
+
+#[test]
+fn a_crosshead_that_falls_behind_is_told_where_it_is() {
+    let mut host = Host::new();
+    host.tell(to(6_000, 2.0));
+    host.pass(1.0);
+    // Somebody sets the slowest speed at the panel.
+    let now = host.now();
+    host.wire.lock().emulator.receive(now, 0, b"k");
+    host.pass(0.5);
+    assert!(!host.path_errors.is_empty());
+    assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.011);
+}
+
+#[test]
+fn late_answers_are_not_taken_for_fresh_ones() {
+    for delay_ms in [450, 700, 1_300] {
+        let mut host = Host::new();
+        host.tell(to(6_000, 2.0));
+        host.pass(1.0);
+        host.wire.lock().delay = palpate_model::Nanos::from_millis(delay_ms);
+        host.pass(0.1);
+        let before = host.readings.len();
+        while host.session.is_dead(host.now()).is_none() {
+            host.turn().expect("the wire is whole");
+        }
+        assert_eq!(host.readings.len(), before, "{delay_ms} ms");
+        assert!(!host.wire.lock().emulator.is_moving());
+        assert!(host.travel() > -4.0);
+    }
 }

@@ -91,11 +91,17 @@ fn a_stop_is_written_before_everything_and_repeated() {
     host.wire.lock().is_deaf = true;
     host.wire.lock().sent.clear();
     host.send(RigCommand::Halt);
-    host.pass(0.05);
+    let stopped_at = host.travel();
+    host.pass(0.02);
     host.wire.lock().is_deaf = false;
     host.until("at rest", |host| !host.is_moving());
     assert!(host.sent().matches('s').count() >= 2);
-    assert!(host.travel() > -5.0, "{}", host.travel());
+    // A tenth of a second later, at 2 mm/s, and the brake.
+    assert!(
+        stopped_at - host.travel() < 0.3,
+        "{} {stopped_at}",
+        host.travel()
+    );
 }
 
 #[test]
@@ -231,7 +237,56 @@ fn samples_come_as_the_description_says() {
             per_sample < told && per_sample > 0.3 * told,
             "{per_sample} {told}"
         );
+        // In motion nothing else is asked: samples stay younger than the interlock allows at any speed, 20 ms, where the
+        // link lets them.
+        let moving = host
+            .readings
+            .iter()
+            .filter(|r| r.status.has(AxisStatus::MOVING));
+        let moving: Vec<u64> = moving.map(|r| r.tick).collect();
+        let gap = moving
+            .windows(2)
+            .map(|w| w[1] - w[0])
+            .max()
+            .expect("samples");
+        assert!(gap <= 5 + 2 * delay.0 / 1_000_000, "{gap} ms at {delay:?}");
         assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
         assert_eq!(host.newest().pulses, 200);
     }
+}
+
+#[test]
+fn a_stand_that_takes_its_time_to_begin_is_no_stand_that_was_stopped() {
+    let mut host = Host::on(Shared::new(EmulatedStandSettings {
+        reaction: Nanos::from_millis(150),
+        ..EmulatedStandSettings::default()
+    }));
+    host.go(300, 2.0);
+    assert_eq!(host.newest().pulses, 300);
+    assert!(
+        !host
+            .readings
+            .iter()
+            .any(|r| r.status.has(AxisStatus::STOPPING))
+    );
+    assert!(host.path_errors.is_empty(), "{:?}", host.path_errors);
+}
+
+#[test]
+fn before_the_first_sample_nobody_knows_which_way_a_target_is() {
+    let wire = Shared::new(EmulatedStandSettings::default());
+    {
+        // Somebody has moved it at its panel.
+        let mut wire = wire.lock();
+        wire.emulator.receive(Nanos::ZERO, 0, b"jd");
+        wire.now = Nanos::from_millis(1_000);
+        wire.emulator.receive(Nanos::from_millis(1_000), 0, b"s");
+    }
+    let mut host = Host::on(wire);
+    assert!(host.travel() < -10.0);
+    host.send(to(500, 5.0));
+    host.until("begun", Host::is_moving);
+    host.until("at rest", |host| !host.is_moving());
+    assert!(host.sent().contains("h-005.00vu"), "{}", host.sent());
+    assert!((host.travel() + 5.0).abs() < 0.006, "{}", host.travel());
 }

@@ -1,4 +1,8 @@
-//! Opening a stand, and one whole rig on a thread.
+//! Opening a stand, and one whole rig on a thread, in real time. Waits are generous: nothing here is about speed.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "the clock of a test stands for the runner's"
+)]
 
 use super::bench::{Shared, to, usual};
 use palpate_drivers::emulate::Device;
@@ -93,6 +97,17 @@ fn who_does_not_fit_is_told_in_words() {
     let err = refused(&stand(), &far);
     assert!(err.contains("999.99"), "{err}");
 
+    // One that makes another limit of -110.00 than it was told.
+    let clipped = stand();
+    let mut before = 0;
+    clipped.lock().spoil = Box::new(move |byte| {
+        let is_changed = before == b'-' && byte == b'1';
+        before = byte;
+        vec![if is_changed { b'0' } else { byte }]
+    });
+    let err = refused(&clipped, &usual());
+    assert!(err.contains("reads back -10"), "{err}");
+
     let silent = stand();
     silent.lock().is_deaf = true;
     let err = refused(&silent, &usual());
@@ -120,7 +135,7 @@ fn a_rig_moves_stops_and_says_farewell() {
     let is_over = Arc::new(AtomicBool::new(false));
     let stopping = Arc::clone(&is_over);
     let device_clock = Arc::clone(&clock);
-    let device = std::thread::spawn(move || {
+    let work = move || {
         let mut stand = EmulatedStand::new(EmulatedStandSettings::default());
         let mut last = Vec::new();
         let mut buffer = [0_u8; 256];
@@ -137,8 +152,12 @@ fn a_rig_moves_stops_and_says_farewell() {
             }
         }
         last
-    });
-    let mut rig = StandRig::open(Box::new(ours), &usual(), Arc::clone(&clock)).expect("a stand");
+    };
+    let device = std::thread::Builder::new()
+        .name("stand".into())
+        .spawn(work)
+        .expect("a thread");
+    let mut rig = StandRig::on(Box::new(ours), &usual(), Arc::clone(&clock)).expect("a stand");
     let begin = Instant::now();
     rig.send(to(50, 1.0));
     let (mut readings, mut is_acknowledged) = (0, false);

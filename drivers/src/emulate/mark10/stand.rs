@@ -35,6 +35,8 @@ pub struct EmulatedStandSettings {
     pub gauge: EmulatedGaugeSettings,
     /// Without the option PC Control: letters that move or set something are passed over.
     pub is_without_control: bool,
+    /// From a letter that moves the crosshead to its first step.
+    pub reaction: Nanos,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -74,6 +76,8 @@ pub struct EmulatedStand {
     velocity: f64,
     /// 1 up, -1 down, 0 to rest.
     way: f64,
+    /// It moves from then on.
+    moves_from: Nanos,
     output: Vec<u8>,
 }
 
@@ -100,6 +104,7 @@ impl EmulatedStand {
             zero: 0.0,
             velocity: 0.0,
             way: 0.0,
+            moves_from: Nanos::ZERO,
             output: Vec::new(),
         }
     }
@@ -249,8 +254,10 @@ impl EmulatedStand {
     /// Letters of the option PC Control.
     fn control(&mut self, byte: u8) {
         match byte {
-            b'u' => self.way = 1.0,
-            b'd' => self.way = -1.0,
+            b'u' | b'd' => {
+                self.way = if byte == b'u' { 1.0 } else { -1.0 };
+                self.moves_from = self.now + self.settings.reaction;
+            }
             b's' => self.way = 0.0,
             b'i' => self.is_inches = false,
             b'b' => self.is_inches = true,
@@ -310,7 +317,7 @@ impl EmulatedStand {
         } else {
             self.velocity.signum()
         };
-        if way == 0.0 {
+        if way == 0.0 || self.velocity == 0.0 && self.now < self.moves_from {
             return;
         }
         let room = self.room(way);

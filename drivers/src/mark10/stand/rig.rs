@@ -4,9 +4,9 @@ use super::StandSettings;
 use super::open::{ConnectedStand, connect};
 use super::protocol::STOP;
 use super::session::StandSession;
-use crate::rig::{Rig, RigEvent, RigEventBody};
+use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
+use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -19,8 +19,12 @@ const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 
 /// A motorised stand with its gauge.
 pub struct StandRig {
-    description: RigDescription,
-    line: Line,
+    /// `None` on a link that was handed over.
+    place: Option<Place>,
+    settings: StandSettings,
+    connected: ConnectedStand,
+    /// `None` while it is being connected anew, and after that has failed.
+    line: Option<Line>,
     clock: HostClock,
     /// The host's clock where the caller's time is zero.
     origin: Option<Nanos>,
@@ -32,47 +36,42 @@ pub struct StandRig {
 }
 
 impl StandRig {
-    /// Sets up the stand behind a link and begins to take samples.
+    /// Opens the link, sets up the stand behind it and begins to take samples.
     pub fn open(
-        mut link: Box<dyn Link>,
+        place: &Place,
         settings: &StandSettings,
         clock: HostClock,
     ) -> Result<Self, DeviceError> {
-        let device: Arc<str> = "stand".into();
-        let ConnectedStand {
-            description,
-            scale,
-            pace,
-            stats,
-            raw,
-        } = connect(link.as_mut(), &clock, settings, &device)?;
-        let session = StandSession::new(settings.clone(), scale, pace, stats, clock());
-        let line_settings = LineSettings {
-            device,
-            farewell: STOP.into(),
-        };
-        let line =
-            Line::start(link, session, Arc::clone(&clock), line_settings).map_err(|err| {
-                DeviceError::Unfit {
-                    device: "Mark-10 stand",
-                    detail: format!("no thread can be started for its link ({err})"),
-                }
-            })?;
+        let mut rig = Self::on(place.open()?, settings, clock)?;
+        rig.place = Some(place.clone());
+        Ok(rig)
+    }
+
+    /// The same on a link that is open. It cannot be connected anew.
+    pub fn on(
+        link: Box<dyn Link>,
+        settings: &StandSettings,
+        clock: HostClock,
+    ) -> Result<Self, DeviceError> {
+        let (connected, line) = start(link, settings, &clock)?;
         Ok(Self {
-            description,
-            line,
+            place: None,
+            settings: settings.clone(),
+            first_raw: connected.raw.clone(),
+            connected,
+            line: Some(line),
             clock,
             origin: None,
             newest: Nanos::ZERO,
             refused: VecDeque::new(),
-            first_raw: raw,
         })
     }
 
     /// How the link behaves.
     #[must_use]
     pub fn stats(&self) -> LinkStats {
-        self.line.stats()
+        let stats = self.line.as_ref().map(Line::stats);
+        stats.unwrap_or(self.connected.stats)
     }
 
     /// The caller's time of a moment of the host's clock; never before what was told already.
@@ -85,15 +84,19 @@ impl StandRig {
 
 impl Rig for StandRig {
     fn description(&self) -> &RigDescription {
-        &self.description
+        &self.connected.description
     }
 
     fn send(&mut self, command: RigCommand) {
-        if self.line.send(command).is_err() {
-            self.refused.push_back(Fault::CommandRefused {
-                detail: "too many commands at once".into(),
-            });
-        }
+        let sent = self.line.as_mut().map(|line| line.send(command));
+        let detail = match sent {
+            Some(Ok(())) => return,
+            Some(Err(_)) => "too many commands at once",
+            None => "the stand is not connected",
+        };
+        self.refused.push_back(Fault::CommandRefused {
+            detail: detail.into(),
+        });
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
@@ -111,14 +114,41 @@ impl Rig for StandRig {
         self.origin = Some(origin);
         if let Some(fault) = self.refused.pop_front() {
             let at = self.told(now, until);
-            let body = RigEventBody::Fault(fault);
-            return Some(RigEvent::arrived(at, body));
+            return Some(RigEvent::arrived(at, RigEventBody::Fault(fault)));
         }
         let end = origin + until;
         let wait = Duration::from_nanos(end.since(now).0);
-        let event = self.line.next_event(end, wait)?;
-        let at = self.told(event.at, until);
-        Some(RigEvent { at, ..event })
+        let Some(line) = &self.line else {
+            std::thread::sleep(wait);
+            return None;
+        };
+        let mut event = line.next_event(end, wait)?;
+        event.at = self.told(event.at, until);
+        if let Some(taken) = &mut event.taken {
+            taken.at = taken.at.since(origin).min(event.at);
+        }
+        Some(event)
+    }
+
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        let place = self.place.as_ref().ok_or(RigError::NotAgain)?;
+        // The old link says farewell and is closed, or a serial port would be busy with it.
+        self.first_raw
+            .extend(self.line.iter().flat_map(Line::take_raw));
+        self.line = None;
+        let started = place
+            .open()
+            .map_err(DeviceError::from)
+            .and_then(|link| start(link, &self.settings, &self.clock));
+        let (connected, line) = started.map_err(|error| RigError::Device {
+            file: self.settings.name.clone(),
+            error: error.into(),
+        })?;
+        self.first_raw.extend(connected.raw.iter().cloned());
+        self.connected = connected;
+        self.line = Some(line);
+        self.refused.clear();
+        Ok(())
     }
 
     fn is_virtual(&self) -> bool {
@@ -130,17 +160,38 @@ impl Rig for StandRig {
         Some(1.0)
     }
 
-    fn links(&self) -> Vec<(String, LinkStats)> {
-        vec![("stand".to_owned(), self.line.stats())]
-    }
-
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.first_raw);
-        raw.extend(self.line.take_raw());
+        raw.extend(self.line.iter().flat_map(Line::take_raw));
         let origin = self.origin.unwrap_or(Nanos::ZERO);
         for piece in &mut raw {
             piece.at = piece.at.since(origin);
         }
         raw
     }
+
+    fn links(&self) -> Vec<(String, LinkStats)> {
+        vec![("stand".to_owned(), self.stats())]
+    }
+}
+
+fn start(
+    mut link: Box<dyn Link>,
+    settings: &StandSettings,
+    clock: &HostClock,
+) -> Result<(ConnectedStand, Line), DeviceError> {
+    let device: Arc<str> = "stand".into();
+    let connected = connect(link.as_mut(), clock, settings, &device)?;
+    let session = StandSession::new(settings.clone(), &connected, clock());
+    let line_settings = LineSettings {
+        device,
+        farewell: STOP.into(),
+    };
+    let line = Line::start(link, session, Arc::clone(clock), line_settings).map_err(|err| {
+        DeviceError::Unfit {
+            device: "Mark-10 stand",
+            detail: format!("no thread can be started for its link ({err})"),
+        }
+    })?;
+    Ok((connected, line))
 }

@@ -1,5 +1,6 @@
 //! The dialogue with a stand that has been set up: one question at a time, stops before everything.
 
+use super::open::ConnectedStand;
 use super::protocol::{
     Crosshead, Force, Pair, STOP, Status, ask_limit, number, set_limit, set_speed,
 };
@@ -10,7 +11,7 @@ use crate::text::{Lines, Taken};
 use crate::wire::{Dialogue, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::command::{position_from_pulses, pulses_from_position};
-use palpate_model::rig::{Ack, AxisStatus, Fault, MoveTo, Profile, Reading, RigCommand};
+use palpate_model::rig::{Ack, Age, AxisStatus, Fault, MoveTo, Profile, Reading, RigCommand};
 use palpate_model::units::{Position, Seconds, Volts};
 use std::collections::VecDeque;
 
@@ -18,11 +19,15 @@ use std::collections::VecDeque;
 pub const TICK: Nanos = Nanos::from_millis(1);
 /// An answer later than this was lost.
 const ANSWER_MAX: Nanos = Nanos::from_millis(400);
-/// Bytes of a late answer are over after so long.
+/// After a garbled answer the line is left to fall silent for so long.
 const QUIET: Nanos = Nanos::from_millis(40);
-/// So many lost answers in a row, and the link counts as dead.
+/// After a lost one for longer: it may only be late, and nothing in an answer tells to which question it belongs.
+const QUIET_LOST: Nanos = Nanos::from_millis(1_000);
+/// So many answers garbled in a row, and the link counts as dead; a lost one counts for two.
 const LOST_MAX: u32 = 3;
-/// How often the crosshead's state is asked for, while it moves and while it rests.
+/// And so many, and the crosshead is stopped.
+const GARBLED_MAX: u32 = 2;
+/// How often the crosshead's state is asked for, while it moves without a new travel and while it rests.
 const STATUS_MOVING: Nanos = Nanos::from_millis(40);
 const STATUS_RESTING: Nanos = Nanos::from_millis(300);
 /// A stop is repeated as often until the crosshead rests.
@@ -90,10 +95,13 @@ pub struct StandSession {
     lines: Lines,
     pair: Pair,
     asked: Option<(Asked, Nanos)>,
+    /// Lines that came since.
+    lines_since: usize,
     next_sample: Nanos,
     status_at: Nanos,
     /// No question before this: a late answer may still be coming.
     quiet_until: Option<Nanos>,
+    quiet: Nanos,
     lost: u32,
     stop_due: bool,
     stopped_at: Option<Nanos>,
@@ -109,6 +117,8 @@ pub struct StandSession {
     /// Where it was commanded to rest.
     rests_at: Option<i64>,
     tick: Option<u64>,
+    /// Of the newest sample's time.
+    uncertainty: Nanos,
     counts: i32,
     attended: Option<Nanos>,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -118,13 +128,10 @@ pub struct StandSession {
 impl StandSession {
     /// With a stand that was set up just now.
     #[must_use]
-    pub fn new(
-        settings: StandSettings,
-        scale: GaugeScale,
-        pace: Pace,
-        stats: LinkStats,
-        now: Nanos,
-    ) -> Self {
+    pub fn new(settings: StandSettings, connected: &ConnectedStand, now: Nanos) -> Self {
+        let ConnectedStand {
+            scale, pace, stats, ..
+        } = *connected;
         Self {
             settings,
             scale,
@@ -133,9 +140,11 @@ impl StandSession {
             lines: Lines::default(),
             pair: Pair::default(),
             asked: None,
+            lines_since: 0,
             next_sample: now,
             status_at: now,
             quiet_until: None,
+            quiet: QUIET,
             lost: 0,
             stop_due: false,
             stopped_at: None,
@@ -148,6 +157,7 @@ impl StandSession {
             offset: 0,
             rests_at: None,
             tick: None,
+            uncertainty: Nanos::ZERO,
             counts: 0,
             attended: None,
             events: VecDeque::new(),
@@ -351,8 +361,12 @@ impl StandSession {
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
             pulses,
             status,
-            age: None,
+            age: Some(Age {
+                by: now.since(at),
+                within: now.since(at),
+            }),
         };
+        self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
         self.report(now, RigEventBody::Reading(reading));
     }
 
@@ -470,6 +484,18 @@ impl StandSession {
         self.rests_at.filter(near).unwrap_or(true_pulses)
     }
 
+    /// A crosshead whose travel grows moves; asking would only cost samples.
+    fn is_status_due(&self, now: Nanos) -> bool {
+        let (every, since) = if self.is_going() && self.stopped_at.is_none() {
+            (STATUS_MOVING, self.status_at.max(self.travel_changed))
+        } else if self.is_going() {
+            (STATUS_MOVING, self.status_at)
+        } else {
+            (STATUS_RESTING, self.status_at)
+        };
+        self.pace.has_status && now.since(since) >= every
+    }
+
     fn has_status_moved(&self) -> bool {
         self.status
             .is_some_and(|status| status.crosshead != Crosshead::Stopped)
@@ -493,25 +519,45 @@ impl StandSession {
     /// Asks for an answer.
     fn ask(&mut self, now: Nanos, text: impl Into<Vec<u8>>, asked: Asked) -> Option<Vec<u8>> {
         self.asked = Some((asked, now));
+        self.lines_since = 0;
         self.pair = Pair::default();
         Some(text.into())
     }
 
-    fn lose_answer(&mut self, now: Nanos) {
+    /// The answer did not come, or came and made no sense.
+    fn lose_answer(&mut self, now: Nanos, quiet: Nanos) {
         self.asked = None;
-        self.lost += 1;
+        self.lost += if quiet == QUIET_LOST { 2 } else { 1 };
         self.stats.resynchronised += 1;
         self.lines.clear();
-        self.quiet_until = Some(now + QUIET);
+        self.quiet_until = Some(now + quiet);
+        self.quiet = quiet;
         if let Motion::Setting(..) = self.motion {
             self.motion = Motion::Rest;
             self.refuse(
                 now,
-                "its answer was lost, so it was not begun; check the cable",
+                "its answer was lost or garbled, so it was not begun; check the cable",
             );
         }
         // It stops at its limit by itself; no reason to wait for that.
-        self.stop_due |= self.is_going();
+        self.stop_due |= self.is_going() && self.lost >= GARBLED_MAX;
+    }
+
+    fn on_taken(&mut self, now: Nanos, taken: Taken) {
+        if self.asked.is_none() {
+            return;
+        }
+        self.lines_since += 1;
+        if let Taken::Line(line) = taken {
+            self.on_line(now, &line);
+        }
+        let lines = match self.asked {
+            Some((Asked::Sample, _)) => 2,
+            _ => 1,
+        };
+        if self.asked.is_some() && self.lines_since >= lines {
+            self.lose_answer(now, QUIET);
+        }
     }
 
     fn write_stop(&mut self, now: Nanos) -> Vec<u8> {
@@ -548,12 +594,12 @@ impl Dialogue for StandSession {
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
         if let Some(until) = self.quiet_until.as_mut().filter(|_| !bytes.is_empty()) {
-            *until = now + QUIET;
+            *until = now + self.quiet;
             return;
         }
         for byte in bytes {
-            if let Some(Taken::Line(line)) = self.lines.take(*byte) {
-                self.on_line(now, &line);
+            if let Some(taken) = self.lines.take(*byte) {
+                self.on_taken(now, taken);
             }
         }
     }
@@ -574,7 +620,7 @@ impl Dialogue for StandSession {
             if now.since(sent) <= ANSWER_MAX {
                 return None;
             }
-            self.lose_answer(now);
+            self.lose_answer(now, QUIET_LOST);
             if self.stop_due {
                 return Some(self.write_stop(now));
             }
@@ -617,12 +663,7 @@ impl Dialogue for StandSession {
             let is_there = going.target == going.from;
             return Some(if is_there { Vec::new() } else { text.into() });
         }
-        let every = if self.is_going() {
-            STATUS_MOVING
-        } else {
-            STATUS_RESTING
-        };
-        if self.pace.has_status && now.since(self.status_at) >= every {
+        if self.is_status_due(now) {
             self.status_at = now;
             return self.ask(now, "p", Asked::Status);
         }
@@ -646,13 +687,20 @@ impl Dialogue for StandSession {
 
     fn is_dead(&self, _now: Nanos) -> Option<String> {
         (self.lost >= LOST_MAX && !self.stop_due).then(|| {
-            format!(
-                "the stand gave no sensible answer to {LOST_MAX} questions in a row; it stops at its travel limit; check cable and power"
-            )
+            "the stand gives no sensible answers any more; it stops at its travel limit; check cable and power"
+                .into()
         })
     }
 
     fn stats(&self) -> LinkStats {
         self.stats
+    }
+
+    fn host_time(&self, tick: u64) -> Option<Nanos> {
+        Some(Nanos(self.opened.0 + tick * TICK.0))
+    }
+
+    fn uncertainty(&self, _at: Nanos) -> Option<Nanos> {
+        Some(self.uncertainty)
     }
 }

@@ -1,8 +1,8 @@
 //! Questions and answers that do not belong together any more: the line is left to fall silent, then a number that must
 //! come back shows where answers are.
 
-use super::protocol::Reply;
-use super::session::{Asked, Outgoing, Session};
+use super::{Asked, Outgoing, Session};
+use crate::galil::protocol::Reply;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 

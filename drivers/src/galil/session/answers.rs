@@ -1,0 +1,212 @@
+//! What an answer means: it belongs to the oldest question that has none.
+
+use super::Outgoing;
+use super::{Asked, RESET, Session};
+use crate::galil::protocol::{Reply, error_of, packed};
+use crate::galil::recording::{Look, Out};
+use crate::galil::sampling::{Sampled, Sampler};
+use crate::galil::timing::Timing;
+use crate::rig::RigEventBody;
+use palpate_model::Nanos;
+use palpate_model::rig::{Fault, RigCommand};
+
+impl Session {
+    pub(super) fn on_reply(&mut self, now: Nanos, reply: &Reply) {
+        if self.search.is_some() {
+            return self.on_reply_while_searching(now, reply);
+        }
+        let Some((asked, sent)) = self.expected.pop_front() else {
+            return self.lose_order(now);
+        };
+        self.answered_at = now;
+        match asked {
+            Asked::Sample => self.on_answer(now, sent, reply, None),
+            Asked::Marked(is_begun) => self.on_answer(now, sent, reply, Some(is_begun)),
+            Asked::Elements => self.on_elements(now, reply),
+            Asked::Segment => {
+                if !reply.is_accepted && self.sine.take().is_some() {
+                    self.end_sine(now, "the controller takes no more of it");
+                }
+            }
+            Asked::Renewal => {
+                // A refusal is a program that is gone, which a reset explains; the clock will tell.
+                if !reply.bytes.is_empty() {
+                    self.lose_order(now);
+                }
+            }
+            Asked::Part => {
+                let settings = self.settings.clone();
+                // Answers of an order that a stop has ended belong to nobody.
+                if let Some((_, order)) = &mut self.order {
+                    let next = order.take(reply, &settings);
+                    self.go_on(now, next);
+                }
+            }
+            Asked::Stop(number, command) if reply.is_accepted && reply.bytes.is_empty() => {
+                self.acknowledge(now, number, command);
+            }
+            Asked::Stop(number, command) if reply.is_accepted => {
+                self.unconfirmed.push((number, command));
+                self.lose_order(now);
+            }
+            Asked::Stop(number, command) => {
+                self.refuse(now, number, format!("it refuses {command:?}"));
+            }
+            Asked::QuietStop => {}
+            Asked::Why => {
+                if let Some((number, _)) = self.order.take() {
+                    let why = error_of(reply).map(|err| err.to_string());
+                    let why = why.unwrap_or_else(|| "it does not say why".into());
+                    self.refuse(now, number, why);
+                }
+            }
+            Asked::Marker(_) => {}
+        }
+    }
+
+    /// The answer to the question, polled or while recording.
+    pub(super) fn on_answer(
+        &mut self,
+        now: Nanos,
+        sent: Nanos,
+        reply: &Reply,
+        marked: Option<bool>,
+    ) {
+        self.stats.push(now.since(sent));
+        let Some(numbers) = reply.numbers().filter(|_| reply.is_accepted) else {
+            return self.lose_order(now);
+        };
+        let Some(recording) = &mut self.recording else {
+            // Without a recording `_RD` means nothing; a question with it may still be on its way.
+            let poll = Look::read(&numbers).map_or(numbers, |look| look.poll.to_vec());
+            return self.on_sample(now, Some(sent), &poll, marked == Some(true));
+        };
+        let Some(look) = Look::read(&numbers) else {
+            return self.lose_order(now);
+        };
+        if self.sampler.is_reset(look.time) {
+            self.give_up_recording(now);
+            return self.on_sample(now, Some(sent), &look.poll, false);
+        }
+        match recording.look(look, marked) {
+            Ok(()) => {
+                self.stats.lost = recording.lost;
+                self.timing
+                    .push(look.time as u64, self.pace.tick, sent, now);
+                self.fetch(now);
+            }
+            Err(_) => {
+                self.give_up_recording(now);
+                let detail = "the controller has stopped recording, and samples were lost; open the rig again";
+                let fault = Fault::CommandRefused {
+                    detail: detail.into(),
+                };
+                self.report(now, RigEventBody::Fault(fault));
+                self.on_sample(now, Some(sent), &look.poll, marked == Some(true));
+            }
+        }
+    }
+
+    /// From here on samples are polled.
+    pub(super) fn give_up_recording(&mut self, now: Nanos) {
+        let Some(mut recording) = self.recording.take() else {
+            return;
+        };
+        self.question = Sampler::question(&self.settings);
+        for out in recording.drain() {
+            self.put_out(now, out);
+        }
+    }
+
+    /// Asks for elements that are there, and tells what waited when there are none.
+    pub(super) fn fetch(&mut self, now: Nanos) {
+        let Some(recording) = &mut self.recording else {
+            return;
+        };
+        if let Some(commands) = recording.fetch() {
+            for text in packed(&commands) {
+                let asked = vec![Asked::Elements; text.matches(';').count() + 1];
+                self.fetches.push_back(Outgoing { text, asked });
+            }
+        } else if !recording.is_fetching() {
+            for out in recording.settled() {
+                self.put_out(now, out);
+            }
+        }
+    }
+
+    pub(super) fn on_elements(&mut self, now: Nanos, reply: &Reply) {
+        let Some(recording) = &mut self.recording else {
+            // Of a recording that was given up.
+            return;
+        };
+        let column = reply.numbers().filter(|_| reply.is_accepted);
+        let out = column.and_then(|column| recording.take(column, &self.settings));
+        let Some(out) = out else {
+            return self.lose_order(now);
+        };
+        for out in out {
+            self.put_out(now, out);
+        }
+        if self.search.is_none() {
+            self.fetch(now);
+        }
+    }
+
+    pub(super) fn put_out(&mut self, now: Nanos, out: Out) {
+        match out {
+            Out::Event(event) => self.report(now, event),
+            Out::Sample(poll, is_begun) => self.on_sample(now, None, &poll, is_begun),
+        }
+    }
+
+    /// The numbers of a sample, as a poll gives them.
+    pub(super) fn on_sample(
+        &mut self,
+        now: Nanos,
+        sent: Option<Nanos>,
+        numbers: &[f64],
+        is_begun: bool,
+    ) {
+        let is_begun = is_begun || self.is_motion_begun;
+        match self.sampler.take(numbers, is_begun) {
+            Some(Sampled::Reading(reading)) => {
+                self.is_motion_begun = false;
+                if let Some(sent) = sent {
+                    self.timing.push(reading.tick, self.pace.tick, sent, now);
+                }
+                self.report(now, RigEventBody::Reading(reading));
+            }
+            Some(Sampled::Same) => self.is_motion_begun = is_begun,
+            Some(Sampled::Reset) => {
+                self.is_motion_begun = false;
+                self.on_reset(now);
+            }
+            None => self.lose_order(now),
+        }
+    }
+
+    /// A sine that cannot go on: the axis is stopped.
+    pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
+        self.urge(RigCommand::Stop, Asked::QuietStop);
+        let fault = Fault::CommandRefused {
+            detail: format!("the sine was broken off: {why}"),
+        };
+        self.report_in_order(now, RigEventBody::Fault(fault));
+    }
+
+    /// The controller has forgotten its settings: nothing may move before it is opened again.
+    pub(super) fn on_reset(&mut self, now: Nanos) {
+        self.is_reset = true;
+        self.timing = Timing::default();
+        self.sine = None;
+        self.has_watchdog = false;
+        self.beginning = None;
+        let under_way = self.order.take().map(|(number, _)| number);
+        let waiting: Vec<u64> = self.orders.drain(..).map(|(number, _)| number).collect();
+        for number in under_way.into_iter().chain(waiting) {
+            self.refuse(now, number, RESET);
+        }
+        self.report(now, RigEventBody::Fault(Fault::ControllerReset));
+    }
+}

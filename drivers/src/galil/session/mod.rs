@@ -1,0 +1,310 @@
+//! The dialogue with a controller that has been set up: samples asked for one after the other, commands between them,
+//! stops before everything.
+
+mod answers;
+mod search;
+mod writing;
+
+use super::connect::Connected;
+use super::order::Order;
+use super::protocol::{Incoming, LINE_MAX, Parser};
+use super::recording::{self, Recording};
+use super::sampling::Sampler;
+use super::settings::GalilSettings;
+use super::sine::Feed;
+use super::timing::Timing;
+use crate::rig::RigEventBody;
+use crate::wire::{Dialogue, LinkStats};
+use palpate_model::Nanos;
+use palpate_model::rig::{Ack, Fault, RigCommand};
+use search::{MARKERS_MAX, QUIET, Search};
+use std::collections::VecDeque;
+
+/// An answer later than this was lost: TMT's galil-io and M2FS wait 0.5 s for commands that write nothing to flash.
+const ANSWER_MAX: Nanos = Nanos::from_millis(400);
+/// Commands that wait; as many as may wait on the way here.
+const ORDERS_MAX: usize = 64;
+
+/// Why a motion is not begun.
+const OVERTAKEN: &str = "a stop came first, so it was not begun";
+/// Why nothing is done any more.
+const RESET: &str = "the controller was reset; open the rig again";
+
+/// Whether a command moves the axis.
+const fn is_motion(command: &RigCommand) -> bool {
+    matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_))
+}
+
+/// What a prompt still to come belongs to.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Asked {
+    /// A sample.
+    Sample,
+    /// A sample behind a command; `true` behind the begin of a motion.
+    Marked(bool),
+    /// Elements of a recorded array.
+    Elements,
+    /// Increments of a sine, which a stop or a limit may have ended before.
+    Segment,
+    /// The watchdog's variable.
+    Renewal,
+    /// A part of the order under way.
+    Part,
+    /// A command that stops.
+    Stop(u64, RigCommand),
+    /// A stop that nobody waits for.
+    QuietStop,
+    /// `TC1`, after a refusal of the order under way.
+    Why,
+    /// A number that must come back.
+    Marker(u32),
+}
+
+/// A command that was not answered for yet.
+#[derive(Clone, Debug)]
+struct Owed {
+    number: u64,
+    answer: Option<RigEventBody>,
+}
+
+/// A line to be written.
+#[derive(Clone, Debug, PartialEq)]
+struct Outgoing {
+    pub text: String,
+    pub asked: Vec<Asked>,
+}
+
+/// How fast the link was when the controller was set up.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pace {
+    /// Between two questions.
+    pub every: Nanos,
+    /// Questions that may wait for answers at once.
+    pub in_flight: usize,
+    /// Length of a sample of the controller.
+    pub tick: Nanos,
+}
+
+/// The dialogue.
+#[derive(Clone, Debug)]
+pub struct Session {
+    settings: GalilSettings,
+    pace: Pace,
+    has_watchdog: bool,
+    question: String,
+    parser: Parser,
+    sampler: Sampler,
+    recording: Option<Recording>,
+    sine: Option<Feed>,
+    timing: Timing,
+    expected: VecDeque<(Asked, Nanos)>,
+    urgent: VecDeque<Outgoing>,
+    lines: VecDeque<Outgoing>,
+    fetches: VecDeque<Outgoing>,
+    /// The part of an order that begins something, and when it may go out.
+    beginning: Option<(Outgoing, Nanos)>,
+    orders: VecDeque<(u64, RigCommand)>,
+    order: Option<(u64, Order)>,
+    /// Commands in the order in which they came, so that answers come in it too.
+    owed: VecDeque<Owed>,
+    commands: u64,
+    is_motion_begun: bool,
+    search: Option<Search>,
+    /// Stops whose answers went by while the order was being looked for.
+    unconfirmed: Vec<(u64, RigCommand)>,
+    /// Why nothing but stops is done any more.
+    is_reset: bool,
+    attended: Option<Nanos>,
+    asked_at: Option<Nanos>,
+    renewed_at: Option<Nanos>,
+    answered_at: Nanos,
+    events: VecDeque<(Nanos, RigEventBody)>,
+    stats: LinkStats,
+}
+
+impl Session {
+    /// With a controller that was set up just now.
+    #[must_use]
+    pub fn new(settings: GalilSettings, connected: &Connected, now: Nanos) -> Self {
+        let recording = connected.plan.map(Recording::new);
+        let question = match &recording {
+            Some(_) => recording::question(&settings),
+            None => Sampler::question(&settings),
+        };
+        Self {
+            question,
+            sampler: Sampler::new(settings.clone()),
+            recording,
+            sine: None,
+            timing: Timing::default(),
+            settings,
+            pace: connected.pace,
+            has_watchdog: connected.has_watchdog,
+            parser: Parser::default(),
+            expected: VecDeque::new(),
+            urgent: VecDeque::new(),
+            lines: VecDeque::new(),
+            fetches: VecDeque::new(),
+            beginning: None,
+            orders: VecDeque::new(),
+            order: None,
+            owed: VecDeque::new(),
+            commands: 0,
+            is_motion_begun: false,
+            search: None,
+            unconfirmed: Vec::new(),
+            is_reset: false,
+            attended: None,
+            asked_at: None,
+            renewed_at: None,
+            answered_at: now,
+            events: VecDeque::new(),
+            stats: connected.stats,
+        }
+    }
+
+    fn report(&mut self, now: Nanos, body: RigEventBody) {
+        self.events.push_back((now, body));
+    }
+
+    /// Reports behind all samples that the controller has taken by now.
+    fn report_in_order(&mut self, now: Nanos, body: RigEventBody) {
+        match &mut self.recording {
+            Some(recording) => recording.hold(body),
+            None => self.report(now, body),
+        }
+    }
+
+    /// Notes a command that wants an answer.
+    fn owe(&mut self) -> u64 {
+        self.commands += 1;
+        self.owed.push_back(Owed {
+            number: self.commands,
+            answer: None,
+        });
+        self.commands
+    }
+
+    /// Answers a command; it is told when all before it are answered.
+    fn answer(&mut self, now: Nanos, number: u64, answer: RigEventBody) {
+        if let Some(owed) = self.owed.iter_mut().find(|owed| owed.number == number) {
+            owed.answer = Some(answer);
+        }
+        while let Some(answer) = self.owed.front_mut().and_then(|owed| owed.answer.take()) {
+            self.owed.pop_front();
+            self.report_in_order(now, answer);
+        }
+    }
+
+    fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
+        self.answer(now, number, RigEventBody::Ack(Ack { command }));
+    }
+
+    fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
+        let detail = detail.into();
+        let fault = Fault::CommandRefused { detail };
+        self.answer(now, number, RigEventBody::Fault(fault));
+    }
+}
+
+impl Dialogue for Session {
+    fn attended(&mut self, at: Nanos) {
+        self.attended = Some(at);
+    }
+
+    fn command(&mut self, now: Nanos, command: RigCommand) {
+        if command.is_stopping() {
+            self.stop(now, command);
+            return;
+        }
+        let number = self.owe();
+        if self.is_reset {
+            self.refuse(now, number, RESET);
+        } else if self.orders.len() >= ORDERS_MAX {
+            self.refuse(now, number, "too many commands at once");
+        } else {
+            self.orders.push_back((number, command));
+        }
+    }
+
+    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
+        // The stop that comes next ends it, if it is a motion.
+        self.command(now, command);
+    }
+
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        if let Some(search) = self.search.as_mut().filter(|_| !bytes.is_empty()) {
+            search.last_byte = now;
+        }
+        for byte in bytes {
+            match self.parser.take(*byte) {
+                Some(Incoming::Reply(reply)) => self.on_reply(now, &reply),
+                // What programs of the controller say is in the log of raw bytes.
+                Some(Incoming::Unasked(_)) => {}
+                Some(Incoming::Flood) if self.search.is_none() => self.lose_order(now),
+                Some(Incoming::Flood) | None => {}
+            }
+        }
+    }
+
+    fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        let is_overdue = self
+            .expected
+            .front()
+            .is_some_and(|(_, sent)| now.since(*sent) > ANSWER_MAX);
+        if is_overdue && self.search.is_none() {
+            self.lose_order(now);
+        }
+        let line = self.next_line(now)?;
+        debug_assert!(line.text.len() <= LINE_MAX, "{}", line.text);
+        for asked in line.asked {
+            self.expected.push_back((asked, now));
+        }
+        Some(line.text.into_bytes())
+    }
+
+    fn next_at(&self, now: Nanos) -> Nanos {
+        if self.search.is_some() {
+            // Often enough to see that the line has become quiet.
+            return now + Nanos(QUIET.0 / 10);
+        }
+        let due = match &self.beginning {
+            Some((_, due)) => *due,
+            None => self.asked_at.map_or(now, |at| at + self.pace.every),
+        };
+        let feed_due = self.sine.as_ref().and_then(Feed::due);
+        let due = feed_due.map_or(due, |feed| feed.min(due));
+        if self.samples_in_flight() < self.pace.in_flight || self.beginning.is_some() {
+            due.max(now)
+        } else {
+            now + QUIET
+        }
+    }
+
+    fn take_event(&mut self) -> Option<(Nanos, RigEventBody)> {
+        self.events.pop_front()
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        self.search?.is_over(now).then(|| {
+            format!(
+                "the controller gave no sensible answer to {MARKERS_MAX} questions; check cable and power"
+            )
+        })
+    }
+
+    fn uncertainty(&self, at: Nanos) -> Option<Nanos> {
+        self.timing.uncertainty(at, self.pace.tick)
+    }
+
+    fn host_time(&self, tick: u64) -> Option<Nanos> {
+        self.timing.host_time(tick, self.pace.tick)
+    }
+
+    fn stats(&self) -> LinkStats {
+        LinkStats {
+            deviation_max: self.timing.deviation_max,
+            ..self.stats
+        }
+    }
+}
