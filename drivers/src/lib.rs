@@ -23,4 +23,4 @@ pub mod text;
 pub mod wire;
 
 pub use open::{is_rig_file, open, open_wired, read_rig_file};
-pub use rig::{Rig, RigError, RigEvent, RigEventBody, Taken};
+pub use rig::{Rig, RigError, RigEvent, RigEventBody};

@@ -13,28 +13,13 @@ pub struct RigEvent {
     pub at: Nanos,
     /// What arrived.
     pub body: RigEventBody,
-    /// When a sample was taken, as far as that is known better than that it was before it arrived.
-    pub taken: Option<Taken>,
-}
-
-/// When a sample was taken, on the host's clock.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Taken {
-    /// The best estimate.
-    pub at: Nanos,
-    /// How far it may be wrong either way.
-    pub uncertainty: Nanos,
 }
 
 impl RigEvent {
-    /// A report of which no more is known than its arrival.
+    /// A report with its arrival.
     #[must_use]
-    pub const fn arrived(at: Nanos, body: RigEventBody) -> Self {
-        Self {
-            at,
-            body,
-            taken: None,
-        }
+    pub const fn new(at: Nanos, body: RigEventBody) -> Self {
+        Self { at, body }
     }
 }
 

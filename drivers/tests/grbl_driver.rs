@@ -8,3 +8,5 @@ mod faults;
 mod moves;
 #[path = "grbl/opening.rs"]
 mod opening;
+#[path = "grbl/wires.rs"]
+mod wires;

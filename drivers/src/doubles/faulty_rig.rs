@@ -118,7 +118,7 @@ impl<R: Rig> FaultyRig<R> {
             _ => at,
         };
         self.newest = Some(at);
-        self.reports.push_back(RigEvent::arrived(at, body));
+        self.reports.push_back(RigEvent::new(at, body));
     }
 
     fn schedule(&mut self, at: Nanos, what: Timed) {

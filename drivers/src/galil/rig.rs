@@ -125,7 +125,7 @@ impl Rig for GalilRig {
         self.origin = Some(origin);
         if let Some(fault) = self.refused.pop_front() {
             let at = self.told(now, until);
-            return Some(RigEvent::arrived(at, RigEventBody::Fault(fault)));
+            return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
         }
         let end = origin + until;
         let wait = Duration::from_nanos(end.since(now).0);
@@ -135,9 +135,6 @@ impl Rig for GalilRig {
         };
         let mut event = line.next_event(end, wait)?;
         event.at = self.told(event.at, until);
-        if let Some(taken) = &mut event.taken {
-            taken.at = taken.at.since(origin).min(event.at);
-        }
         Some(event)
     }
 

@@ -26,6 +26,8 @@ const POLL_CLOSELY: Nanos = Nanos::from_millis(25);
 const REPORT_MAX: Nanos = Nanos::from_millis(150);
 /// Without a status for so long the board counts as gone.
 const SILENCE_MAX: Nanos = Nanos::from_millis(1_500);
+/// This thread looks every half a millisecond. When it did not for so long, it was not the board that was silent.
+const PAUSE: Nanos = Nanos::from_millis(20);
 /// A jog is acknowledged when it is planned, within milliseconds.
 const OK_MAX: Nanos = Nanos::from_millis(400);
 /// A jog that was still in the input buffer begins after a cancel, so that is written again and again until all rests.
@@ -65,6 +67,7 @@ pub struct Session {
     asked: Option<Nanos>,
     polled: Option<Nanos>,
     heard: Nanos,
+    looked: Nanos,
     /// Stops that a status after them will confirm.
     stops: Vec<(u64, RigCommand, Nanos)>,
     halt: Option<u64>,
@@ -101,6 +104,7 @@ impl Session {
             asked: None,
             polled: None,
             heard: now,
+            looked: now,
             stops: Vec::new(),
             halt: None,
             locked: None,
@@ -541,6 +545,10 @@ impl Session {
 
     /// Reasons to stop that nobody has asked for.
     fn watch(&mut self, now: Nanos) {
+        let pause = now.since(std::mem::replace(&mut self.looked, now));
+        if pause > PAUSE {
+            self.heard = self.heard + pause;
+        }
         if self.open.is_some_and(|at| now.since(at) > OK_MAX) {
             self.open = None;
             self.stats.resynchronised += 1;

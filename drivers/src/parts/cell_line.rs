@@ -14,8 +14,10 @@ use std::sync::{Arc, Mutex, PoisonError};
 pub const TICK: Nanos = Nanos::from_millis(1);
 /// So many samples may be missing before the cell counts as gone.
 const SILENT_PERIODS: f64 = 5.0;
-/// A slower device than this would be told by its own dialogue.
-const SILENT_MIN: Nanos = Nanos::from_millis(100);
+/// Computers and USB converters pause for so long now and then.
+const SILENT_MIN: Nanos = Nanos::from_millis(250);
+/// This thread looks every half a millisecond. When it did not for so long, it was not the cell that was silent.
+const PAUSE: Nanos = Nanos::from_millis(20);
 
 /// A load cell in progress.
 pub struct CellLine {
@@ -25,6 +27,7 @@ pub struct CellLine {
     start: Nanos,
     last_tick: Option<u64>,
     heard: Nanos,
+    looked: Nanos,
     silence: Nanos,
     is_silent: bool,
     events: VecDeque<(Nanos, RigEventBody)>,
@@ -47,6 +50,7 @@ impl CellLine {
             start,
             last_tick: None,
             heard: start,
+            looked: start,
             silence: silence.max(SILENT_MIN),
             is_silent: false,
             events: VecDeque::new(),
@@ -111,6 +115,10 @@ impl Dialogue for CellLine {
     }
 
     fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        let pause = now.since(std::mem::replace(&mut self.looked, now));
+        if pause > PAUSE {
+            self.heard = self.heard + pause;
+        }
         if now.since(self.heard) > self.silence && !std::mem::replace(&mut self.is_silent, true) {
             let ms = self.silence.0 / 1_000_000;
             self.fault(

@@ -197,13 +197,13 @@ impl Rig for PartsRig {
         self.origin = Some(origin);
         if let Some(fault) = self.refused.pop_front() {
             let at = self.told(now, until);
-            return Some(RigEvent::arrived(at, RigEventBody::Fault(fault)));
+            return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
         }
         let end = origin + until;
         let event = self.next(end, end)?;
         let at = self.told(event.at, until);
         let body = self.complete(event.body);
-        Some(RigEvent::arrived(at, body))
+        Some(RigEvent::new(at, body))
     }
 
     fn is_virtual(&self) -> bool {

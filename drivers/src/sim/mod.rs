@@ -211,7 +211,7 @@ impl SimRig {
 
     fn report(&mut self, sent: Nanos, body: RigEventBody) {
         let at = self.link.arrival(sent);
-        self.reports.push_back(RigEvent::arrived(at, body));
+        self.reports.push_back(RigEvent::new(at, body));
     }
 }
 

@@ -3,9 +3,9 @@
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
 use super::link::Link;
-use crate::rig::{RigEvent, RigEventBody, Taken};
+use crate::rig::{RigEvent, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{Fault, RawBytes, RigCommand};
+use palpate_model::rig::{Age, Fault, RawBytes, RigCommand};
 use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -177,7 +177,7 @@ impl<D> Drop for Owner<D> {
         if std::thread::panicking() {
             let failed = lost("the driver has failed; open the rig again");
             let at = (self.clock)();
-            reports.events.push_back(RigEvent::arrived(at, failed));
+            reports.events.push_back(RigEvent::new(at, failed));
         }
         came.notify_all();
     }
@@ -206,7 +206,7 @@ impl<D: Dialogue> Owner<D> {
             }
         };
         let at = (self.clock)();
-        self.report(vec![RigEvent::arrived(at, lost(ending))]);
+        self.report(vec![RigEvent::new(at, lost(ending))]);
     }
 
     /// Commands, lines, bytes: once.
@@ -237,21 +237,21 @@ impl<D: Dialogue> Owner<D> {
             self.dialogue.received(now, &buffer[..count]);
         }
         let mut events = Vec::new();
-        while let Some((at, body)) = self.dialogue.take_event() {
-            let taken = match &body {
-                RigEventBody::Reading(reading) => self.taken(at, reading.tick),
-                _ => None,
-            };
-            events.push(RigEvent { at, body, taken });
+        while let Some((at, mut body)) = self.dialogue.take_event() {
+            if let RigEventBody::Reading(reading) = &mut body {
+                reading.age = reading.age.or_else(|| self.age(at, reading.tick));
+            }
+            events.push(RigEvent { at, body });
         }
         self.report(events);
         Ok(())
     }
 
-    fn taken(&self, at: Nanos, tick: u64) -> Option<Taken> {
-        Some(Taken {
-            at: self.dialogue.host_time(tick)?,
-            uncertainty: self.dialogue.uncertainty(at)?,
+    /// How long before a time of the host a sample of the device was taken.
+    fn age(&self, at: Nanos, tick: u64) -> Option<Age> {
+        Some(Age {
+            by: at.since(self.dialogue.host_time(tick)?),
+            within: self.dialogue.uncertainty(at)?,
         })
     }
 

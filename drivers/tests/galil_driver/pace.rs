@@ -75,17 +75,17 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     while newest < last {
         runner.pass();
         for event in std::mem::take(&mut runner.events) {
-            let RigEventBody::Reading(Reading { tick, .. }) = event.body else {
+            let RigEventBody::Reading(Reading { tick, age, .. }) = event.body else {
                 continue;
             };
             assert!(tick > newest);
             samples += 1;
             gaps += (tick - newest) / step - 1;
             newest = tick;
-            let taken = event.taken.expect("its time is known");
-            age_max = age_max.max(event.at.since(taken.at));
-            uncertainty_max = uncertainty_max.max(taken.uncertainty);
-            line.push((tick, taken.at));
+            let age = age.expect("its age is known");
+            age_max = age_max.max(age.by);
+            uncertainty_max = uncertainty_max.max(age.within);
+            line.push((tick, Nanos(event.at.0.saturating_sub(age.by.0))));
         }
         // Nobody else takes them, and they are many.
         drop(runner.rig.take_raw());

@@ -93,9 +93,7 @@ fn a_reset_is_noticed_and_nothing_moves_after_it() {
         wire.board.receive(now, &[0x18]);
     }
     host.until("noticed", |host| {
-        host.faults
-            .iter()
-            .any(|fault| *fault == Fault::ControllerReset)
+        host.faults.contains(&Fault::ControllerReset)
     });
     host.pass(0.5);
     let there = host.truth();

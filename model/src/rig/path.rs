@@ -106,6 +106,7 @@ impl PathTracker {
         let reported = position_from_pulses(reading.pulses, self.mm_per_pulse);
         let at_rest = self.position.unwrap_or(reported);
         let is_moving = reading.status.has(AxisStatus::MOVING);
+        let mut lag_mm = 0.0_f64;
         if is_moving
             && matches!(self.motion, Motion::Rest)
             && let Some(pending) = self.pending.take()
@@ -134,6 +135,10 @@ impl PathTracker {
                 }
                 self.velocity = course.velocity(since);
                 let here = course.position(since);
+                for other in [since.0 - self.pulse_lag.0, since.0 + self.pulse_lag.0] {
+                    let way = course.position(Seconds(other)).distance_from(here);
+                    lag_mm = lag_mm.max(way.abs());
+                }
                 if is_moving {
                     here
                 } else {
@@ -146,8 +151,8 @@ impl PathTracker {
         }
         self.position = Some(position);
         let expected_pulses = position.0 / self.mm_per_pulse;
-        let speed = self.velocity.0.abs().max(self.speed_at_stop.0);
-        let lag_pulses = speed * self.pulse_lag.0 / self.mm_per_pulse;
+        let lag_mm = lag_mm.max(self.speed_at_stop.0 * self.pulse_lag.0);
+        let lag_pulses = lag_mm / self.mm_per_pulse;
         // One pulse, plus rounding of a position of up to 1e5 pulses in double precision.
         if (expected_pulses - reading.pulses as f64).abs() > 1.0 + lag_pulses + 1e-6 {
             return Err(PathError {

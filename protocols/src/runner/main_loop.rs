@@ -8,9 +8,9 @@ use super::start::{Bench, RunRequest, StartError, start};
 use super::watch::HostWatch;
 use crate::engine::{Input, Operator};
 use arc_swap::ArcSwap;
-use palpate_drivers::{Rig, RigEvent, RigEventBody};
+use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{Age, AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -245,7 +245,7 @@ impl MainLoop {
             let limit = self.next_tick.min(until);
             while let Some(event) = self.rig.next_event(limit) {
                 self.now = event.at;
-                self.on_event(event);
+                self.on_event(event.body);
             }
             self.now = limit;
             if limit == self.next_tick {
@@ -257,21 +257,14 @@ impl MainLoop {
         }
     }
 
-    fn on_event(&mut self, event: RigEvent) {
-        match event.body {
+    fn on_event(&mut self, body: RigEventBody) {
+        match body {
             // What is not a number goes no further: not to a plot, a fit or a file.
             RigEventBody::Reading(reading) if !reading.volts.is_finite() => {
                 let tick = reading.tick;
                 self.feed(Input::Fault(Fault::SignalInvalid { tick }));
             }
             RigEventBody::Reading(reading) => {
-                let reading = Reading {
-                    age: reading.age.or(event.taken.map(|taken| Age {
-                        by: event.at.since(taken.at),
-                        within: taken.uncertainty,
-                    })),
-                    ..reading
-                };
                 self.is_sample_seen = true;
                 // A clock that runs back is a controller that restarted, also between runs.
                 if self.reading.is_some_and(|last| reading.tick <= last.tick) {

@@ -1,0 +1,256 @@
+//! Board and load cell on two pseudo-terminals, as `palpate emulate grbl` puts them there, and the rig of a rig file.
+
+use palpate_drivers::emulate::ScheduledFault;
+use palpate_drivers::emulate::bench::Bench;
+use palpate_drivers::emulate::cell::EmulatedCell;
+use palpate_drivers::emulate::grbl::{Grbl, GrblSettings};
+use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
+use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
+use palpate_drivers::rig_file::RigFile;
+use palpate_drivers::sim::SimSettings;
+use palpate_drivers::wire::HostClock;
+use palpate_drivers::{Rig, RigEventBody};
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
+use palpate_model::units::{MmPerS, MmPerS2};
+use std::io::Write;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{SyncSender, sync_channel};
+use std::thread::JoinHandle;
+use std::time::{Duration, Instant};
+
+struct Served {
+    stop: Arc<AtomicBool>,
+    thread: Option<JoinHandle<()>>,
+    orders: SyncSender<String>,
+    places: Vec<String>,
+}
+
+impl Drop for Served {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.thread.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// `None`, with a word, where there are no pseudo-terminals.
+fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let asked = Arc::clone(&stop);
+    let (orders, received) = sync_channel(4);
+    let (tell, told) = sync_channel(64);
+    let thread = std::thread::Builder::new()
+        .name("emulator".into())
+        .spawn(move || {
+            let cell: Box<dyn EmulatedCell> = if is_gauge {
+                Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default()))
+            } else {
+                Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
+            };
+            let board = Grbl::new(GrblSettings::default());
+            let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
+            let options = ServeOptions {
+                place: Place::Ptys(vec![None, None]),
+                baud: None,
+                latency: Nanos::ZERO,
+                faults,
+                seed: 1,
+            };
+            let mut listener = |said| drop(tell.try_send(said));
+            let served = serve(&mut device, &options, &received, &asked, &mut listener);
+            if let Err(err) = served {
+                writeln!(std::io::stderr(), "skipped: {err}").expect("standard error is open");
+            }
+        })
+        .expect("a thread");
+    let Ok(Told::Ready(places)) = told.recv_timeout(Duration::from_secs(20)) else {
+        return None;
+    };
+    Some(Served {
+        stop,
+        thread: Some(thread),
+        orders,
+        places: places.split(", ").map(str::to_owned).collect(),
+    })
+}
+
+#[expect(clippy::disallowed_methods, reason = "real wires take real time")]
+fn now() -> Instant {
+    Instant::now()
+}
+
+/// The rig of a rig file, with a test's clock.
+struct Client {
+    rig: Box<dyn Rig>,
+    start: Instant,
+    readings: Vec<Reading>,
+    acks: Vec<RigCommand>,
+    faults: Vec<Fault>,
+}
+
+impl Client {
+    fn open(served: &Served, cell: &str) -> Self {
+        let [board, cell_port] = served.places.as_slice() else {
+            panic!("{:?}", served.places);
+        };
+        let text = format!(
+            "device = \"grbl\"\nport = \"{board}\"\nmm_per_pulse = 0.0025\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
+             acceleration_mm_s2 = 60\nhome_switch = \"limit\"\n[cell]\nport = \"{cell_port}\"\n{cell}\n"
+        );
+        let file = RigFile::parse("bench.toml", &text).expect("a rig file");
+        let start = now();
+        let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
+        Self {
+            rig: file.open(&clock).expect("it opens"),
+            start: now(),
+            readings: Vec::new(),
+            acks: Vec::new(),
+            faults: Vec::new(),
+        }
+    }
+
+    fn turn(&mut self) {
+        let until = Nanos(self.start.elapsed().as_nanos() as u64) + Nanos::from_millis(5);
+        while let Some(event) = self.rig.next_event(until) {
+            match event.body {
+                RigEventBody::Reading(reading) => self.readings.push(reading),
+                RigEventBody::Ack(ack) => self.acks.push(ack.command),
+                RigEventBody::Fault(fault) => self.faults.push(fault),
+            }
+        }
+    }
+
+    fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
+        let end = now() + Duration::from_secs(30);
+        while !is_so(self) {
+            assert!(now() < end, "{what} never: {:?}", self.faults);
+            self.turn();
+        }
+    }
+
+    fn tell(&mut self, command: RigCommand) {
+        let before = self.acks.len();
+        self.rig.send(command);
+        self.until("acknowledged", |client| client.acks.len() > before);
+    }
+
+    fn is_moving(&self) -> bool {
+        self.readings
+            .last()
+            .is_some_and(|reading| reading.status.has(AxisStatus::MOVING))
+    }
+}
+
+fn to(target_pulses: i64, speed: f64) -> MoveTo {
+    MoveTo {
+        target_pulses,
+        speed: MmPerS(speed),
+        acceleration: MmPerS2(60.0),
+    }
+}
+
+const HX711: &str = "device = \"hx711\"";
+const GAUGE: &str = "device = \"mark10\"\ncapacity_n = 25";
+
+#[test]
+fn samples_follow_the_path_with_either_cell() {
+    for (is_gauge, cell) in [(false, HX711), (true, GAUGE)] {
+        let Some(served) = start(is_gauge, Vec::new()) else {
+            return;
+        };
+        let mut client = Client::open(&served, cell);
+        assert_eq!(client.rig.newtons_per_volt(), is_gauge.then_some(1.0));
+        assert_eq!(client.rig.links().len(), 2);
+        let mut tracker = PathTracker::new(client.rig.description());
+        client.tell(RigCommand::EnableMotor);
+        client.until("samples", |client| client.readings.len() > 5);
+        for reading in client.readings.drain(..) {
+            tracker.on_reading(&reading).expect("on the path");
+        }
+        for (target, speed) in [(2_000, 9.0), (2_020, 0.75), (2_010, 9.0)] {
+            let wanted = to(target, speed);
+            tracker.on_move(wanted);
+            client.tell(RigCommand::MoveTo(wanted));
+            client.until("begun", |client| {
+                client
+                    .readings
+                    .iter()
+                    .any(|r| r.status.has(AxisStatus::MOVING))
+            });
+            client.until("at rest", |client| !client.is_moving());
+            for reading in client.readings.drain(..) {
+                tracker.on_reading(&reading).expect("on the path");
+                if tracker.is_at_rest() {
+                    assert_eq!(reading.pulses, target);
+                }
+            }
+            assert!(tracker.is_at_rest());
+        }
+        client.tell(RigCommand::DefinePosition { pulses: -7 });
+        let before = client.readings.len();
+        client.until("a sample", |client| client.readings.len() > before);
+        assert_eq!(client.readings[before].pulses, -7);
+        assert_eq!(client.faults, []);
+        assert!(
+            client
+                .readings
+                .windows(2)
+                .all(|pair| pair[0].tick < pair[1].tick)
+        );
+        assert!(!client.rig.take_raw().is_empty());
+    }
+}
+
+#[test]
+fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
+    let Some(served) = start(false, Vec::new()) else {
+        return;
+    };
+    let mut client = Client::open(&served, HX711);
+    client.tell(RigCommand::EnableMotor);
+    client.tell(RigCommand::MoveTo(to(40_000, 9.0)));
+    client.until("moving", Client::is_moving);
+    client.tell(RigCommand::Stop);
+    client.until("at rest", |client| !client.is_moving());
+    assert_eq!(client.faults, []);
+    served
+        .orders
+        .send("disconnect:60".into())
+        .expect("it listens");
+    client.until("told", |client| {
+        let lost = client
+            .faults
+            .iter()
+            .filter(|fault| matches!(fault, Fault::LinkLost { .. }));
+        lost.count() == 2
+    });
+}
+
+#[test]
+fn a_cell_that_falls_silent_stops_the_axis() {
+    let Some(served) = start(false, Vec::new()) else {
+        return;
+    };
+    let mut client = Client::open(&served, HX711);
+    client.tell(RigCommand::EnableMotor);
+    client.tell(RigCommand::MoveTo(to(40_000, 5.0)));
+    client.until("moving", Client::is_moving);
+    // Nothing comes from either device for as long as the cell may be silent, and from the board shorter than it may be.
+    served.orders.send("mute:0.7".into()).expect("it listens");
+    client.until("told", |client| {
+        client
+            .faults
+            .iter()
+            .any(|fault| fault.to_string().contains("load cell has sent nothing"))
+    });
+    let before = client.readings.len();
+    client.until("samples again", |client| {
+        client.readings.len() > before + 20
+    });
+    client.until("at rest", |client| !client.is_moving());
+    assert!(client.readings.last().expect("one").pulses < 30_000);
+}
