@@ -232,6 +232,11 @@ impl WorkbenchApp {
                     }
                 }
                 Command::CloseSession => self.operator(Operator::Close),
+                Command::Reconnect => {
+                    if let Err(err) = self.runner.request(Request::Reconnect) {
+                        self.refusal = Some(err);
+                    }
+                }
                 Command::ListPorts => self.ports.refresh(ctx),
                 Command::Choose(ask) => {
                     if let Err(err) = self.dialog.open(ask, ctx) {

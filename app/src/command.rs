@@ -20,6 +20,8 @@ pub enum Command {
     Retract,
     /// After a stop: end the session where the probe stands.
     CloseSession,
+    /// Connect the rig anew after its link was lost; nothing moves.
+    Reconnect,
     /// List the serial ports again.
     ListPorts,
     /// Choose a folder or a file in a dialog of its own.

@@ -2,7 +2,7 @@
 
 use super::cell_line::{CellLine, TICK};
 use super::track::Track;
-use crate::rig::{Rig, RigEvent, RigEventBody};
+use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::OpenedCell;
 use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
 use palpate_model::Nanos;
@@ -28,12 +28,18 @@ pub struct Axis {
     pub raw: Vec<RawBytes>,
 }
 
+/// Opens the same devices once more.
+pub type Again = Box<dyn Fn() -> Result<PartsRig, RigError> + Send>;
+
 /// An axis and a load cell.
 pub struct PartsRig {
+    /// How it is opened once more; `None` where it cannot be.
+    again: Option<Again>,
     description: RigDescription,
     newtons_per_volt: Option<f64>,
-    axis: Line,
-    cell: Line,
+    /// Both are `None` while they are being connected anew, and after that has failed.
+    axis: Option<Line>,
+    cell: Option<Line>,
     track: Arc<Mutex<Track>>,
     clock: HostClock,
     /// The host's clock where ticks begin.
@@ -85,10 +91,11 @@ impl PartsRig {
         // The first sample of a motion is up to a period behind its beginning.
         description.pulse_lag.0 += 1.5 * period;
         Ok(Self {
+            again: None,
             description,
             newtons_per_volt: cell.newtons_per_volt,
-            axis: axis.line,
-            cell: cell_line,
+            axis: Some(axis.line),
+            cell: Some(cell_line),
             track: axis.track,
             clock,
             start,
@@ -103,11 +110,24 @@ impl PartsRig {
         })
     }
 
+    /// Lets it be opened once more.
+    #[must_use]
+    pub fn with_again(self, again: Again) -> Self {
+        Self {
+            again: Some(again),
+            ..self
+        }
+    }
+
     /// The older of what has come from axis and cell, within `wait`; the axis first.
     fn next(&mut self, until: Nanos, end: Nanos) -> Option<RigEvent> {
+        let (Some(axis_line), Some(cell_line)) = (&self.axis, &self.cell) else {
+            std::thread::sleep(Duration::from_nanos(end.since((self.clock)()).0));
+            return None;
+        };
         loop {
             if self.from_axis.is_none() {
-                self.from_axis = self.axis.next_event(until, Duration::ZERO);
+                self.from_axis = axis_line.next_event(until, Duration::ZERO);
             }
             let left = if self.from_axis.is_some() {
                 Nanos::ZERO
@@ -116,7 +136,7 @@ impl PartsRig {
             };
             if self.from_cell.is_none() {
                 let wait = Duration::from_nanos(left.min(TURN).0);
-                self.from_cell = self.cell.next_event(until, wait);
+                self.from_cell = cell_line.next_event(until, wait);
             }
             let is_axis_first = match (&self.from_axis, &self.from_cell) {
                 (Some(axis), Some(cell)) => axis.at <= cell.at,
@@ -161,6 +181,15 @@ impl PartsRig {
         }
     }
 
+    /// What was exchanged since this was last asked, at the host's time.
+    fn take_raw_of_host(&mut self) -> Vec<RawBytes> {
+        let mut raw = std::mem::take(&mut self.first_raw);
+        let lines = [&self.axis, &self.cell];
+        raw.extend(lines.into_iter().flatten().flat_map(Line::take_raw));
+        raw.sort_by_key(|piece| piece.at);
+        raw
+    }
+
     /// The caller's time of a moment of the host's clock; never before what was told already.
     fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
         let origin = self.origin.unwrap_or(at);
@@ -175,11 +204,15 @@ impl Rig for PartsRig {
     }
 
     fn send(&mut self, command: RigCommand) {
-        if self.axis.send(command).is_err() {
-            self.refused.push_back(Fault::CommandRefused {
-                detail: "too many commands at once".into(),
-            });
-        }
+        let sent = self.axis.as_mut().map(|axis| axis.send(command));
+        let detail = match sent {
+            Some(Ok(())) => return,
+            Some(Err(_)) => "too many commands at once",
+            None => "the rig is not connected",
+        };
+        self.refused.push_back(Fault::CommandRefused {
+            detail: detail.into(),
+        });
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
@@ -206,6 +239,34 @@ impl Rig for PartsRig {
         Some(RigEvent::new(at, body))
     }
 
+    fn reconnect(&mut self) -> Result<(), RigError> {
+        let again = self.again.take().ok_or(RigError::NotAgain)?;
+        // The old links say farewell and are closed, or their ports would be busy with them.
+        let mut raw = self.take_raw_of_host();
+        (self.axis, self.cell) = (None, None);
+        (self.from_axis, self.from_cell) = (None, None);
+        self.refused.clear();
+        let opened = again();
+        match opened {
+            Ok(mut opened) => {
+                raw.append(&mut opened.first_raw);
+                *self = Self {
+                    first_raw: raw,
+                    origin: self.origin,
+                    newest: self.newest,
+                    again: Some(again),
+                    ..opened
+                };
+                Ok(())
+            }
+            Err(err) => {
+                self.first_raw = raw;
+                self.again = Some(again);
+                Err(err)
+            }
+        }
+    }
+
     fn is_virtual(&self) -> bool {
         false
     }
@@ -215,17 +276,16 @@ impl Rig for PartsRig {
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {
-        vec![
-            ("grbl".to_owned(), self.axis.stats()),
-            ("cell".to_owned(), self.cell.stats()),
-        ]
+        let lines = [("grbl", &self.axis), ("cell", &self.cell)];
+        let open = lines
+            .into_iter()
+            .filter_map(|(name, line)| Some((name, line.as_ref()?)));
+        open.map(|(name, line)| (name.to_owned(), line.stats()))
+            .collect()
     }
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
-        let mut raw = std::mem::take(&mut self.first_raw);
-        raw.extend(self.axis.take_raw());
-        raw.extend(self.cell.take_raw());
-        raw.sort_by_key(|piece| piece.at);
+        let mut raw = self.take_raw_of_host();
         let origin = self.origin.unwrap_or(Nanos::ZERO);
         for piece in &mut raw {
             piece.at = piece.at.since(origin);

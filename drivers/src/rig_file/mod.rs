@@ -17,7 +17,7 @@ use crate::galil::{GalilOpenError, GalilRig, GalilSettings};
 use crate::grbl::{GrblOpenError, GrblSettings};
 use crate::mark10::{StandRig, StandSettings};
 use crate::parts::PartsRig;
-use crate::rig::Rig;
+use crate::rig::{Rig, RigError};
 use crate::wire::{HostClock, Place, WireError};
 use fields::Fields;
 use std::fmt;
@@ -123,20 +123,43 @@ impl RigFile {
                 cell_place,
                 cell,
             } => {
-                let axis_link = place.open()?;
-                let mut cell_link = cell_place.open()?;
-                let (description, axis) = crate::grbl::open(axis_link, settings, clock)?;
-                let opened = cell.open(cell_link.as_mut(), clock)?;
-                let rig = PartsRig::new(description, axis, cell_link, opened, clock.clone());
-                Ok(Box::new(
-                    rig.map_err(|err| DeviceError::Thread(err.to_string()))?,
-                ))
+                let (file, clock) = (settings.name.clone(), clock.clone());
+                let parts = (
+                    place.clone(),
+                    settings.clone(),
+                    cell_place.clone(),
+                    cell.clone(),
+                );
+                let open = move || open_parts(&parts.0, &parts.1, &parts.2, &parts.3, &clock);
+                let rig = open()?;
+                Ok(Box::new(rig.with_again(Box::new(move || {
+                    open().map_err(|error| RigError::Device {
+                        file: file.clone(),
+                        error,
+                    })
+                }))))
             }
             Self::Stand { place, settings } => {
                 Ok(Box::new(StandRig::open(place, settings, clock.clone())?))
             }
         }
     }
+}
+
+/// A Grbl board and the load cell beside it.
+fn open_parts(
+    place: &Place,
+    settings: &GrblSettings,
+    cell_place: &Place,
+    cell: &CellFile,
+    clock: &HostClock,
+) -> Result<PartsRig, DeviceError> {
+    let axis_link = place.open()?;
+    let mut cell_link = cell_place.open()?;
+    let (description, axis) = crate::grbl::open(axis_link, settings, clock)?;
+    let opened = cell.open(cell_link.as_mut(), clock)?;
+    PartsRig::new(description, axis, cell_link, opened, clock.clone())
+        .map_err(|err| DeviceError::Thread(err.to_string()))
 }
 
 /// A device that a rig file describes cannot be used.

@@ -14,10 +14,13 @@ pub const BLOCKS: usize = 8;
 /// A slope of so many of its standard deviations is no noise: one window in 400 of a steady signal.
 const SLOPE_SIGMAS: f64 = 3.0;
 
+/// Fewer samples in a block show no scatter.
+const BLOCK_SAMPLES_MIN: u64 = 2;
+
 /// When a signal counts as settled.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SettleRule {
-    /// Time between two samples.
+    /// Length of a tick of the clock that counts them. A sample comes every tick, or every so many.
     pub interval: Seconds,
     /// Length of the window that must be steady.
     pub window: Seconds,
@@ -46,11 +49,11 @@ impl SettleRule {
         }
     }
 
-    /// Samples in one block of the window; two at least, for a scatter within.
-    fn block_samples(&self) -> u64 {
-        let samples = self.window.0 / (self.interval.0 * BLOCKS as f64);
+    /// Ticks of one block of the window.
+    fn block_ticks(&self) -> u64 {
+        let ticks = self.window.0 / (self.interval.0 * BLOCKS as f64);
         // A float-to-integer cast saturates; NaN becomes 0.
-        (samples.round() as u64).max(2)
+        (ticks.round() as u64).max(BLOCK_SAMPLES_MIN)
     }
 }
 
@@ -120,6 +123,7 @@ impl fmt::Display for Unsettled {
 /// Mean and squared scatter of a block under construction (Welford 1962).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Block {
+    ticks: u64,
     samples: u64,
     mean: f64,
     scatter: f64,
@@ -138,7 +142,7 @@ impl Block {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Settling {
     rule: SettleRule,
-    samples: u64,
+    ticks: u64,
     block: Block,
     blocks: VecDeque<Block>,
     last: Option<(Steady, f64)>,
@@ -151,7 +155,7 @@ impl Settling {
     pub fn new(rule: SettleRule) -> Self {
         Self {
             rule,
-            samples: 0,
+            ticks: 0,
             block: Block::default(),
             blocks: VecDeque::with_capacity(BLOCKS),
             last: None,
@@ -159,19 +163,21 @@ impl Settling {
         }
     }
 
-    /// Takes the next sample. A signal that is no number begins the window anew.
-    pub fn push(&mut self, signal: Volts) -> Settle {
+    /// Takes the next sample, so many ticks after the one before. A signal that is no number begins the window anew.
+    pub fn push(&mut self, ticks: u64, signal: Volts) -> Settle {
         if self.verdict != Settle::Waiting {
             return self.verdict;
         }
-        self.samples += 1;
+        self.ticks += ticks;
         if signal.is_finite() {
+            self.block.ticks += ticks;
             self.block.push(signal.0);
         } else {
             self.block = Block::default();
             self.blocks.clear();
         }
-        if self.block.samples >= self.rule.block_samples() {
+        let is_full = self.block.ticks >= self.rule.block_ticks();
+        if is_full && self.block.samples >= BLOCK_SAMPLES_MIN {
             if self.blocks.len() == BLOCKS {
                 self.blocks.pop_front();
             }
@@ -192,12 +198,14 @@ impl Settling {
     }
 
     fn waited(&self) -> Seconds {
-        Seconds(self.samples as f64 * self.rule.interval.0)
+        Seconds(self.ticks as f64 * self.rule.interval.0)
     }
 
     fn judge(&mut self) {
         let count = BLOCKS as f64;
-        let per_block = self.rule.block_samples() as f64;
+        let samples: u64 = self.blocks.iter().map(|block| block.samples).sum();
+        let ticks: u64 = self.blocks.iter().map(|block| block.ticks).sum();
+        let (per_block, block_ticks) = (samples as f64 / count, ticks as f64 / count);
         let mean = self.blocks.iter().map(|block| block.mean).sum::<f64>() / count;
         let places = (0..BLOCKS).map(|i| i as f64 - 0.5 * (count - 1.0));
         let along: f64 = places
@@ -206,7 +214,7 @@ impl Settling {
             .sum();
         // Sum of the squared places of `count` blocks a block apart.
         let square = count * (count * count - 1.0) / 12.0;
-        let block_time = per_block * self.rule.interval.0;
+        let block_time = block_ticks * self.rule.interval.0;
         let slope = along / square / block_time;
         let scatter: f64 = self.blocks.iter().map(|block| block.scatter).sum();
         let noise = (scatter / (count * (per_block - 1.0))).sqrt();
@@ -217,7 +225,7 @@ impl Settling {
             mean: Volts(mean),
             noise: Volts(noise),
             slope_v_per_s: slope,
-            samples: BLOCKS as u64 * self.rule.block_samples(),
+            samples,
             waited: self.waited(),
         };
         self.last = Some((steady, slope_max));
@@ -246,7 +254,7 @@ mod tests {
         let mut settling = Settling::new(RULE);
         for i in 0..40_000 {
             let t = f64::from(i) * 1e-3;
-            let verdict = settling.push(Volts(signal(t) + 1e-3 * random.normal()));
+            let verdict = settling.push(1, Volts(signal(t) + 1e-3 * random.normal()));
             if verdict != Settle::Waiting {
                 return verdict;
             }
@@ -296,24 +304,49 @@ mod tests {
     }
 
     #[test]
+    fn a_slow_cell_is_waited_for_as_long_as_a_fast_one() {
+        // Eighty samples a second on a clock of milliseconds: 12 or 13 ticks apart.
+        for seed in 0..20 {
+            let mut random = SplitMix::seeded(seed);
+            let mut settling = Settling::new(RULE);
+            let mut verdict = Settle::Waiting;
+            let mut sample = 0_u64;
+            while verdict == Settle::Waiting {
+                sample += 1;
+                let ticks = 12 + sample % 2;
+                let t = sample as f64 * 0.0125;
+                let volts = 1.6 - 0.02 * (-t / 0.3).exp() + 2e-4 * random.normal();
+                verdict = settling.push(ticks, Volts(volts));
+            }
+            let Settle::Settled(steady) = verdict else {
+                panic!("seed {seed}: {verdict:?}");
+            };
+            assert!((steady.mean.0 - 1.6).abs() < 5e-4, "{steady:?}");
+            assert!((2.0..8.0).contains(&steady.waited.0), "{steady:?}");
+            assert!((155..=170).contains(&steady.samples), "{steady:?}");
+            assert!((steady.noise.0 - 2e-4).abs() < 6e-5, "{steady:?}");
+        }
+    }
+
+    #[test]
     fn what_is_no_number_begins_anew_and_the_verdict_stays() {
         let mut settling = Settling::new(RULE);
         for i in 0..1999 {
             let volts = if i == 1500 { f64::NAN } else { 1.28 };
-            assert_eq!(settling.push(Volts(volts)), Settle::Waiting);
+            assert_eq!(settling.push(1, Volts(volts)), Settle::Waiting);
         }
         let mut verdict = Settle::Waiting;
         for _ in 0..2000 {
-            verdict = settling.push(Volts(1.28));
+            verdict = settling.push(1, Volts(1.28));
         }
         let Settle::Settled(steady) = verdict else {
             panic!("{verdict:?}");
         };
         assert_eq!((steady.noise, steady.slope_v_per_s), (Volts(0.0), 0.0));
         assert!((steady.waited.0 - 3.501).abs() < 1e-9, "{steady:?}");
-        assert_eq!(settling.push(Volts(9.0)), verdict);
+        assert_eq!(settling.push(1, Volts(9.0)), verdict);
         let mut blind = Settling::new(RULE);
-        let verdict = (0..30_000).map(|_| blind.push(Volts(f64::NAN))).last();
+        let verdict = (0..30_000).map(|_| blind.push(1, Volts(f64::NAN))).last();
         let Some(Settle::TimedOut(blind)) = verdict else {
             panic!("{verdict:?}");
         };

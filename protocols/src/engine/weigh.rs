@@ -12,6 +12,7 @@ use palpate_model::units::Volts;
 pub(crate) struct Weighing {
     plan: Weigh,
     settling: Settling,
+    newest_tick: Option<u64>,
 }
 
 impl Weighing {
@@ -28,11 +29,17 @@ impl Weighing {
         Self {
             plan,
             settling: Settling::new(rule),
+            newest_tick: None,
         }
     }
 
     pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
-        match self.settling.push(reading.volts) {
+        // A controller that restarted counts from zero again.
+        let ticks = self
+            .newest_tick
+            .map_or(1, |newest| reading.tick.saturating_sub(newest));
+        self.newest_tick = Some(reading.tick);
+        match self.settling.push(ticks, reading.volts) {
             Settle::Waiting => Progress::Continue,
             Settle::TimedOut(unsettled) => {
                 Progress::Fail(format!("weigh {} g: {unsettled}", self.plan.mass_g))

@@ -159,6 +159,7 @@ impl Player {
                 description: Arc::new(state.config().rig.clone()),
                 reading: reading.and_then(reading_of),
                 is_homed: state.is_homed(),
+                link: None,
                 link_error: None,
             },
             run: Some(board.view(state, log)),

@@ -37,6 +37,8 @@ pub enum Request {
     Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
     Operator(Operator),
+    /// Connect the rig anew after its link was lost. Nothing moves, and it has to be zeroed again. Not while a run goes on.
+    Reconnect,
     /// Stop motion and end the thread.
     Shutdown,
 }
@@ -280,6 +282,9 @@ impl MainLoop {
                 }
                 if let Fault::LinkLost { detail } = &fault {
                     self.link_error = Some(detail.clone());
+                } else if matches!(fault, Fault::ControllerReset) && !self.rig.is_virtual() {
+                    // It has forgotten what was set.
+                    self.link_error = Some("the controller was reset".into());
                 }
                 self.feed(Input::Fault(fault));
             }
@@ -320,6 +325,13 @@ impl MainLoop {
                     self.rig.send(RigCommand::Halt);
                     self.is_homed = false;
                 }
+            }
+            Request::Reconnect if self.is_running() => {}
+            Request::Reconnect => {
+                self.reading = None;
+                self.is_homed = false;
+                self.link_error = self.rig.reconnect().err().map(|err| err.to_string());
+                self.description = Arc::new(self.rig.description().clone());
             }
             Request::Shutdown => return true,
         }
@@ -390,6 +402,7 @@ impl MainLoop {
                 description: Arc::clone(&self.description),
                 reading: self.reading,
                 is_homed: self.is_homed,
+                link: self.rig.link().map(str::to_owned),
                 link_error: self.link_error.clone(),
             },
             run: self.run.as_ref().and_then(ActiveRun::view),

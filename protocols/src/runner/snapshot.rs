@@ -34,6 +34,8 @@ pub struct RigView {
     pub reading: Option<Reading>,
     /// Whether position zero is known.
     pub is_homed: bool,
+    /// How fast it was when it was opened, in words; none on a simulated rig.
+    pub link: Option<String>,
     /// Why the link is down, if it is.
     pub link_error: Option<String>,
 }

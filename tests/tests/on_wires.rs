@@ -1,0 +1,147 @@
+//! A whole protocol on an emulated controller behind a pseudo-terminal, at real pace: what is in its session, and a link
+//! that is lost and made again. A computer that is busy with other tests may keep samples waiting until an interlock ends
+//! the run; everything else holds however it ended.
+
+use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings};
+use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
+use palpate_drivers::open_wired;
+use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_model::Nanos;
+use palpate_protocols::replay::replay;
+use palpate_protocols::runner::{Request, Runner, TimeScale, driver_clock};
+use palpate_sessions::Session;
+use palpate_tests::{recorded, shipped};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::mpsc::{Receiver, sync_channel};
+use std::thread::JoinHandle;
+use std::time::Duration;
+
+/// An emulated controller; unplugged when dropped.
+struct Emulator(Arc<AtomicBool>, Option<JoinHandle<()>>);
+
+impl Emulator {
+    fn at(path: &Path) -> Result<Self, String> {
+        let is_over = Arc::new(AtomicBool::new(false));
+        let stop = Arc::clone(&is_over);
+        let (sender, told) = sync_channel(4);
+        let options = ServeOptions {
+            place: Place::Ptys(vec![Some(path.to_owned())]),
+            baud: None,
+            latency: Nanos::ZERO,
+            faults: Vec::new(),
+            seed: 1,
+        };
+        let thread = std::thread::Builder::new()
+            .name("emulator".into())
+            .spawn(move || {
+                let mut device = GalilEmulator::new(GalilSettings {
+                    is_serial: true,
+                    ..GalilSettings::default()
+                });
+                let (_orders, received) = sync_channel(1);
+                let mut tell = |told| drop(sender.try_send(told));
+                // The sender falls with the thread, and so tells of a failure.
+                let _ = serve(&mut device, &options, &received, &stop, &mut tell);
+            })
+            .map_err(|err| err.to_string())?;
+        match told.recv_timeout(Duration::from_secs(20)) {
+            Ok(Told::Ready(_)) => Ok(Self(is_over, Some(thread))),
+            _ => Err("there is no pseudo-terminal".into()),
+        }
+    }
+}
+
+impl Drop for Emulator {
+    fn drop(&mut self) {
+        self.0.store(true, Ordering::Relaxed);
+        if let Some(thread) = self.1.take() {
+            let _ = thread.join();
+        }
+    }
+}
+
+/// Waits until a snapshot is as wanted.
+fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) -> bool {
+    // 30 snapshots a second.
+    for _ in 0..1800 {
+        if is_it() {
+            return true;
+        }
+        if woken.recv_timeout(Duration::from_secs(20)).is_err() && !runner.is_alive() {
+            return false;
+        }
+    }
+    false
+}
+
+#[test]
+fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("galil");
+    let emulator = match Emulator::at(&port) {
+        Ok(emulator) => emulator,
+        Err(why) => {
+            println!("skipped: {why}");
+            return;
+        }
+    };
+    let file = folder.path().join("bench.toml");
+    let text = format!(
+        "device = \"galil\"\nport = \"{}\"\nmm_per_pulse = 0.015\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
+         acceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n",
+        port.display()
+    );
+    std::fs::write(&file, text).unwrap();
+    let rig = open_wired(&file.display().to_string(), &driver_clock()).unwrap();
+    let calibration = SimRig::new(SimSettings::default()).calibration();
+    let plan = shipped("check-home", &[]);
+    let out = folder.path().join("session");
+    let (runner, woken) = recorded::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
+    let has_ended = || {
+        let snapshot = runner.snapshot();
+        snapshot
+            .run
+            .as_ref()
+            .is_some_and(|run| run.outcome.is_some())
+    };
+    assert!(wait(&runner, &woken, has_ended), "the run does not end");
+
+    let session = Session::open(&out).unwrap();
+    let end = session.end.as_ref().unwrap();
+    println!(
+        "{}: {}; {} samples",
+        end.outcome,
+        end.reason,
+        session.rows.len()
+    );
+    let rig = session.manifest.rig.as_ref().unwrap();
+    assert!(rig.identity.contains("watchdog"), "{}", rig.identity);
+    assert!(session.rows.len() > 100, "{}", session.rows.len());
+    // A sample is never younger than nothing, and its age is known to some ten milliseconds on any computer.
+    let ages = session.rows.iter().map(|row| row.age);
+    assert!(ages.clone().all(|age| age.is_some()), "an age is missing");
+    assert!(ages.flatten().all(|age| age.within > Nanos::ZERO));
+    assert!(session.rows.windows(2).all(|two| two[0].tick < two[1].tick));
+    let raw: usize = session.raw.iter().map(|piece| piece.bytes.len()).sum();
+    assert!(raw > 1000, "{raw} raw bytes");
+    let report = replay(&session).unwrap();
+    assert!(report.is_identical(), "{report:?}");
+
+    // The plug is pulled, and put back.
+    drop(emulator);
+    let is_lost = || runner.snapshot().rig.link_error.is_some();
+    assert!(wait(&runner, &woken, is_lost), "the loss is not noticed");
+    let _emulator = Emulator::at(&port).unwrap();
+    runner.request(Request::Reconnect).unwrap();
+    let is_back = || {
+        let rig = &runner.snapshot().rig;
+        rig.link_error.is_none() && rig.reading.is_some() && !rig.is_homed
+    };
+    assert!(
+        wait(&runner, &woken, is_back),
+        "{:?}",
+        runner.snapshot().rig.link_error
+    );
+}
