@@ -76,7 +76,16 @@ impl RigDescription {
     #[must_use]
     pub fn samples_per_ms(&self) -> u32 {
         // Saturates for a tick of zero, which no rig has.
-        (1e6 / self.tick_nanos.max(1) as f64).round().max(1.0) as u32
+        let nanos = self.tick_nanos.max(1) as f64 * self.ticks_per_sample.max(1.0);
+        (1e6 / nanos).round().max(1.0) as u32
+    }
+
+    /// Whether the signal's own noise changes its counts, so that many equal samples are a dead cell. Half a count of
+    /// white noise leaves two samples equal two times in five; a hundred in a row never happen.
+    #[must_use]
+    pub fn shows_noise(&self) -> bool {
+        self.adc
+            .is_none_or(|adc| self.noise_expected.0 >= 0.5 * adc.volts_per_count)
     }
 
     /// Checks that the rig can follow an oscillation, and explains a refusal.

@@ -34,14 +34,16 @@ impl Limits {
     }
 
     /// Longest tolerated age of the newest sample at a speed: the time in which the probe moves
-    /// 0.1 mm, kept between 20 ms (two scheduler slices of a desktop host) and 250 ms.
+    /// 0.1 mm, kept between 20 ms (two scheduler slices of a desktop host) and 250 ms. A rig whose samples come `apart`,
+    /// as those of a slow load cell, has that time beside the 20 ms: its newest sample is as old by itself.
     #[must_use]
-    pub fn sample_age_max(speed: MmPerS) -> Seconds {
+    pub fn sample_age_max(speed: MmPerS, apart: Seconds) -> Seconds {
         let span = if speed.0.abs() > 0.0 {
             0.1 / speed.0.abs()
         } else {
             f64::INFINITY
         };
-        Seconds(span.clamp(0.020, 0.250))
+        // Apart by more than 230 ms there is no room for a computer's slices: nothing moves on such a rig.
+        Seconds(span.clamp((0.020 + apart.0.max(0.0)).min(0.250), 0.250))
     }
 }

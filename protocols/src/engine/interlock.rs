@@ -5,7 +5,7 @@ use super::state::{Power, State};
 use crate::plans::Step;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Limits, Phase, Reading, RigDescription};
-use palpate_model::units::{MmPerS, Newtons, Position, Volts};
+use palpate_model::units::{MmPerS, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 use std::fmt;
 
@@ -85,6 +85,8 @@ pub(super) struct Watch {
     millisecond: Millisecond,
     /// The newest forces, one a millisecond, oldest first once full.
     recent: [f64; 2 * RATE_MS],
+    /// The ticks of their last samples.
+    recent_ticks: [u64; 2 * RATE_MS],
     recent_count: usize,
     retract_ceiling: Option<(Newtons, Volts)>,
     newest: (Newtons, Volts),
@@ -101,11 +103,16 @@ impl Watch {
             last_tick: None,
             millisecond: Millisecond::of(rig),
             recent: [0.0; 2 * RATE_MS],
+            recent_ticks: [0; 2 * RATE_MS],
             recent_count: 0,
             retract_ceiling: None,
             newest: (Newtons(0.0), Volts(0.0)),
             same_count: 0,
-            stuck: STUCK_MS * rig.samples_per_ms(),
+            stuck: if rig.shows_noise() {
+                STUCK_MS * rig.samples_per_ms()
+            } else {
+                u32::MAX
+            },
         }
     }
 
@@ -137,17 +144,30 @@ impl Watch {
     }
 
     /// Change of force between the two newest means, in N/s, each time a millisecond is complete and there are enough.
-    fn push_rate(&mut self, force: f64, rig: &RigDescription) -> Option<f64> {
+    fn push_rate(&mut self, tick: u64, force: f64, rig: &RigDescription) -> Option<f64> {
         let (_, force) = self.millisecond.push(0.0, force)?;
         self.recent.rotate_left(1);
         self.recent[2 * RATE_MS - 1] = force;
+        self.recent_ticks.rotate_left(1);
+        self.recent_ticks[2 * RATE_MS - 1] = tick;
         self.recent_count = (self.recent_count + 1).min(2 * RATE_MS);
         if self.recent_count < 2 * RATE_MS {
             return None;
         }
         let (older, newer) = self.recent.split_at(RATE_MS);
         let difference = newer.iter().sum::<f64>() - older.iter().sum::<f64>();
-        let apart = (RATE_MS as u32 * rig.samples_per_ms()) as f64 * rig.tick().0;
+        let (older, newer) = self.recent_ticks.split_at(RATE_MS);
+        let sum = |ticks: &[u64]| {
+            ticks
+                .iter()
+                .fold(0, |sum: u64, tick| sum.saturating_add(*tick))
+        };
+        // A clock that went back is another interlock's business.
+        let ticks = sum(newer).saturating_sub(sum(older));
+        if ticks == 0 {
+            return None;
+        }
+        let apart = ticks as f64 / RATE_MS as f64 * rig.tick().0;
         Some(difference / RATE_MS as f64 / apart)
     }
 }
@@ -180,7 +200,9 @@ pub(super) fn judge(
     let derived = state.derived.force;
     let force = derived.unwrap_or_else(|| state.force_from_volts(reading.volts));
     state.watch.newest = (force, reading.volts);
-    let rate = state.watch.push_rate(force.0, &state.config.rig);
+    let rate = state
+        .watch
+        .push_rate(reading.tick, force.0, &state.config.rig);
     let (force_max, volts_max) = match state.watch.retract_ceiling {
         Some((force, volts)) => (
             Newtons(limits.force_max.0.max(force.0)),
@@ -306,7 +328,9 @@ fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     // A move just begun counts at its full speed: the newest sample cannot know it yet.
     let commanded = state.in_flight.map_or(0.0, |flight| flight.speed.0);
     let speed = state.derived.velocity.0.abs().max(commanded);
-    let age_max = Limits::sample_age_max(MmPerS(speed));
+    let rig = &state.config.rig;
+    let apart = Seconds((rig.ticks_per_sample - 1.0) * rig.tick().0);
+    let age_max = Limits::sample_age_max(MmPerS(speed), apart);
     if age <= age_max {
         return None;
     }

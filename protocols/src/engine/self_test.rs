@@ -59,7 +59,7 @@ impl SelfTest {
             ));
         }
         let noise = self.volts.std_dev();
-        if noise == 0.0 {
+        if noise == 0.0 && cx.state.config.rig.shows_noise() {
             return Err("the signal does not change at all; check the load cell's wiring".into());
         }
         let noise_max = NOISE_FACTOR_MAX * cx.state.config.rig.noise_expected.0;

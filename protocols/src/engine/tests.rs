@@ -243,8 +243,19 @@ fn silence_trips_by_the_speed() {
         tripped(&bench.give(Input::Tick)),
         Some(Interlock::SampleAge)
     );
-    assert_eq!(Limits::sample_age_max(MmPerS(0.75)), Seconds(0.1 / 0.75));
-    assert_eq!(Limits::sample_age_max(MmPerS(20.0)), Seconds(0.020));
+    assert_eq!(
+        Limits::sample_age_max(MmPerS(0.75), Seconds(0.0)),
+        Seconds(0.1 / 0.75)
+    );
+    assert_eq!(
+        Limits::sample_age_max(MmPerS(20.0), Seconds(0.0)),
+        Seconds(0.020)
+    );
+    // Eighty samples a second, one in 12.5 ms.
+    assert_eq!(
+        Limits::sample_age_max(MmPerS(20.0), Seconds(0.0125)),
+        Seconds(0.0325)
+    );
 }
 
 #[test]
