@@ -82,7 +82,10 @@ impl GalilRig {
     #[must_use]
     pub fn stats(&self) -> LinkStats {
         let stats = self.line.as_ref().map(Line::stats);
-        stats.unwrap_or(self.connected.stats)
+        // Nothing was asked since: as it was measured when it was opened.
+        stats
+            .filter(|stats| stats.answers > 0)
+            .unwrap_or(self.connected.stats)
     }
 
     /// The caller's time of a moment of the host's clock; never before what was told already.

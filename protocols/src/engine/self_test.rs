@@ -62,7 +62,9 @@ impl SelfTest {
         if noise == 0.0 && cx.state.config.rig.shows_noise() {
             return Err("the signal does not change at all; check the load cell's wiring".into());
         }
-        let noise_max = NOISE_FACTOR_MAX * cx.state.config.rig.noise_expected.0;
+        let rig = &cx.state.config.rig;
+        let count = rig.adc.map_or(0.0, |adc| adc.volts_per_count);
+        let noise_max = NOISE_FACTOR_MAX * rig.noise_expected.0.max(count);
         if noise > noise_max {
             return Err(format!(
                 "the signal's noise is {:.2} mV rms, above {:.2} mV; check wiring and range",

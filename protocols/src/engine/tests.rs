@@ -7,7 +7,7 @@ use crate::plans::{HoldUntil, Plan, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
-    Ack, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
+    Ack, AdcDescription, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
 };
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use std::sync::Arc;
@@ -47,9 +47,13 @@ fn rig() -> RigDescription {
 
 impl Bench {
     fn new(steps: Vec<Step>) -> Self {
+        Self::on(rig(), steps)
+    }
+
+    fn on(rig: RigDescription, steps: Vec<Step>) -> Self {
         let calibration = Calibration::linear("line", Volts(ZERO), 0.15, Newtons(50.0));
         let config = Config {
-            rig: rig(),
+            rig,
             limits: Limits::for_travel(Position(150.0)),
             curve: calibration.curve().unwrap(),
             plan: Plan::of("table", 1, steps),
@@ -72,7 +76,12 @@ impl Bench {
 
     /// The same with a rule that may end the hold before.
     fn holding_until(hold: f64, until: Option<HoldUntil>) -> Self {
-        let mut bench = Self::new(vec![
+        Self::holding_on(rig(), hold, until)
+    }
+
+    /// The same on another rig.
+    fn holding_on(rig: RigDescription, hold: f64, until: Option<HoldUntil>) -> Self {
+        let steps = vec![
             Step::SelfTest {
                 duration: Seconds(0.1),
             },
@@ -84,7 +93,8 @@ impl Bench {
                 until,
                 rate: None,
             },
-        ]);
+        ];
+        let mut bench = Self::on(rig, steps);
         bench.start();
         for _ in 0..1000 {
             if bench.state().phase() == Phase::Hold {
@@ -118,8 +128,12 @@ impl Bench {
 
     /// The next millisecond's sample, with a little alternating noise so that the cell lives.
     fn sample(&mut self, volts: f64) -> Vec<Effect> {
-        self.tick += 1;
-        self.now = self.now + Nanos::from_millis(1);
+        self.sample_after(1, volts)
+    }
+
+    fn sample_after(&mut self, ticks: u64, volts: f64) -> Vec<Effect> {
+        self.tick += ticks;
+        self.now = self.now + Nanos::from_millis(ticks);
         let noise = if self.tick.is_multiple_of(2) {
             1e-4
         } else {
@@ -231,6 +245,63 @@ fn raw_volts_trip_whatever_the_calibration_says() {
     bench.state.as_mut().unwrap().config = Arc::new(config);
     let effects = bench.sample(2.85);
     assert_eq!(tripped(&effects), Some(Interlock::Volts));
+}
+
+/// A slow cell: eighty samples a second, 12 and 13 ms apart, whose counts hide its noise.
+fn slow() -> RigDescription {
+    RigDescription {
+        ticks_per_sample: 12.5,
+        adc: Some(AdcDescription {
+            counts_min: -25_000,
+            counts_max: 25_000,
+            volts_per_count: 0.001,
+        }),
+        noise_expected: Volts(1e-4),
+        ..rig()
+    }
+}
+
+#[test]
+fn the_rate_of_a_force_is_by_time_where_samples_come_seldom() {
+    // N/s at which it trips, or none in a second.
+    let trips = |rate: f64| {
+        let mut bench = Bench::holding_on(slow(), 60.0, None);
+        (0..80).find_map(|sample| {
+            let force = rate * sample as f64 * 0.0125;
+            let effects = bench.sample_after(12 + sample % 2, volts(force.min(8.0)));
+            tripped(&effects)
+        })
+    };
+    // 40 N/s counted as if samples were a millisecond apart would be 500.
+    assert_eq!(trips(7.0), None);
+    assert_eq!(trips(40.0), None);
+    assert_eq!(trips(70.0), Some(Interlock::ForceRate));
+}
+
+#[test]
+fn a_cell_whose_counts_hide_its_noise_is_not_dead() {
+    let stuck = |rig: RigDescription| {
+        let mut bench = Bench::holding_on(rig, 60.0, None);
+        (0..200).find_map(|_| {
+            bench.tick += 12;
+            bench.now = bench.now + Nanos::from_millis(12);
+            let reading = Reading {
+                tick: bench.tick,
+                counts: Some(0),
+                volts: Volts(ZERO),
+                pulses: 0,
+                status: AxisStatus::MOTOR_ON,
+                age: None,
+            };
+            tripped(&bench.give(Input::Reading(reading)))
+        })
+    };
+    assert_eq!(stuck(slow()), None);
+    let noisy = RigDescription {
+        noise_expected: Volts(0.001),
+        ..slow()
+    };
+    assert_eq!(stuck(noisy), Some(Interlock::Signal));
 }
 
 #[test]

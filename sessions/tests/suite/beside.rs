@@ -130,7 +130,7 @@ fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
         let kept = Edits::read(&recovery.folder, id).unwrap().all;
         let is_kept = |edit: &Edit| has_contacts || !matches!(edit.change, Change::Contact { .. });
         let expected: Vec<Edit> = edits().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}");
+        assert_eq!(kept, expected, "{place} of {}: {missing:?}", whole.len());
         let kept = Analyses::read(&recovery.folder, id).unwrap().all;
         let is_kept = |one: &Analysis| match one.what {
             Analysed::Mask { .. } | Analysed::Withdrawal => has_first,
@@ -138,7 +138,7 @@ fn what_still_means_the_same_goes_with_the_copy_and_the_rest_is_told() {
             Analysed::Fit { .. } => false,
         };
         let expected: Vec<Analysis> = analyses().into_iter().filter(is_kept).collect();
-        assert_eq!(kept, expected, "{place}");
+        assert_eq!(kept, expected, "{place} of {}: {missing:?}", whole.len());
         // Whoever opens the copy is told of the rest, as whoever made it was.
         let note = &copy.notes[0];
         assert_eq!(recovery.salvage.missing, missing);

@@ -33,6 +33,16 @@ pub struct GaugeSettings {
     pub noise: Option<Newtons>,
 }
 
+impl GaugeSettings {
+    /// Standard deviation of readings at rest: as it was given, or the rounding to steps of the last digit alone, for a
+    /// gauge's filters are mostly stronger than its noise.
+    #[must_use]
+    pub fn noise_expected(&self, step: Volts) -> Volts {
+        self.noise
+            .map_or(Volts(step.0 / 12.0_f64.sqrt()), |noise| Volts(noise.0))
+    }
+}
+
 impl Default for GaugeSettings {
     fn default() -> Self {
         Self {

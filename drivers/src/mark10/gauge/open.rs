@@ -51,7 +51,7 @@ pub fn open(
             counts_max: scale.counts_max,
             volts_per_count: step.0,
         },
-        noise_expected: settings.noise.map_or(step, |noise| Volts(noise.0)),
+        noise_expected: settings.noise_expected(step),
         rate,
         newtons_per_volt: Some(1.0),
     };

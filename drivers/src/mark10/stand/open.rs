@@ -248,7 +248,7 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
             counts_max: scale.counts_max,
             volts_per_count: step.0,
         }),
-        noise_expected: settings.gauge.noise.map_or(step, |noise| Volts(noise.0)),
+        noise_expected: settings.gauge.noise_expected(step),
         pulse_lag: LAG,
         ticks_per_sample: (ticks / SHARE_MIN).max(1.0),
     }
