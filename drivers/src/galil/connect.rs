@@ -30,8 +30,8 @@ const DOWNLOAD_MAX: Nanos = Nanos::from_millis(10_000);
 /// By how many samples reported pulses may differ from the command: 1.5 of the smoothing filter, and two between
 /// `BG` or `ST` and the sample behind it.
 const LAG_SAMPLES: f64 = 4.0;
-/// A computer with much else to do may get half of the samples that the link carries.
-const SHARE_MIN: f64 = 0.5;
+/// Two samples of the controller may fall between two questions: on average they come further apart by this.
+const BETWEEN: f64 = 1.1;
 
 /// A controller that was set up.
 #[derive(Clone, Debug)]
@@ -332,7 +332,7 @@ fn describe(
         noise_expected: settings.noise,
         // A recording has them all.
         ticks_per_sample: plan.map_or_else(
-            || (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) / SHARE_MIN,
+            || (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) * BETWEEN,
             |plan| plan.interval as f64,
         ),
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),

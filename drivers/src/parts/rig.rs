@@ -86,8 +86,7 @@ impl PartsRig {
         description.adc = Some(cell.adc);
         description.noise_expected = cell.noise_expected;
         let period = 1.0 / cell.rate;
-        // A computer with much else to do may get half of the samples.
-        description.ticks_per_sample = (period * 1e9 / TICK.0 as f64).max(1.0) / 0.5;
+        description.ticks_per_sample = (period * 1e9 / TICK.0 as f64).max(1.0);
         // The first sample of a motion is up to a period behind its beginning.
         description.pulse_lag.0 += 1.5 * period;
         Ok(Self {

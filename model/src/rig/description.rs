@@ -45,8 +45,8 @@ pub struct RigDescription {
     /// a command to the sample behind it. Zero on a simulated rig.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub pulse_lag: Seconds,
-    /// On average at least one sample comes in so many ticks of the controller. One on a rig that reports every tick;
-    /// more on one that is asked for its samples over a link.
+    /// On average a sample comes in so many ticks of the controller. One on a rig that reports every tick; more on one that
+    /// is asked for its samples over a link, or whose load cell is slower than its clock.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub ticks_per_sample: f64,
 }
@@ -78,6 +78,17 @@ impl RigDescription {
         // Saturates for a tick of zero, which no rig has.
         let nanos = self.tick_nanos.max(1) as f64 * self.ticks_per_sample.max(1.0);
         (1e6 / nanos).round().max(1.0) as u32
+    }
+
+    /// What a filter of so many milliseconds holds: a mean of each millisecond, or as many samples as come in them where
+    /// they come more seldom, one at least.
+    #[must_use]
+    pub fn means_in(&self, ms: usize) -> usize {
+        let apart_ms = self.tick_nanos as f64 * 1e-6 * self.ticks_per_sample;
+        if self.ticks_per_sample <= 1.0 || apart_ms <= 1.0 {
+            return ms;
+        }
+        ((ms as f64 / apart_ms).round() as usize).clamp(1, ms.max(1))
     }
 
     /// Whether the signal's own noise changes its counts, so that many equal samples are a dead cell. Half a count of

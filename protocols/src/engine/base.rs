@@ -50,7 +50,9 @@ pub(crate) struct BaseSearch {
 impl BaseSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindBase) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let samples = FILTER_MS * cx.state.config.rig.samples_per_ms() as usize;
+        let rig = &cx.state.config.rig;
+        let filtered = rig.means_in(FILTER_MS);
+        let samples = filtered * rig.samples_per_ms() as usize;
         let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if plan.approach_speed > FindBase::SPEED_MAX || plan.pass_speed > FindBase::SPEED_MAX {
             return Err(format!(
@@ -71,7 +73,7 @@ impl BaseSearch {
             criterion,
             stage: Stage::Approach,
             millisecond: Millisecond::of(&cx.state.config.rig),
-            filter: MovingMean::new(FILTER_MS),
+            filter: MovingMean::new(filtered),
             first: Position(0.0),
             samples: Vec::new(),
         })

@@ -22,7 +22,10 @@ use std::collections::VecDeque;
 const FILTER_MS: usize = 50;
 
 /// Consecutive milliseconds that must be above the criterion: filtered, and raw where the plan presses.
-const CONSECUTIVE: u32 = 10;
+const CONSECUTIVE_MS: usize = 10;
+
+/// Where samples come seldom, so many of them at least.
+const CONSECUTIVE_MIN: usize = 3;
 
 /// A mean of so few milliseconds is late by 5 ms only: what is hard is noticed by it.
 const FAST_MS: usize = 10;
@@ -51,7 +54,7 @@ const FORCE_MAX: Newtons = Newtons(0.5);
 const PASS_OVERRUN_MM: f64 = 4.0;
 
 /// Milliseconds averaged into one point of the fit of a second pass alone: 100 points a second.
-const POINT_MS: u32 = 10;
+const POINT_MS: usize = 10;
 
 /// Distance from contact at which the tissue recovers untouched, in mm.
 const CLEARANCE_MM: f64 = 1.0;
@@ -87,6 +90,10 @@ pub(crate) struct ContactSearch {
     millisecond: Millisecond,
     filter: MovingMean,
     fast: MovingMean,
+    /// Means in the filter, means in a row above the criterion, and in a point of the slow pass.
+    filtered: usize,
+    consecutive: usize,
+    point: u32,
     seen: usize,
     above: u32,
     /// The newest raw forces, one a millisecond, oldest first.
@@ -113,7 +120,12 @@ struct Bin {
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
         let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let samples = FILTER_MS * cx.state.config.rig.samples_per_ms() as usize;
+        let rig = &cx.state.config.rig;
+        let means = |ms| rig.means_in(ms);
+        let filtered = means(FILTER_MS);
+        let (fast, point) = (means(FAST_MS), means(POINT_MS));
+        let consecutive = means(CONSECUTIVE_MS).max(CONSECUTIVE_MIN);
+        let samples = filtered * rig.samples_per_ms() as usize;
         let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
         if criterion > CRITERION_MAX {
             return Err(format!(
@@ -134,15 +146,18 @@ impl ContactSearch {
             criterion,
             stage: Stage::Approach,
             millisecond: Millisecond::of(&cx.state.config.rig),
-            filter: MovingMean::new(FILTER_MS),
-            fast: MovingMean::new(FAST_MS),
+            filter: MovingMean::new(filtered),
+            fast: MovingMean::new(fast),
+            filtered,
+            consecutive,
+            point: point as u32,
             seen: 0,
             above: 0,
-            raw: VecDeque::with_capacity(CONSECUTIVE as usize),
+            raw: VecDeque::with_capacity(consecutive),
             false_triggers: 0,
             first_trigger: Position(0.0),
             first_end: None,
-            log: TouchLog::new(cx.state.tick, cx.state.config.rig.tick()),
+            log: TouchLog::new(cx.state.tick, &cx.state.config.rig),
             pass_start_tick: 0,
             points: Vec::new(),
             bin: Bin::default(),
@@ -268,7 +283,7 @@ impl ContactSearch {
         if self.plan.press.is_none() {
             return;
         }
-        if self.raw.len() == CONSECUTIVE as usize {
+        if self.raw.len() == self.consecutive {
             self.raw.pop_front();
         }
         self.raw.push_back(force);
@@ -284,7 +299,7 @@ impl ContactSearch {
 
     /// Refuses a load before the approach and a force that contact finding must not exert.
     fn check_force(&self, filtered: Newtons, fast: Newtons) -> Result<(), String> {
-        if self.seen == FILTER_MS && filtered.abs() >= self.criterion {
+        if self.seen == self.filtered && filtered.abs() >= self.criterion {
             return Err(format!(
                 "the load cell reads {filtered:.3} before the tissue is met; free the probe and tare again"
             ));
@@ -360,7 +375,7 @@ impl ContactSearch {
         } else {
             0
         };
-        self.above >= CONSECUTIVE
+        self.above as usize >= self.consecutive
     }
 
     fn record_trigger(&self, cx: &mut Context<'_>, reading: &Reading, pass: u8, force: Newtons) {
@@ -385,8 +400,8 @@ impl ContactSearch {
         bin.t += (reading.tick - self.pass_start_tick) as f64 * cx.state.config.rig.tick().0;
         bin.position += position.0;
         bin.force += force.0;
-        if bin.count == POINT_MS {
-            let count = f64::from(POINT_MS);
+        if bin.count == self.point {
+            let count = f64::from(self.point);
             self.points.push(ContactPoint {
                 t: Seconds(bin.t / count),
                 position: Position(bin.position / count),

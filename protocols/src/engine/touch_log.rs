@@ -1,10 +1,11 @@
 //! What a contact search felt, averaged into points for the fit.
 
+use palpate_model::rig::RigDescription;
 use palpate_model::signal::TouchPoint;
 use palpate_model::units::{Newtons, Position, Seconds};
 
 /// Milliseconds averaged into one point: 50 points a second, in which the fastest approach goes 0.03 mm.
-const POINT_MS: u32 = 20;
+const POINT_MS: usize = 20;
 
 /// Points kept of the way to the tissue, 5 s: they tell offset and drift.
 const LEAD_POINTS: usize = 250;
@@ -14,6 +15,8 @@ const LEAD_POINTS: usize = 250;
 pub(super) struct TouchLog {
     start_tick: u64,
     tick: Seconds,
+    /// Means in one point.
+    point: u32,
     bin: Bin,
     points: Vec<TouchPoint>,
 }
@@ -40,10 +43,12 @@ pub(super) enum Counts {
 }
 
 impl TouchLog {
-    pub fn new(start_tick: u64, tick: Seconds) -> Self {
+    pub fn new(start_tick: u64, rig: &RigDescription) -> Self {
         Self {
             start_tick,
-            tick,
+            tick: rig.tick(),
+            // Twenty at most.
+            point: rig.means_in(POINT_MS) as u32,
             bin: Bin::default(),
             points: Vec::new(),
         }
@@ -56,7 +61,7 @@ impl TouchLog {
         bin.position += position.0;
         bin.force += force.0;
         bin.is_uncounted |= counts == Counts::No;
-        if bin.count < POINT_MS {
+        if bin.count < self.point {
             return;
         }
         let count = f64::from(bin.count);

@@ -7,7 +7,7 @@ pub use dialogue::{GaugeDialogue, GaugeScale};
 pub use open::open;
 pub(crate) use open::{check, check_list, commands, filters};
 
-use palpate_model::units::Newtons;
+use palpate_model::units::{Newtons, Volts};
 
 /// Rates of `AOUT` (Model 7i user's guide, page 30).
 pub const RATES: [u16; 8] = [1, 2, 5, 10, 25, 50, 125, 250];

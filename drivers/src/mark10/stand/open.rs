@@ -25,8 +25,8 @@ const SPEED_QUANTUM: MmPerS = MmPerS(0.1 / 60.0);
 const MARGIN: i64 = 1_000;
 /// A question at least so often apart: a sample has a tick of its own.
 const EVERY_MIN: Nanos = Nanos::from_millis(2);
-/// Other questions and a busy computer take samples away: at least this share comes.
-const SHARE_MIN: f64 = 0.4;
+/// Other questions take samples away: they come further apart by this.
+const BETWEEN: f64 = 1.5;
 
 /// A stand that was set up.
 #[derive(Clone, Debug)]
@@ -250,7 +250,7 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
         }),
         noise_expected: settings.gauge.noise_expected(step),
         pulse_lag: LAG,
-        ticks_per_sample: (ticks / SHARE_MIN).max(1.0),
+        ticks_per_sample: ticks.max(1.0) * BETWEEN,
     }
 }
 
