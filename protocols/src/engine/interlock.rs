@@ -181,7 +181,11 @@ pub(super) fn judge(
 ) -> Option<Trip> {
     let limits = state.config.limits;
     let age = age_trip(state, now);
-    state.watch.last_at = Some(now);
+    // A sample that took long to come is as old as it is.
+    let taken = reading
+        .age
+        .map_or(now, |age| Nanos(now.0.saturating_sub(age.by.0)));
+    state.watch.last_at = Some(taken);
     if !reading.volts.is_finite() {
         return trip(
             Interlock::Signal,
@@ -230,10 +234,10 @@ pub(super) fn judge(
         .or(age)
         .or_else(|| motor_trip(state, reading))
         .or_else(|| {
-            path_error.map(|reason| Trip {
-                interlock: Interlock::Path,
-                reason,
-            })
+            let reason = path_error?;
+            // What is left of this run knows its place well enough to leave the tissue; the next one looks for home.
+            state.is_path_lost = true;
+            trip(Interlock::Path, reason)
         })
 }
 

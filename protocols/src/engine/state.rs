@@ -192,6 +192,8 @@ pub struct State {
     pub(super) activity: Activity,
     pub(super) power: Power,
     pub(super) is_homed: bool,
+    /// Steps were lost, or the axis was moved by hand.
+    pub(super) is_path_lost: bool,
     pub(super) is_halted: bool,
     pub(super) phase: Phase,
     pub(super) step_index: usize,
@@ -228,6 +230,7 @@ impl State {
             activity: Activity::Waiting,
             power: Power::Stopped,
             is_homed: config.is_homed,
+            is_path_lost: false,
             is_halted: false,
             phase: Phase::Idle,
             step_index: 0,
@@ -325,6 +328,12 @@ impl State {
     #[must_use]
     pub fn is_homed(&self) -> bool {
         self.is_homed
+    }
+
+    /// Whether the next run may trust position zero.
+    #[must_use]
+    pub fn is_homed_for_next(&self) -> bool {
+        self.is_homed && !self.is_path_lost
     }
 
     /// Where the tissue begins, once found.

@@ -22,6 +22,9 @@ const TICK: Nanos = Nanos::from_millis(10);
 /// How often a rig on wires is asked what has come: an interlock decides so late at most.
 const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
 
+/// A counter at rest may flicker by so much.
+const DISPLACED_PULSES: i64 = 1;
+
 /// How far time runs between looks at the requests, at full pace.
 const STRIDE_MAX: Nanos = Nanos::from_millis(100);
 
@@ -272,6 +275,9 @@ impl MainLoop {
                 if self.reading.is_some_and(|last| reading.tick <= last.tick) {
                     self.is_homed = false;
                 }
+                if !self.rig.is_virtual() && !self.is_running() && self.is_displaced(&reading) {
+                    self.is_homed = false;
+                }
                 self.reading = Some(reading);
                 self.feed(Input::Reading(reading));
             }
@@ -291,6 +297,17 @@ impl MainLoop {
         }
     }
 
+    /// Whether nobody knows any more where an axis is that no run moves: its motor is off, so that a hand may push it, or
+    /// its counter has changed at rest.
+    fn is_displaced(&self, reading: &Reading) -> bool {
+        let has_jumped = self.reading.is_some_and(|last| {
+            let is_moving = |one: &Reading| one.status.has(AxisStatus::MOVING);
+            let way = (reading.pulses - last.pulses).abs();
+            way > DISPLACED_PULSES && !is_moving(&last) && !is_moving(reading)
+        });
+        has_jumped || !reading.status.has(AxisStatus::MOTOR_ON)
+    }
+
     /// One input to the run in progress, if there is one, and its commands to the rig.
     fn feed(&mut self, input: Input) {
         // Also between runs, so that nothing piles up.
@@ -303,7 +320,7 @@ impl MainLoop {
         let rig = &mut self.rig;
         run.feed(now, input, &mut |asked| act(rig.as_mut(), asked));
         if let Some(state) = run.engine() {
-            self.is_homed = state.is_homed();
+            self.is_homed = state.is_homed_for_next();
         }
     }
 
