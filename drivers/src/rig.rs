@@ -92,7 +92,7 @@ pub trait Rig: Send {
         Err(RigError::NotAgain)
     }
 
-    /// The link as it was measured when it was opened, in words for operator and log: latency, jitter, and how samples are
+    /// The link as it was measured when it was opened, in words for the operator: latency, jitter, and how samples are
     /// taken over it. It differs a little each time; what is the same stands in the identity.
     fn link(&self) -> Option<&str> {
         None

@@ -18,6 +18,9 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
+/// What a run says that a busy computer has ended.
+const LATE: [&str; 3] = ["sample age interlock", "stood still", "samples arrived"];
+
 /// An emulated controller; unplugged when dropped.
 struct Emulator(Arc<AtomicBool>, Option<JoinHandle<()>>);
 
@@ -80,13 +83,11 @@ fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) 
 fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
     let folder = tempfile::tempdir().unwrap();
     let port = folder.path().join("galil");
-    let emulator = match Emulator::at(&port) {
-        Ok(emulator) => emulator,
-        Err(why) => {
-            println!("skipped: {why}");
-            return;
-        }
-    };
+    if !Path::new("/dev/ptmx").exists() {
+        println!("skipped: this system has no pseudo-terminals");
+        return;
+    }
+    let emulator = Emulator::at(&port).unwrap();
     let file = folder.path().join("bench.toml");
     let text = format!(
         "device = \"galil\"\nport = \"{}\"\nmm_per_pulse = 0.015\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
@@ -115,6 +116,14 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
         end.outcome,
         end.reason,
         session.rows.len()
+    );
+    // Samples that come late end a run, as they must; nothing else may.
+    let is_late = |reason: &str| LATE.iter().any(|words| reason.contains(words));
+    assert!(
+        end.outcome == "finish" || is_late(&end.reason),
+        "{}: {}",
+        end.outcome,
+        end.reason
     );
     let rig = session.manifest.rig.as_ref().unwrap();
     assert!(rig.identity.contains("watchdog"), "{}", rig.identity);
