@@ -265,6 +265,7 @@ impl WorkbenchApp {
                     is_busy,
                     verdict: &verdict,
                     refusal: self.refusal.as_deref(),
+                    is_link_lost: self.snapshot.rig.link_error.is_some(),
                 };
                 start_ui(ui, &mut self.form, &facts, commands);
             });

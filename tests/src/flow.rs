@@ -53,7 +53,13 @@ impl Flow {
             seed: 7,
             ..SimSettings::default()
         };
-        let mut options = WindowOptions::open("sim", &settings, scale).unwrap();
+        let options = WindowOptions::open("sim", &settings, scale).unwrap();
+        Self::open_on(options, folder)
+    }
+
+    /// The same on any rig.
+    #[must_use]
+    pub fn open_on(mut options: WindowOptions, folder: TempDir) -> Self {
         options.sessions = Some(folder.path().to_path_buf());
         let window = Harness::builder()
             .with_size((1280.0, 800.0))

@@ -208,6 +208,8 @@ pub struct StartFacts<'a> {
     pub verdict: &'a Result<(), String>,
     /// Why the last start was refused.
     pub refusal: Option<&'a str>,
+    /// Whether the link to the rig is lost.
+    pub is_link_lost: bool,
 }
 
 /// Draws the start strip, which never scrolls away: what to acknowledge, the button, why it cannot
@@ -227,6 +229,13 @@ pub fn start_ui(
             commands.push(Command::Start);
         }
     });
+    if facts.is_link_lost {
+        let hint = "opens the devices again and stops the axis; nothing moves, and position zero has to be found again";
+        let button = ui.add_enabled(!facts.is_busy, Button::new("Connect again"));
+        if button.on_hover_text(hint).clicked() {
+            commands.push(Command::Reconnect);
+        }
+    }
     if let Some(refusal) = facts.refusal {
         ui.label(RichText::new(format!("Not started: {refusal}")).color(tokens.alarm_text));
     }

@@ -1,7 +1,6 @@
 //! The rig: what it is, what it says now, and the serial ports of this computer.
 
 use crate::command::{Command, Commands};
-use crate::shell::activity::run_in_progress;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::workers::ports::Ports;
@@ -24,7 +23,7 @@ pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Co
     if !settings.is_empty() {
         fact_ui(ui, "settings", settings.join(", "));
     }
-    link_ui(ui, snapshot, commands);
+    link_ui(ui, rig);
     match rig.reading {
         Some(reading) => reading_ui(ui, rig, &reading),
         None => fact_ui(ui, "signal", "no sample yet"),
@@ -32,20 +31,12 @@ pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Co
     ports_ui(ui, ports, commands);
 }
 
-fn link_ui(ui: &mut Ui, snapshot: &Snapshot, commands: &mut Commands) {
+fn link_ui(ui: &mut Ui, rig: &RigView) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let rig = &snapshot.rig;
     match &rig.link_error {
         Some(reason) => {
             let text = format!("Link lost: {reason}");
             ui.label(RichText::new(text).color(tokens.alarm_text));
-            // A run that lost its link ends by itself.
-            let can = run_in_progress(snapshot).is_none();
-            let hint = "opens the devices again and stops the axis; nothing moves, and position zero has to be found again";
-            let button = ui.add_enabled(can, Button::new("Connect again"));
-            if button.on_hover_text(hint).clicked() {
-                commands.push(Command::Reconnect);
-            }
         }
         None => fact_ui(ui, "link", rig.link.as_deref().unwrap_or("connected")),
     }

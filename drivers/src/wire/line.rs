@@ -183,6 +183,19 @@ impl<D> Drop for Owner<D> {
     }
 }
 
+/// Why a link failed.
+fn in_words(err: &io::Error) -> String {
+    match err.kind() {
+        io::ErrorKind::BrokenPipe
+        | io::ErrorKind::UnexpectedEof
+        | io::ErrorKind::ConnectionReset => {
+            "the device has hung up; check its plug and power".into()
+        }
+        io::ErrorKind::TimedOut => "the device takes no bytes; check its cable".into(),
+        _ => err.to_string(),
+    }
+}
+
 fn lost(detail: impl Into<String>) -> RigEventBody {
     RigEventBody::Fault(Fault::LinkLost {
         detail: detail.into(),
@@ -199,7 +212,7 @@ impl<D: Dialogue> Owner<D> {
                 return;
             }
             if let Err(err) = self.turn() {
-                break err.to_string();
+                break in_words(&err);
             }
             if let Some(why) = self.dialogue.is_dead((self.clock)()) {
                 break why;
