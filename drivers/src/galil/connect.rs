@@ -263,10 +263,8 @@ fn read_back(
     if !reply.is_accepted {
         return Ok(());
     }
-    let found = reply.numbers().unwrap_or_default();
-    if found != wanted {
-        let found: Vec<String> = found.iter().map(f64::to_string).collect();
-        let found = found.join(" and ");
+    if reply.numbers().as_deref() != Some(wanted) {
+        let found = reply.text();
         return Err(GalilOpenError::SetOtherwise { command, found });
     }
     Ok(())

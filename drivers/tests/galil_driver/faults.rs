@@ -232,7 +232,7 @@ fn a_stop_that_seems_refused_is_sent_again() {
         (9, &["STA", "STA", "STA", "AB "]),
     ] {
         let mut host = unwatched();
-        let (mut last, mut left) = (b' ', spoilt);
+        let (mut last, mut left) = (b':', spoilt);
         // Without a watchdog only the prompt of a stop follows another prompt.
         host.wire.lock().spoil = Box::new(move |byte| {
             let is_stop = byte == b':' && matches!(last, b':' | b'?') && left > 0;
