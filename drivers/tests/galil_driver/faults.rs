@@ -218,7 +218,8 @@ fn unwatched() -> Host {
 
 /// Lines from now on that begin with a stop.
 fn stops_after(host: &Host, from: usize) -> Vec<String> {
-    let lines = String::from_utf8(host.wire.lock().lines[from..].to_vec()).unwrap();
+    let lines = host.wire.lock().lines[from..].to_vec();
+    let lines = String::from_utf8(lines).expect("lines are text");
     let lines = lines.split('\r');
     let stops = lines.filter(|line| line.starts_with("STA") || line.starts_with("AB"));
     stops.map(|line| line[..3].to_owned()).collect()
