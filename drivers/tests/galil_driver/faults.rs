@@ -291,3 +291,20 @@ fn an_axis_that_nobody_looks_after_is_stopped_without_a_watchdog_too() {
     host.settle();
     assert_eq!(host.newest().pulses, 0);
 }
+
+#[test]
+fn a_reset_while_recording_is_told_as_one() {
+    let mut host = Host::new(&GalilSettings {
+        sampling: Sampling::Record,
+        ..thesis()
+    });
+    host.pass(0.5);
+    {
+        let mut wire = host.wire.lock();
+        let now = wire.now;
+        wire.emulator.suffer(now, DeviceFault::Reset, true);
+    }
+    host.until("noticed", |host| !host.faults.is_empty());
+    host.pass(1.0);
+    assert_eq!(host.faults, [Fault::ControllerReset]);
+}
