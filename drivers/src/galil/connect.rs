@@ -204,19 +204,21 @@ fn set_up_axis(
             motor_type,
         )?;
     }
-    console.ask(&format!("KS{a}={SMOOTHING}"))?;
-    console.ask(&format!(
-        "CN {},{}",
-        settings.limits.code(),
-        settings.home.code()
-    ))?;
+    let command = format!("KS{a}={SMOOTHING}");
+    console.ask(&command)?;
+    read_back(console, command, &format!("_KS{a}"), &[SMOOTHING])?;
+    let levels = [settings.limits.code(), settings.home.code()];
+    let command = format!("CN {},{}", levels[0], levels[1]);
+    console.ask(&command)?;
+    read_back(console, command, "_CN0,_CN1", &levels.map(f64::from))?;
     let rate = settings.counts2(settings.acceleration);
     console.ask(&format!("AC{a}={rate}"))?;
     console.ask(&format!("DC{a}={rate}"))?;
     // Limits are left at this rate; the older series have no such command and use that of `DC`.
     console.try_ask(&format!("SD{a}={rate}"))?;
     let rates = console.numbers(&format!("_AC{a},_DC{a}"))?;
-    if rates[0] != rates[1] || rates[0] <= 0.0 {
+    // It rounds down to its resolution.
+    if rates[0] != rates[1] || rates[0] <= 0.0 || rates[0] > rate as f64 {
         return Err(GalilOpenError::SetOtherwise {
             command: format!("AC{a}={rate}"),
             found: format!("{} and {}", rates[0], rates[1]),
@@ -248,6 +250,24 @@ fn set_up_axis(
         }
     }
     Ok(MmPerS2(rates[0] * settings.mm_per_pulse))
+}
+
+/// Compares what a command has set, where the firmware has the operands that tell it.
+fn read_back(
+    console: &mut Console<'_>,
+    command: String,
+    operands: &str,
+    wanted: &[f64],
+) -> Result<(), GalilOpenError> {
+    let reply = console.try_ask(&format!("MG {operands}"))?;
+    if !reply.is_accepted {
+        return Ok(());
+    }
+    if reply.numbers().as_deref() != Some(wanted) {
+        let found = reply.text();
+        return Err(GalilOpenError::SetOtherwise { command, found });
+    }
+    Ok(())
 }
 
 fn set_up_input(console: &mut Console<'_>, settings: &GalilSettings) -> Result<(), GalilOpenError> {

@@ -158,9 +158,13 @@ impl Order {
                         wanted.target_pulses
                     ));
                 }
-                if ac != dc || speed <= 0.0 {
+                // It rounds down to its resolution; what is above is not what was asked.
+                let speed_asked = settings.counts(wanted.speed) as f64;
+                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                if ac != dc || speed <= 0.0 || speed > speed_asked || ac > ac_asked {
                     return Next::Refused(format!(
-                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts"
+                        "it reads back speed {speed}, acceleration {ac} and deceleration {dc} in counts, where \
+                         {speed_asked} and {ac_asked} were asked for"
                     ));
                 }
                 let made = MoveTo {
@@ -182,9 +186,10 @@ impl Order {
                 (self.command, vec![define])
             }
             (RigCommand::Oscillate(wanted), &[ac, dc]) => {
-                if ac != dc || ac <= 0.0 {
+                let ac_asked = settings.counts2(wanted.acceleration) as f64;
+                if ac != dc || ac <= 0.0 || ac > ac_asked {
                     return Next::Refused(format!(
-                        "it reads back acceleration {ac} and deceleration {dc} in counts"
+                        "it reads back acceleration {ac} and deceleration {dc} in counts, where {ac_asked} was asked for"
                     ));
                 }
                 let made = Oscillation {
@@ -231,4 +236,50 @@ pub fn limit_commands(axis: char, forward: i64, reverse: i64) -> Vec<String> {
         format!("BL{axis}={reverse}"),
         format!("MG _FL{axis},_BL{axis}"),
     ]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::galil::settings::tests::thesis;
+
+    /// What becomes of an order whose numbers are read back so.
+    fn read_back(command: RigCommand, told: &[&str]) -> Next {
+        let settings = thesis();
+        let mut order = Order::new(command, Nanos(976_563));
+        let Next::Send(commands) = order.begin(&settings) else {
+            panic!("it is not set");
+        };
+        let first = commands.len() - told.len();
+        let answers = std::iter::repeat_n("", first).chain(told.iter().copied());
+        let mut next = Next::Wait;
+        for text in answers {
+            let reply = Reply {
+                is_accepted: true,
+                bytes: text.into(),
+            };
+            next = order.take(&reply, &settings);
+        }
+        next
+    }
+
+    #[test]
+    fn nothing_faster_than_asked_for_is_begun() {
+        let wanted = MoveTo {
+            target_pulses: 1000,
+            speed: MmPerS(0.75),
+            acceleration: MmPerS2(61.44),
+        };
+        for (told, is_begun) in [
+            (" 50 4096 4096", true),
+            (" 48 3072 3072", true),
+            (" 52 4096 4096", false),
+            (" 500 4096 4096", false),
+            (" 50 5120 5120", false),
+        ] {
+            let next = read_back(RigCommand::MoveTo(wanted), &[told, " 1000"]);
+            let begins = matches!(next, Next::SendAndSample(_));
+            assert_eq!(begins, is_begun, "{told}: {next:?}");
+        }
+    }
 }

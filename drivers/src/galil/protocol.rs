@@ -42,6 +42,26 @@ impl Reply {
         String::from_utf8_lossy(&self.bytes).trim().to_owned()
     }
 
+    /// Whether it begins with a number as `{F2.4}` writes it, with one or two digits, a point and four decimals: one
+    /// with a digit lost or too many is none.
+    #[must_use]
+    pub fn begins_with_volts(&self) -> bool {
+        let text = self.bytes.trim_ascii_start();
+        let unsigned = text.strip_prefix(b"-").unwrap_or(text);
+        let digits = |bytes: &[u8]| {
+            bytes
+                .iter()
+                .take_while(|byte| byte.is_ascii_digit())
+                .count()
+        };
+        let whole = digits(unsigned);
+        let rest = unsigned.get(whole..).unwrap_or_default();
+        (1..=2).contains(&whole)
+            && rest
+                .strip_prefix(b".")
+                .is_some_and(|rest| digits(rest) == 4)
+    }
+
     /// The numbers of its text; `None` when anything else stands there.
     #[must_use]
     pub fn numbers(&self) -> Option<Vec<f64>> {

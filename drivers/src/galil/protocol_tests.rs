@@ -292,3 +292,36 @@ fn random_bytes_never_panic_and_memory_is_bounded() {
     }
     assert!(parser.unasked.len() <= UNASKED_MAX);
 }
+
+#[test]
+fn a_signal_with_a_digit_lost_is_none() {
+    let is_whole = |text: &str| {
+        let reply = Reply {
+            is_accepted: true,
+            bytes: text.into(),
+        };
+        reply.begins_with_volts()
+    };
+    for whole in [
+        " 0.3050 120 120",
+        "-0.3050-120",
+        "10.0000,1",
+        " 00.3050 1",
+        "\r\n 1.2345",
+    ] {
+        assert!(is_whole(whole), "{whole}");
+    }
+    for spoilt in [
+        " .2345 120",
+        " 1.245 120",
+        " 1.23455 120",
+        " 12345 120",
+        " 112.2345 1",
+        "",
+        "-",
+        "--1.2345",
+        " 1,2345",
+    ] {
+        assert!(!is_whole(spoilt), "{spoilt}");
+    }
+}

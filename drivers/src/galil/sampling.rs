@@ -7,6 +7,9 @@ use palpate_model::units::Volts;
 /// `TIME` counts samples in a number of the controller, which has 31 bits before the point (DMC-40x0 user manual,
 /// variables). Where it wraps is not confirmed; at a millisecond each it takes 24 days.
 const TIME_WRAPS: u64 = 1 << 31;
+/// A clock that goes back has wrapped only from within a minute (half of one at `TM 500`) before [`TIME_WRAPS`] to within
+/// one behind zero; any other has begun anew.
+const WRAP_NEAR: u64 = 60 * 1024;
 
 /// Bits of `TS` (DMC-1400 user manual, page 211).
 pub mod ts {
@@ -28,7 +31,9 @@ pub enum Sampled {
     Reading(Reading),
     /// The same sample again: two polls fell between two of them.
     Same,
-    /// The clock went back: the controller has been reset.
+    /// The clock went back, or a digit of it was lost: the next answer will tell.
+    Doubtful,
+    /// The clock went back twice: the controller has been reset.
     Reset,
 }
 
@@ -39,6 +44,8 @@ pub struct Sampler {
     /// `TIME` of the newest sample, and what to add to it for a count that never goes back.
     time: Option<u64>,
     offset: u64,
+    /// A clock that had gone back in the answer before.
+    doubtful: Option<u64>,
     was_moving: bool,
 }
 
@@ -50,6 +57,7 @@ impl Sampler {
             settings,
             time: None,
             offset: 0,
+            doubtful: None,
             was_moving: false,
         }
     }
@@ -62,11 +70,28 @@ impl Sampler {
         format!("MG @AN[{input}]{{F2.4}},_TD{a},_RP{a},_TS{a},_SC{a},TIME")
     }
 
+    /// Whether the axis moved in the newest sample.
+    #[must_use]
+    pub const fn is_moving(&self) -> bool {
+        self.was_moving
+    }
+
     /// Whether a clock that shows this has begun anew since the newest sample.
     #[must_use]
     pub fn is_reset(&self, time: i64) -> bool {
         self.time
             .is_some_and(|last| u64::try_from(time).is_ok_and(|time| time < last))
+    }
+
+    /// Whether a clock that shows this has gone back for the first time, so that it may be a garbled one: a reset is
+    /// believed when a second answer, no earlier than the first, says so too.
+    pub fn doubts(&mut self, time: u64) -> bool {
+        let is_back = self
+            .time
+            .is_some_and(|last| time < last && !is_wrapped(last, time));
+        let is_first = is_back && self.doubtful.is_none_or(|before| time < before);
+        self.doubtful = is_back.then_some(time);
+        is_first
     }
 
     /// Takes an answer; `None` when it is none. `is_begun` says that a motion was begun just before this was asked:
@@ -81,14 +106,18 @@ impl Sampler {
         if !(volts.abs() <= 100.0 && switches < 256 && stop_code < 256) {
             return None;
         }
+        if self.doubts(time) {
+            return Some(Sampled::Doubtful);
+        }
         match self.time {
             Some(last) if time == last && !is_begun => return Some(Sampled::Same),
             Some(last) if time < last => {
                 // Either it wrapped or it began anew; what it counted stays counted.
-                let is_wrapped = last - time > TIME_WRAPS / 2;
+                let is_wrapped = is_wrapped(last, time);
                 self.offset += if is_wrapped { TIME_WRAPS } else { last + 1 };
                 if !is_wrapped {
                     self.time = Some(time);
+                    self.doubtful = None;
                     self.was_moving = false;
                     return Some(Sampled::Reset);
                 }
@@ -139,6 +168,11 @@ impl Sampler {
             .filter(|(is_set, _)| *is_set)
             .fold(AxisStatus::default(), |all, (_, bit)| all | bit)
     }
+}
+
+/// Whether a clock that went back from `last` to `time` did so because it wrapped.
+fn is_wrapped(last: u64, time: u64) -> bool {
+    last.abs_diff(TIME_WRAPS) < WRAP_NEAR && time < WRAP_NEAR
 }
 
 /// A whole number that is not negative.

@@ -59,9 +59,31 @@ fn the_clock_wraps_and_a_reset_is_noticed() {
     assert_eq!(sampler.take(&at(newest), false), Some(Sampled::Same));
     assert_eq!(reading(&mut sampler, at(3.0)).tick, (1 << 31) + 3);
     reading(&mut sampler, at(90_000.0));
-    assert_eq!(sampler.take(&at(12.0), false), Some(Sampled::Reset));
+    assert_eq!(sampler.take(&at(12.0), false), Some(Sampled::Doubtful));
+    assert_eq!(sampler.take(&at(13.0), false), Some(Sampled::Reset));
     // Ticks go on all the same.
-    assert!(reading(&mut sampler, at(13.0)).tick > (1 << 31) + 90_000);
+    assert!(reading(&mut sampler, at(14.0)).tick > (1 << 31) + 90_000);
+}
+
+#[test]
+fn a_reset_after_many_days_is_no_wrap() {
+    for newest in [1.5e9, 2_147_000_000.0] {
+        let mut sampler = sampler();
+        let at = |time: f64| [0.3, 0.0, 0.0, 15.0, 1.0, time];
+        reading(&mut sampler, at(newest));
+        assert_eq!(sampler.take(&at(400.0), false), Some(Sampled::Doubtful));
+        assert_eq!(sampler.take(&at(401.0), false), Some(Sampled::Reset));
+    }
+}
+
+#[test]
+fn a_clock_that_lost_a_digit_once_is_no_reset() {
+    let mut sampler = sampler();
+    let at = |time: f64| [0.3, 0.0, 0.0, 15.0, 1.0, time];
+    for time in (90_000..90_040).map(f64::from) {
+        assert_eq!(reading(&mut sampler, at(time)).tick, time as u64);
+        assert_eq!(sampler.take(&at(9_000.0), false), Some(Sampled::Doubtful));
+    }
 }
 
 #[test]

@@ -202,3 +202,109 @@ fn random_bytes_never_break_the_dialogue() {
         }
     }
 }
+
+/// On the way to a place, on a controller that has no watchdog.
+fn unwatched() -> Host {
+    let mut host = Host::new(&GalilSettings {
+        has_watchdog: false,
+        ..thesis()
+    });
+    host.tell(RigCommand::EnableMotor);
+    host.tell(to(6000, 20.0));
+    host.pass(0.6);
+    assert!(!host.is_at_rest());
+    host
+}
+
+/// Lines from now on that begin with a stop.
+fn stops_after(host: &Host, from: usize) -> Vec<String> {
+    let lines = host.wire.lock().lines[from..].to_vec();
+    let lines = String::from_utf8(lines).expect("lines are text");
+    let lines = lines.split('\r');
+    let stops = lines.filter(|line| line.starts_with("STA") || line.starts_with("AB"));
+    stops.map(|line| line[..3].to_owned()).collect()
+}
+
+#[test]
+fn a_stop_that_seems_refused_is_sent_again() {
+    for (spoilt, lines) in [
+        (1, &["STA", "STA"][..]),
+        (3, &["STA", "STA", "STA", "AB "]),
+        (9, &["STA", "STA", "STA", "AB "]),
+    ] {
+        let mut host = unwatched();
+        let (mut last, mut left) = (b':', spoilt);
+        // Without a watchdog only the prompt of a stop follows another prompt.
+        host.wire.lock().spoil = Box::new(move |byte| {
+            let is_stop = byte == b':' && matches!(last, b':' | b'?') && left > 0;
+            last = byte;
+            left -= usize::from(is_stop);
+            vec![if is_stop { b'?' } else { byte }]
+        });
+        let start = host.now();
+        let from = host.wire.lock().lines.len();
+        host.session.command(start, RigCommand::Stop);
+        host.until("answered", |host| {
+            host.acks.contains(&RigCommand::Stop) || !host.faults.is_empty()
+        });
+        assert!(host.now().since(start).seconds().0 < 0.1);
+        assert_eq!(host.faults.is_empty(), spoilt < 4, "{:?}", host.faults);
+        assert_eq!(stops_after(&host, from), lines);
+    }
+}
+
+#[test]
+fn a_stop_of_its_own_is_confirmed_when_answers_fit_again() {
+    let mut host = unwatched();
+    host.tell(RigCommand::Stop);
+    host.settle();
+    let from = host.wire.lock().lines.len();
+    let now = host.now();
+    host.session.command(now, to(0, 20.0));
+    // The answers to what a move sets are lost for a while.
+    let mut left = 40;
+    host.wire.lock().spoil = Box::new(move |byte| {
+        left = i32::max(left - 1, 0);
+        if left > 0 { Vec::new() } else { vec![byte] }
+    });
+    host.until("refused", |host| !host.faults.is_empty());
+    host.pass(1.5);
+    assert!(host.faults[0].to_string().contains("garbled"));
+    assert_eq!(stops_after(&host, from), ["STA", "STA"]);
+}
+
+#[test]
+fn an_axis_that_nobody_looks_after_is_stopped_without_a_watchdog_too() {
+    let mut host = unwatched();
+    host.is_attended = false;
+    host.pass(2.0);
+    assert!(host.is_at_rest());
+    let rest = host.newest().pulses;
+    assert!(rest > 0 && rest < 6000 - 1000, "{rest}");
+    let from = host.wire.lock().lines.len();
+    host.pass(2.0);
+    assert_eq!(stops_after(&host, from), [""; 0]);
+    host.is_attended = true;
+    host.pass(0.1);
+    host.tell(to(0, 20.0));
+    host.until("moving", |host| !host.is_at_rest());
+    host.settle();
+    assert_eq!(host.newest().pulses, 0);
+}
+
+#[test]
+fn a_reset_while_recording_is_told_as_one() {
+    let mut host = Host::new(&GalilSettings {
+        sampling: Sampling::Record,
+        ..thesis()
+    });
+    host.pass(0.5);
+    {
+        let mut wire = host.wire.lock();
+        let now = wire.now;
+        wire.emulator.suffer(now, DeviceFault::Reset, true);
+    }
+    host.until("noticed", |host| !host.faults.is_empty());
+    host.pass(1.0);
+    assert_eq!(host.faults, [Fault::ControllerReset]);
+}

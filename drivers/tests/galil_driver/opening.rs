@@ -166,3 +166,16 @@ fn the_identity_is_the_same_each_time() {
         assert!(first.link.contains("an answer takes"), "{}", first.link);
     }
 }
+
+#[test]
+fn switches_set_otherwise_are_an_error_that_names_them() {
+    let wire = wired(galil::GalilSettings::default());
+    // Every sign is lost on the way here, so that `CN -1,-1` is not what is read back.
+    wire.lock().spoil = Box::new(|byte| if byte == b'-' { Vec::new() } else { vec![byte] });
+    let err = try_connect(&wire, &thesis()).unwrap_err();
+    let GalilOpenError::SetOtherwise { command, found } = err else {
+        panic!("{err}");
+    };
+    assert_eq!(command, "CN -1,-1");
+    assert!(found.contains("1.0000"), "{found}");
+}

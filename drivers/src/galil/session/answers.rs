@@ -1,7 +1,7 @@
 //! What an answer means: it belongs to the oldest question that has none.
 
 use super::Outgoing;
-use super::{Asked, RESET, Session};
+use super::{Asked, Halting, RESET, Session};
 use crate::galil::protocol::{Reply, error_of, packed};
 use crate::galil::recording::{Look, Out};
 use crate::galil::sampling::{Sampled, Sampler};
@@ -9,6 +9,9 @@ use crate::galil::timing::Timing;
 use crate::rig::RigEventBody;
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand};
+
+/// At so many `?` to a stop `AB 1` is sent in its place; one more, and it counts as refused.
+const REFUSALS_MAX: u32 = 3;
 
 impl Session {
     pub(super) fn on_reply(&mut self, now: Nanos, reply: &Reply) {
@@ -42,17 +45,16 @@ impl Session {
                     self.go_on(now, next);
                 }
             }
-            Asked::Stop(number, command) if reply.is_accepted && reply.bytes.is_empty() => {
-                self.acknowledge(now, number, command);
+            Asked::Stop(halting) if reply.is_accepted && reply.bytes.is_empty() => {
+                if let Some(number) = halting.number {
+                    self.acknowledge(now, number, halting.command);
+                }
             }
-            Asked::Stop(number, command) if reply.is_accepted => {
-                self.unconfirmed.push((number, command));
+            Asked::Stop(halting) if reply.is_accepted => {
+                self.confirm_later(halting);
                 self.lose_order(now);
             }
-            Asked::Stop(number, command) => {
-                self.refuse(now, number, format!("it refuses {command:?}"));
-            }
-            Asked::QuietStop => {}
+            Asked::Stop(halting) => self.on_refused_stop(now, halting),
             Asked::Why => {
                 if let Some((number, _)) = self.order.take() {
                     let why = error_of(reply).map(|err| err.to_string());
@@ -61,6 +63,30 @@ impl Session {
                 }
             }
             Asked::Marker(_) => {}
+        }
+    }
+
+    /// A `?` to a stop: it was garbled on the way there, or its `:` on the way back. It is sent again at once, at the
+    /// third `?` as the stop that asks for least, and only then given up.
+    fn on_refused_stop(&mut self, now: Nanos, halting: Halting) {
+        let refusals = halting.refusals + 1;
+        let again = Asked::Stop(Halting {
+            refusals,
+            ..halting
+        });
+        match refusals {
+            0..REFUSALS_MAX => self.urge(halting.command, again),
+            REFUSALS_MAX => self.urge(RigCommand::Halt, again),
+            _ => {
+                let detail = format!("it refuses {:?}", halting.command);
+                match halting.number {
+                    Some(number) => self.refuse(now, number, detail),
+                    None => {
+                        let fault = Fault::CommandRefused { detail };
+                        self.report_in_order(now, RigEventBody::Fault(fault));
+                    }
+                }
+            }
         }
     }
 
@@ -73,7 +99,8 @@ impl Session {
         marked: Option<bool>,
     ) {
         self.stats.push(now.since(sent));
-        let Some(numbers) = reply.numbers().filter(|_| reply.is_accepted) else {
+        let is_whole = reply.is_accepted && reply.begins_with_volts();
+        let Some(numbers) = reply.numbers().filter(|_| is_whole) else {
             return self.lose_order(now);
         };
         let Some(recording) = &mut self.recording else {
@@ -85,6 +112,13 @@ impl Session {
             return self.lose_order(now);
         };
         if self.sampler.is_reset(look.time) {
+            if self.sampler.doubts(look.time as u64) {
+                // A sample that shows what a command has done is not thrown away.
+                if marked.is_some() {
+                    self.lose_order(now);
+                }
+                return;
+            }
             return self.end_recording(now, sent, &look, false);
         }
         match recording.look(look, sent, marked) {
@@ -101,6 +135,8 @@ impl Session {
     /// A recording that has ended by itself, because of a reset or for whatever else.
     fn end_recording(&mut self, now: Nanos, sent: Nanos, look: &Look, is_begun: bool) {
         self.give_up_recording(now);
+        // What waited has been told meanwhile, and its clock was right: that takes nothing from the doubt in this one.
+        self.sampler.doubts(look.time as u64);
         self.on_sample(now, Some(sent), &look.poll, is_begun);
         if !self.is_reset {
             let detail =
@@ -182,7 +218,7 @@ impl Session {
                 }
                 self.report(now, RigEventBody::Reading(reading));
             }
-            Some(Sampled::Same) => self.is_motion_begun = is_begun,
+            Some(Sampled::Same | Sampled::Doubtful) => self.is_motion_begun = is_begun,
             Some(Sampled::Reset) => {
                 self.is_motion_begun = false;
                 self.on_reset(now);
@@ -193,7 +229,7 @@ impl Session {
 
     /// A sine that cannot go on: the axis is stopped.
     pub(super) fn end_sine(&mut self, now: Nanos, why: &str) {
-        self.urge(RigCommand::Stop, Asked::QuietStop);
+        self.urge(RigCommand::Stop, Asked::Stop(Halting::QUIET));
         let fault = Fault::CommandRefused {
             detail: format!("the sine was broken off: {why}"),
         };

@@ -35,6 +35,25 @@ const fn is_motion(command: &RigCommand) -> bool {
     matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_))
 }
 
+/// A stop that is sent until the controller has accepted it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Halting {
+    /// The command it answers; `None` for a stop that nobody waits for.
+    number: Option<u64>,
+    command: RigCommand,
+    /// How often it came back with `?`, which may be a spoilt `:`.
+    refusals: u32,
+}
+
+impl Halting {
+    /// One that nobody waits for.
+    const QUIET: Self = Self {
+        number: None,
+        command: RigCommand::Stop,
+        refusals: 0,
+    };
+}
+
 /// What a prompt still to come belongs to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Asked {
@@ -51,9 +70,7 @@ enum Asked {
     /// A part of the order under way.
     Part,
     /// A command that stops.
-    Stop(u64, RigCommand),
-    /// A stop that nobody waits for.
-    QuietStop,
+    Stop(Halting),
     /// `TC1`, after a refusal of the order under way.
     Why,
     /// A number that must come back.
@@ -111,10 +128,13 @@ pub struct Session {
     is_motion_begun: bool,
     search: Option<Search>,
     /// Stops whose answers went by while the order was being looked for.
-    unconfirmed: Vec<(u64, RigCommand)>,
+    unconfirmed: Vec<Halting>,
     /// Why nothing but stops is done any more.
     is_reset: bool,
-    attended: Option<Nanos>,
+    /// When somebody took samples last; the beginning counts.
+    attended: Nanos,
+    /// When the axis was stopped last because nobody took samples.
+    abandoned_at: Option<Nanos>,
     asked_at: Option<Nanos>,
     renewed_at: Option<Nanos>,
     answered_at: Nanos,
@@ -154,7 +174,8 @@ impl Session {
             search: None,
             unconfirmed: Vec::new(),
             is_reset: false,
-            attended: None,
+            attended: now,
+            abandoned_at: None,
             asked_at: None,
             renewed_at: None,
             answered_at: now,
@@ -209,7 +230,8 @@ impl Session {
 
 impl Dialogue for Session {
     fn attended(&mut self, at: Nanos) {
-        self.attended = Some(at);
+        self.attended = at;
+        self.abandoned_at = None;
     }
 
     fn command(&mut self, now: Nanos, command: RigCommand) {

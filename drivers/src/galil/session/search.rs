@@ -1,7 +1,7 @@
 //! Questions and answers that do not belong together any more: the line is left to fall silent, then a number that must
 //! come back shows where answers are.
 
-use super::{Asked, Outgoing, Session};
+use super::{Asked, Halting, Outgoing, Session};
 use crate::galil::protocol::Reply;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
@@ -34,9 +34,9 @@ impl Session {
     pub(super) fn lose_order(&mut self, now: Nanos) {
         self.stats.resynchronised += 1;
         self.parser.clear();
-        for (asked, _) in self.expected.drain(..) {
-            if let Asked::Stop(number, command) = asked {
-                self.unconfirmed.push((number, command));
+        for (asked, _) in std::mem::take(&mut self.expected) {
+            if let Asked::Stop(halting) = asked {
+                self.confirm_later(halting);
             }
         }
         self.lines.clear();
@@ -50,7 +50,7 @@ impl Session {
                 number,
                 "its answer was garbled, so the axis was stopped; check the cable",
             );
-            self.urge(RigCommand::Stop, Asked::QuietStop);
+            self.urge(RigCommand::Stop, Asked::Stop(Halting::QUIET));
         }
         if let Some(recording) = &mut self.recording {
             recording.give_up_fetch();
@@ -73,9 +73,18 @@ impl Session {
             self.expected.clear();
             self.search = None;
             self.answered_at = now;
-            for (number, command) in std::mem::take(&mut self.unconfirmed) {
-                self.urge(command, Asked::Stop(number, command));
+            for halting in std::mem::take(&mut self.unconfirmed) {
+                self.urge(halting.command, Asked::Stop(halting));
             }
+        }
+    }
+
+    /// Keeps a stop whose answer nobody sees, until answers belong to questions again. Of those that nobody waits for
+    /// one is enough.
+    pub(super) fn confirm_later(&mut self, halting: Halting) {
+        let is_known = |one: &Halting| halting.number.is_none() && one.number.is_none();
+        if !self.unconfirmed.iter().any(is_known) {
+            self.unconfirmed.push(halting);
         }
     }
 

@@ -1,6 +1,6 @@
 //! What is written next: stops before everything, then the watchdog, increments of a sine, commands, questions.
 
-use super::{Asked, OVERTAKEN, Outgoing, Session, is_motion};
+use super::{Asked, Halting, OVERTAKEN, Outgoing, Session, is_motion};
 use crate::galil::order::{Next, Order};
 use crate::galil::protocol::packed;
 use crate::galil::recording::Recording;
@@ -8,8 +8,12 @@ use crate::galil::watchdog;
 use palpate_model::Nanos;
 use palpate_model::rig::RigCommand;
 
-/// The watchdog is renewed only while somebody takes samples: a computer whose palpate hangs is silent too.
+/// The watchdog is renewed, and the axis left to move, only while somebody takes samples: a computer whose palpate hangs
+/// is silent too.
 const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
+
+/// Why an axis is stopped that nobody looks after.
+const ABANDONED: &str = "nobody took samples for half a second, so the axis was stopped";
 
 impl Session {
     pub(super) fn with_sample(
@@ -30,6 +34,18 @@ impl Session {
     /// Puts a stop before everything. Motions that wait are not begun any more.
     pub(super) fn stop(&mut self, now: Nanos, command: RigCommand) {
         self.sine = None;
+        self.drop_motions(now, OVERTAKEN);
+        let number = self.owe();
+        let halting = Halting {
+            number: Some(number),
+            command,
+            refusals: 0,
+        };
+        self.urge(command, Asked::Stop(halting));
+    }
+
+    /// Refuses motions that wait or are being set.
+    fn drop_motions(&mut self, now: Nanos, why: &str) {
         let mut ended = Vec::new();
         self.orders.retain(|(number, order)| {
             let stays = !is_motion(order);
@@ -46,10 +62,31 @@ impl Session {
             ended.push(number);
         }
         for number in ended {
-            self.refuse(now, number, OVERTAKEN);
+            self.refuse(now, number, why);
         }
-        let number = self.owe();
-        self.urge(command, Asked::Stop(number, command));
+    }
+
+    /// Stops an axis that may move while nobody takes samples, again and again until somebody does: a computer that hangs
+    /// has nobody to stop it, and a controller without the watchdog's program would go on.
+    fn stop_if_abandoned(&mut self, now: Nanos) {
+        let is_due = now.since(self.abandoned_at.unwrap_or(self.attended)) > ATTENDED_MAX;
+        if !is_due || !self.may_move() {
+            return;
+        }
+        self.abandoned_at = Some(now);
+        self.drop_motions(now, ABANDONED);
+        if self.sine.take().is_some() {
+            self.end_sine(now, ABANDONED);
+        } else {
+            self.urge(RigCommand::Stop, Asked::Stop(Halting::QUIET));
+        }
+    }
+
+    /// Whether the axis moves, as far as is known, or is to move.
+    fn may_move(&self) -> bool {
+        let orders = self.order.iter().map(|(_, order)| &order.command);
+        let mut orders = orders.chain(self.orders.iter().map(|(_, command)| command));
+        self.sine.is_some() || self.sampler.is_moving() || orders.any(is_motion)
     }
 
     pub(super) fn urge(&mut self, command: RigCommand, asked: Asked) {
@@ -109,7 +146,7 @@ impl Session {
     }
 
     pub(super) fn is_renewal_due(&self, now: Nanos) -> bool {
-        let is_attended = self.attended.is_some_and(|at| now.since(at) < ATTENDED_MAX);
+        let is_attended = now.since(self.attended) < ATTENDED_MAX;
         self.has_watchdog
             && is_attended
             && self
@@ -118,14 +155,15 @@ impl Session {
     }
 
     pub(super) fn next_line(&mut self, now: Nanos) -> Option<Outgoing> {
+        self.stop_if_abandoned(now);
         if let Some(line) = self.urgent.pop_front() {
             if let Some(search) = &mut self.search {
                 // Its answers go by unseen; it will be asked for again.
                 search.marker_at = None;
                 search.last_byte = now;
                 for asked in &line.asked {
-                    if let Asked::Stop(number, command) = asked {
-                        self.unconfirmed.push((*number, *command));
+                    if let Asked::Stop(halting) = asked {
+                        self.confirm_later(*halting);
                     }
                 }
                 return Some(Outgoing {
