@@ -6,7 +6,7 @@ use palpate_drivers::emulate::cell::EmulatedCell;
 use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_drivers::mark10::gauge::{GaugeSettings, open};
 use palpate_drivers::text::{DeviceError, OpenedCell};
-use palpate_model::units::{Newtons, Volts};
+use palpate_model::units::Newtons;
 
 fn bench() -> CellBench<EmulatedGauge> {
     CellBench::new(EmulatedGauge::new(EmulatedGaugeSettings::default()))
