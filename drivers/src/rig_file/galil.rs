@@ -90,7 +90,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             bits,
             // Without better knowledge, a count of the converter.
             noise: Volts(noise.unwrap_or(range.span().0 / counts)),
-            serial_number: serial_number,
+            serial_number,
             has_watchdog,
             filter,
             sampling: sampling?,
