@@ -38,6 +38,8 @@ const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
 const RESET_AGAIN: Nanos = Nanos::from_millis(100);
 /// Without a welcome for so long after the first reset, nobody knows what the axis does.
 const RESET_MAX: Nanos = Nanos::from_millis(2_000);
+/// A stop is answered by then though the axis is still braking, because it takes longer: the engine waits for a second.
+const STOP_MAX: Nanos = Nanos::from_millis(700);
 /// Segments that are made ahead go on after a cancel: 4 to 5 of 10 ms (stepper.h, config.h).
 const SEGMENTS: Nanos = Nanos::from_millis(45);
 /// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
@@ -440,9 +442,15 @@ impl Session {
         let asked = asked.unwrap_or(now);
         // A stop is done when nothing moves.
         let is_at_rest = !status.state.is_moving();
+        let braking = self.motion.as_ref().map_or(Nanos::ZERO, |motion| {
+            Nanos((motion.wanted.speed.0 / motion.wanted.acceleration.0 * 1e9) as u64)
+        });
+        let is_jog = status.state == State::Jog;
+        // An axis that brakes slowly is braking still.
+        let is_slow = |at| is_jog && now.since(at) > STOP_MAX && now.since(at) < braking;
         let (confirmed, waiting): (Vec<_>, Vec<_>) = std::mem::take(&mut self.stops)
             .into_iter()
-            .partition(|(_, _, at)| is_at_rest && *at <= asked);
+            .partition(|(_, _, at)| *at <= asked && (is_at_rest || is_slow(*at)));
         self.stops = waiting;
         for (number, command, _) in confirmed {
             self.acknowledge(now, number, command);

@@ -8,7 +8,8 @@ use palpate_drivers::grbl::{GrblSettings, HomeSwitch};
 use palpate_drivers::wire::Dialogue;
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
-use palpate_model::rig::{AxisStatus, Fault, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand};
+use palpate_model::units::{MmPerS, MmPerS2};
 
 #[test]
 fn a_cut_cable_stops_the_axis_within_the_stated_way() {
@@ -116,6 +117,37 @@ fn a_stop_is_told_when_the_axis_stands() {
     let there = host.truth();
     host.pass(0.5);
     assert_eq!(host.truth(), there);
+}
+
+#[test]
+fn a_stop_of_an_axis_that_brakes_slowly_is_answered_within_a_second() {
+    let mut eeprom = grbl::Eeprom::slide();
+    eeprom.set(120, 5.0).expect("it takes it");
+    let wire = wired(grbl::GrblSettings {
+        eeprom,
+        ..grbl::GrblSettings::default()
+    });
+    let acceleration = MmPerS2(5.0);
+    let mut host = Host::on(
+        wire,
+        &GrblSettings {
+            acceleration,
+            ..slide()
+        },
+    );
+    host.tell(RigCommand::MoveTo(MoveTo {
+        target_pulses: 40_000,
+        speed: MmPerS(9.0),
+        acceleration,
+    }));
+    host.pass(3.0);
+    host.ask(RigCommand::Stop);
+    host.pass(0.5);
+    assert!(!host.acks.contains(&RigCommand::Stop));
+    host.pass(0.4);
+    assert!(host.acks.contains(&RigCommand::Stop));
+    host.settle();
+    assert_eq!((host.pulses(), host.faults.len()), (host.truth(), 0));
 }
 
 #[test]
