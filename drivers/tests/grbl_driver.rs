@@ -8,5 +8,7 @@ mod faults;
 mod moves;
 #[path = "grbl/opening.rs"]
 mod opening;
+#[path = "grbl/streams.rs"]
+mod streams;
 #[path = "grbl/wires.rs"]
 mod wires;

@@ -24,6 +24,8 @@ const SETTLE: Nanos = Nanos::from_millis(60);
 const REST_MAX: Nanos = Nanos::from_millis(5_000);
 /// Empty lines by which the link is measured.
 const PINGS: usize = 10;
+/// Status reports have three decimals of a mm (report.c): shorter steps cannot be told apart.
+pub const MM_PER_STEP_MIN: f64 = 1e-3;
 /// Longest single wait for bytes.
 const READ_MAX: Duration = Duration::from_millis(5);
 
@@ -89,6 +91,24 @@ pub enum GrblOpenError {
         found: f64,
         /// As it should be.
         wanted: String,
+    },
+    /// Its steps are shorter than what it tells.
+    #[error(
+        "the board has ${number}={found} (steps a mm), but tells places in thousandths of a mm only, so that more than 1000 cannot be checked; set the drive to coarser microsteps"
+    )]
+    TooFine {
+        /// Number of the setting.
+        number: u16,
+        /// What it is.
+        found: f64,
+    },
+    /// Nobody knows at which end it stands.
+    #[error(
+        "the limit pin of axis {axis} is closed, and home and the far limit look alike on it; move the slide off the switch by hand, or say closed_is_home = true in the rig file if nothing but home can have closed it"
+    )]
+    OnASwitch {
+        /// The axis.
+        axis: char,
     },
     /// It refuses a question.
     #[error("the board refuses {line} ({detail})")]
@@ -233,6 +253,12 @@ pub fn connect(
     let status = to_rest(&mut console)?;
     if status.state != State::Idle {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
+    }
+    let is_shared = settings.home == HomeSwitch::Limit && !settings.is_closed_home;
+    if is_shared && status.has_pin(settings.axis) {
+        return Err(GrblOpenError::OnASwitch {
+            axis: settings.axis,
+        });
     }
     let place = status
         .machine
@@ -416,6 +442,12 @@ fn check(settings: &GrblSettings, values: &BTreeMap<u16, f64>) -> Result<f64, Gr
     };
     // Three decimals are stored and shown; 2e-4 of the way is far below what any other part of a rig is known to.
     let steps_per_mm = value(values, 100 + axis);
+    if steps_per_mm > 1.0 / MM_PER_STEP_MIN {
+        return Err(GrblOpenError::TooFine {
+            number: 100 + axis,
+            found: steps_per_mm,
+        });
+    }
     let wanted = 1.0 / settings.mm_per_pulse;
     let is_near = |found: f64, wanted: f64, share: f64| (found - wanted).abs() <= share * wanted;
     if !is_near(steps_per_mm, wanted, 2e-4) {

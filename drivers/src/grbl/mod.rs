@@ -12,7 +12,7 @@ mod session;
 mod settings;
 
 pub use axis::open;
-pub use connect::{Connected, GrblOpenError, connect};
+pub use connect::{Connected, GrblOpenError, MM_PER_STEP_MIN, connect};
 pub use error::{Alarm, Refusal};
 pub use motion::worst_case_mm;
 pub use session::{Session, SharedTrack};

@@ -90,6 +90,13 @@ impl Motion {
         self.sent == self.to
     }
 
+    /// The part of the profile for which jogs were sent: what becomes of it when no more come.
+    #[must_use]
+    pub fn given(&self, mm_per_pulse: f64) -> Profile {
+        let way = (self.sent - self.from).abs() as f64 * mm_per_pulse;
+        Self::profile(way, &self.wanted)
+    }
+
     /// From start to rest.
     #[must_use]
     pub fn duration(&self) -> Nanos {

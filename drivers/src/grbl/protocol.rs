@@ -39,6 +39,12 @@ pub enum State {
 }
 
 impl State {
+    /// Whether the axis moves in it.
+    #[must_use]
+    pub const fn is_moving(self) -> bool {
+        matches!(self, Self::Run | Self::Jog | Self::Home)
+    }
+
     fn parse(text: &str) -> Option<Self> {
         let (name, part) = text.split_once(':').unwrap_or((text, ""));
         Some(match name {
@@ -176,7 +182,11 @@ impl Incoming {
             let inner = inner.strip_suffix(']');
             return inner.map_or_else(other, |inner| Self::Message(inner.to_owned()));
         }
-        if let Some(rest) = line.strip_prefix("Grbl ") {
+        // grblHAL says `GrblHAL 1.1f ['$' or '$HELP' for help]` (grblHAL/core, report.c).
+        let welcome = line
+            .strip_prefix("Grbl ")
+            .or_else(|| line.strip_prefix("GrblHAL "));
+        if let Some(rest) = welcome {
             let version = rest.split(' ').next().unwrap_or_default();
             return Self::Hello(version.to_owned());
         }

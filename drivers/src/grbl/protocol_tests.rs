@@ -51,6 +51,12 @@ fn meaning() -> Vec<Incoming> {
 }
 
 #[test]
+fn the_welcome_of_grblhal_is_one() {
+    let said = all(b"\r\nGrblHAL 1.1f ['$' or '$HELP' for help]\r\n");
+    assert_eq!(said, [Incoming::Hello("1.1f".into())]);
+}
+
+#[test]
 fn a_transcript_is_understood_split_at_every_byte() {
     assert_eq!(all(TRANSCRIPT), meaning());
     for at in 0..TRANSCRIPT.len() {

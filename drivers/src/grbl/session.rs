@@ -34,6 +34,12 @@ const OK_MAX: Nanos = Nanos::from_millis(400);
 const CANCEL_AGAIN: Nanos = Nanos::from_millis(40);
 /// Without anybody asking for reports the axis is stopped: a computer that hangs counts as dead.
 const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
+/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it.
+const RESET_AGAIN: Nanos = Nanos::from_millis(100);
+/// Without a welcome for so long after the first reset, nobody knows what the axis does.
+const RESET_MAX: Nanos = Nanos::from_millis(2_000);
+/// A stop is answered by then though the axis is still braking, because it takes longer: the engine waits for a second.
+const STOP_MAX: Nanos = Nanos::from_millis(700);
 /// Segments that are made ahead go on after a cancel: 4 to 5 of 10 ms (stepper.h, config.h).
 const SEGMENTS: Nanos = Nanos::from_millis(45);
 /// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
@@ -46,6 +52,14 @@ const OVERTAKEN: &str = "a stop came first, so it was not begun";
 
 /// What happens with an axis, shared with whoever needs its past.
 pub type SharedTrack = Arc<Mutex<Track>>;
+
+/// A reset whose welcome is to come.
+struct Halt {
+    /// The stops that it does.
+    owed: Vec<(u64, RigCommand)>,
+    begun: Nanos,
+    written: Nanos,
+}
 
 /// The dialogue.
 pub struct Session {
@@ -70,7 +84,9 @@ pub struct Session {
     looked: Nanos,
     /// Stops that a status after them will confirm.
     stops: Vec<(u64, RigCommand, Nanos)>,
-    halt: Option<u64>,
+    halt: Option<Halt>,
+    /// The newest state that is known.
+    state: State,
     /// Why nothing but stops is done any more.
     locked: Option<String>,
     attended: Nanos,
@@ -107,6 +123,7 @@ impl Session {
             looked: now,
             stops: Vec::new(),
             halt: None,
+            state: State::Idle,
             locked: None,
             attended: now,
             events: VecDeque::new(),
@@ -186,10 +203,51 @@ impl Session {
         if self.motion.take().is_some() {
             self.track().rest(now, here);
         }
+        if self.state.is_moving() {
+            // A status that shows it at rest answers them.
+            return;
+        }
         for (number, command, _) in std::mem::take(&mut self.stops) {
-            // It stands.
             self.acknowledge(now, number, command);
         }
+    }
+
+    /// Jogs that the board has are done though no more come: what is known of the way.
+    fn leave(&mut self, now: Nanos) {
+        let Some(motion) = self.motion.take() else {
+            return;
+        };
+        let given = motion.given(self.settings.mm_per_pulse);
+        let sign = self.settings.sign() as f64;
+        match (motion.started, self.open) {
+            (Some(_), _) if !motion.is_braking => self.track().shortened(given),
+            (None, Some(written)) => {
+                let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
+                let from = sign * motion.from as f64;
+                // It may have begun; nobody has said so.
+                self.track()
+                    .moves(written.min(now), from, given, pulses_per_mm);
+            }
+            _ => {}
+        }
+        self.track().ends();
+    }
+
+    /// Resets the board, again and again until its welcome.
+    fn reset(&mut self, now: Nanos, number: u64, command: RigCommand) {
+        self.urgent.push_front(vec![RESET]);
+        self.leave(now);
+        self.open = None;
+        self.halt = Some(Halt {
+            owed: vec![(number, command)],
+            begun: now,
+            written: now,
+        });
+        self.locked = Some(
+            "it was cut short by a reset and its position is lost; open the rig again and home it"
+                .into(),
+        );
+        self.drop_orders(now, OVERTAKEN);
     }
 
     fn stop(&mut self, now: Nanos, command: RigCommand) {
@@ -207,20 +265,18 @@ impl Session {
         if let Some(owed) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
             self.refuse(now, owed, OVERTAKEN);
         }
-        let is_moving = self.motion.is_some() || self.open.is_some();
-        if command == RigCommand::Halt && is_moving {
-            self.urgent.push_front(vec![RESET]);
-            self.halt = Some(number);
-            self.motion = None;
-            self.open = None;
-            let here = self.track().at(now).pulses.round() as i64;
-            self.track().rest(now, here);
-            self.locked = Some("it was cut short by a reset and its position is lost; open the rig again and home it".into());
-            self.drop_orders(now, OVERTAKEN);
+        if let Some(halt) = &mut self.halt {
+            halt.owed.push((number, command));
             return;
         }
+        let is_moving = self.motion.is_some() || self.open.is_some() || self.state.is_moving();
+        // What is no jog is not ended by the cancel of a jog.
+        let is_foreign = matches!(self.state, State::Run | State::Home);
+        if is_foreign || command == RigCommand::Halt && is_moving {
+            return self.reset(now, number, command);
+        }
         self.cancel(now);
-        if self.locked.is_some() {
+        if self.locked.is_some() && !self.state.is_moving() {
             // It stands, and after a limit switch it answers nothing but a reset.
             return self.acknowledge(now, number, command);
         }
@@ -344,6 +400,7 @@ impl Session {
         if self.halt.is_some() {
             return;
         }
+        self.state = State::Alarm;
         self.lock(now, &alarm.to_string());
         self.fault(now, alarm.to_string());
     }
@@ -351,8 +408,14 @@ impl Session {
     fn on_hello(&mut self, now: Nanos) {
         self.heard = now;
         self.asked = None;
-        if let Some(number) = self.halt.take() {
-            self.acknowledge(now, number, RigCommand::Halt);
+        // Nothing is in motion after a reset.
+        self.state = State::Idle;
+        if let Some(halt) = self.halt.take() {
+            let here = self.track().at(now).pulses.round() as i64;
+            self.track().rest(now, here);
+            for (number, command) in halt.owed {
+                self.acknowledge(now, number, command);
+            }
         } else {
             self.lock(now, "the board was reset; open the rig again");
         }
@@ -372,13 +435,22 @@ impl Session {
         if let Some(asked) = asked {
             self.stats.push(now.since(asked));
         }
+        self.state = status.state;
         if self.halt.is_some() {
             return;
         }
         let asked = asked.unwrap_or(now);
+        // A stop is done when nothing moves.
+        let is_at_rest = !status.state.is_moving();
+        let braking = self.motion.as_ref().map_or(Nanos::ZERO, |motion| {
+            Nanos((motion.wanted.speed.0 / motion.wanted.acceleration.0 * 1e9) as u64)
+        });
+        let is_jog = status.state == State::Jog;
+        // An axis that brakes slowly is braking still.
+        let is_slow = |at| is_jog && now.since(at) > STOP_MAX && now.since(at) < braking;
         let (confirmed, waiting): (Vec<_>, Vec<_>) = std::mem::take(&mut self.stops)
             .into_iter()
-            .partition(|(_, _, at)| *at <= asked);
+            .partition(|(_, _, at)| *at <= asked && (is_at_rest || is_slow(*at)));
         self.stops = waiting;
         for (number, command, _) in confirmed {
             self.acknowledge(now, number, command);
@@ -571,6 +643,12 @@ impl Session {
                 self.cancel(now);
             }
         }
+        if let Some(halt) = &mut self.halt
+            && now.since(halt.written) >= RESET_AGAIN
+        {
+            halt.written = now;
+            self.urgent.push_front(vec![RESET]);
+        }
         let is_wanted = std::mem::take(&mut self.track().is_stop_wanted);
         let Some(motion) = &self.motion else {
             return;
@@ -680,7 +758,16 @@ impl Dialogue for Session {
 
     fn is_dead(&self, now: Nanos) -> Option<String> {
         // A board that a limit switch has locked says nothing before it is reset, and nothing moves.
-        let is_silent = now.since(self.heard) > SILENCE_MAX && self.locked.is_none();
+        if let Some(halt) = &self.halt
+            && now.since(halt.begun) > RESET_MAX
+        {
+            let silence = RESET_MAX.0 as f64 * 1e-9;
+            return Some(format!(
+                "the board has not answered a reset for {silence} s; the axis comes to rest by itself, unless somebody else moves it: use the emergency stop"
+            ));
+        }
+        let is_unsure = self.locked.is_none() || self.state.is_moving();
+        let is_silent = now.since(self.heard) > SILENCE_MAX && is_unsure;
         is_silent.then(|| {
             let silence = SILENCE_MAX.0 as f64 * 1e-9;
             format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
@@ -689,5 +776,12 @@ impl Dialogue for Session {
 
     fn stats(&self) -> LinkStats {
         self.stats
+    }
+}
+
+impl Drop for Session {
+    /// However its thread ends, such as with a port that is gone: what the board was given ends in the track too.
+    fn drop(&mut self) {
+        self.leave(self.looked);
     }
 }

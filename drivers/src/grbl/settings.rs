@@ -30,6 +30,8 @@ pub struct GrblSettings {
     pub acceleration: MmPerS2,
     /// Its home switch.
     pub home: HomeSwitch,
+    /// A closed limit pin is home when the rig is opened: nothing else can have closed it.
+    pub is_closed_home: bool,
     /// The text of `$I=`, by which a board is told from others.
     pub build_info: Option<String>,
     /// Unlock a board that is locked when it is opened (`$X`).

@@ -25,6 +25,8 @@ pub struct CellLine {
     track: Arc<Mutex<Track>>,
     clock: CellClock,
     start: Nanos,
+    /// Between two samples.
+    period: Nanos,
     last_tick: Option<u64>,
     heard: Nanos,
     looked: Nanos,
@@ -42,12 +44,14 @@ impl CellLine {
         track: Arc<Mutex<Track>>,
         start: Nanos,
     ) -> Self {
-        let silence = Nanos((SILENT_PERIODS / rate.max(1e-3) * 1e9) as u64);
+        let period = Nanos((1e9 / rate.max(1e-3)) as u64);
+        let silence = Nanos((SILENT_PERIODS * period.0 as f64) as u64);
         Self {
             cell,
             track,
             clock: CellClock::default(),
             start,
+            period,
             last_tick: None,
             heard: start,
             looked: start,
@@ -70,13 +74,33 @@ impl CellLine {
         self.events.push_back((now, RigEventBody::Fault(fault)));
     }
 
+    /// When a sample was taken that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
+    /// before it a period apart, or closer where there is less time since the last one.
+    fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
+        let told = self
+            .last_tick
+            .map_or(self.start, |tick| self.start + Nanos(tick * TICK.0));
+        // The samples that are left share what is left of the time.
+        let apart = self.period.min(Nanos(at.since(told).0 / (newer + 1)));
+        Nanos(at.0 - apart.0 * newer)
+    }
+
     fn take_samples(&mut self, now: Nanos) {
-        while let Some(sample) = self.cell.take_sample() {
+        let burst: Vec<_> = std::iter::from_fn(|| self.cell.take_sample()).collect();
+        for (place, sample) in burst.iter().enumerate() {
             self.heard = now;
             self.is_silent = false;
-            let taken = match sample.device_time {
-                Some(device) => self.clock.map(device, sample.at),
-                None => sample.at,
+            let newer = burst.len() - 1 - place;
+            let (taken, within) = match sample.device_time {
+                Some(device) => {
+                    let taken = self.clock.map(device, sample.at);
+                    (taken, self.clock.spread())
+                }
+                // It was taken at any time of its period, and told on the grid.
+                None => (
+                    self.laid_back(sample.at, newer as u64),
+                    Nanos(self.period.0 / 2 + TICK.0),
+                ),
             };
             let tick = (taken.since(self.start).0 + TICK.0 / 2) / TICK.0;
             // Two in one thousandth of a second: the second is told for the next.
@@ -88,9 +112,9 @@ impl CellLine {
                 volts: sample.volts,
                 pulses: 0,
                 status: AxisStatus(0),
-                age: sample.device_time.map(|_| Age {
+                age: Some(Age {
                     by: now.since(taken),
-                    within: self.clock.spread(),
+                    within,
                 }),
             };
             self.events.push_back((now, RigEventBody::Reading(reading)));
@@ -153,5 +177,66 @@ impl Drop for CellLine {
     /// However its thread ends, such as with a port that is gone.
     fn drop(&mut self) {
         self.stop_axis();
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cell::CellSample;
+    use palpate_model::units::Volts;
+
+    /// A sample for every byte.
+    #[derive(Default)]
+    struct Bytes(VecDeque<CellSample>);
+
+    impl CellDialogue for Bytes {
+        fn received(&mut self, now: Nanos, bytes: &[u8]) {
+            self.0.extend(bytes.iter().map(|byte| CellSample {
+                at: now,
+                device_time: None,
+                counts: i32::from(*byte),
+                volts: Volts(0.0),
+            }));
+        }
+
+        fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
+            None
+        }
+
+        fn take_sample(&mut self) -> Option<CellSample> {
+            self.0.pop_front()
+        }
+
+        fn take_trouble(&mut self) -> Option<String> {
+            None
+        }
+
+        fn garbled(&self) -> u64 {
+            0
+        }
+
+        fn is_dead(&self, _now: Nanos) -> Option<String> {
+            None
+        }
+    }
+
+    #[test]
+    fn a_burst_is_laid_backwards_and_never_into_the_future() {
+        let ms = Nanos::from_millis;
+        let track = Arc::new(Mutex::new(Track::at_rest(0)));
+        let mut line = CellLine::new(Box::<Bytes>::default(), 250.0, track, ms(1_000));
+        let mut told = Vec::new();
+        // One, four that a converter has held back, then two that come closer than the rate.
+        for (at, bytes) in [(1_010, &[0][..]), (1_026, &[0, 0, 0, 0]), (1_028, &[0, 0])] {
+            line.received(ms(at), bytes);
+            while let Some((now, RigEventBody::Reading(reading))) = line.take_event() {
+                let age = reading.age.expect("it is known");
+                assert_eq!(age.within, ms(3));
+                assert_eq!(now.since(ms(1_000 + reading.tick)), age.by);
+                told.push(reading.tick);
+            }
+        }
+        assert_eq!(told, [10, 14, 18, 22, 26, 27, 28]);
     }
 }

@@ -110,6 +110,31 @@ impl Track {
         debug_assert!((end.position(Seconds(0.0)).0 * pulses_per_mm - here).abs() < 1e-6);
     }
 
+    /// The motion under way ends earlier than was told, at the end of this profile, such as when the way behind it was
+    /// never given.
+    pub fn shortened(&mut self, profile: Profile) {
+        if let Some(Piece {
+            course: Some((course, _)),
+            ..
+        }) = self.pieces.back_mut()
+        {
+            *course = profile;
+        }
+    }
+
+    /// Nobody watches the axis any more: it rests where and when its motion ends.
+    pub fn ends(&mut self) {
+        let Some(last) = self.pieces.back().copied() else {
+            return;
+        };
+        let Some((profile, pulses_per_mm)) = last.course else {
+            return;
+        };
+        let end = last.pulses + profile.end().0 * pulses_per_mm;
+        let after = Nanos((profile.duration().0 * 1e9) as u64);
+        self.rest(last.from + after, end.round() as i64);
+    }
+
     /// Switches and motor from then on.
     pub fn inputs(&mut self, from: Nanos, status: AxisStatus) {
         if self.inputs.back().is_some_and(|(_, last)| *last == status) {
@@ -179,5 +204,30 @@ mod tests {
         let rest = track.at(ms(3_000));
         assert_eq!((rest.pulses, rest.motion), (-700.0, 1));
         assert!(!rest.status.has(AxisStatus::MOVING));
+    }
+
+    #[test]
+    fn a_motion_that_nobody_watches_ends() {
+        let mut track = Track::at_rest(100);
+        let ms = Nanos::from_millis;
+        let speed = (MmPerS(2.0), MmPerS2(20.0));
+        let profile = |to| Profile::to_rest(Position(0.0), Position(to), speed.0, speed.1);
+        track.ends();
+        assert_eq!(track.at(ms(500)).pulses, 100.0);
+        track.moves(ms(1_000), 100.0, profile(10.0), -400.0);
+        track.shortened(profile(1.0));
+        track.ends();
+        assert!(track.at(ms(1_300)).status.has(AxisStatus::MOVING));
+        let rest = track.at(ms(2_000));
+        assert_eq!((rest.pulses, rest.motion), (-300.0, 1));
+        assert!(!rest.status.has(AxisStatus::MOVING));
+        // A motion that is being braked ends there.
+        track.moves(ms(3_000), -300.0, profile(10.0), 400.0);
+        track.brakes(ms(4_000));
+        track.ends();
+        let rest = track.at(ms(9_000));
+        assert!(!rest.status.has(AxisStatus::MOVING));
+        // 0.1 mm while it gains speed, 0.9 s at 2 mm/s, 0.1 mm while it brakes.
+        assert_eq!(rest.pulses, -300.0 + 400.0 * 2.0);
     }
 }

@@ -68,13 +68,13 @@ pub(super) fn read(fields: &mut Fields) -> Option<(Place, CellFile)> {
 pub(super) fn gauge(fields: &mut Fields) -> Option<GaugeSettings> {
     let usual = GaugeSettings::default();
     let capacity = fields.needed("cell.capacity_n", 1e-3, 1e6);
-    let per_second = fields.number("cell.readings_per_second", 1.0, 250.0);
+    let per_second = fields.whole("cell.readings_per_second", 1, 250);
     let per_second = per_second.map_or(usual.per_second, |rate| rate as u16);
     if !RATES.contains(&per_second) {
         let rates = RATES.map(|rate| rate.to_string()).join(", ");
         fields.mistake("cell.readings_per_second", &format!("gauges send {rates}"));
     }
-    let filter = fields.number("cell.filter", 0.0, f64::from(FILTER_MAX));
+    let filter = fields.whole("cell.filter", 0, u64::from(FILTER_MAX));
     let is_reversed = fields.choice(
         "cell.direction",
         &[("compression", false), ("tension", true)],

@@ -132,6 +132,23 @@ impl Fields {
         }
     }
 
+    /// A whole number within bounds, if it is there.
+    pub fn whole(&mut self, key: &str, least: u64, most: u64) -> Option<u64> {
+        let (least, most) = (least as f64, most as f64);
+        match self.take(key)? {
+            Value::Number(number) if (least..=most).contains(&number) && number.fract() == 0.0 => {
+                Some(number as u64)
+            }
+            _ => {
+                self.mistake(
+                    key,
+                    &format!("give a whole number from {least} to {most}, without quotes"),
+                );
+                None
+            }
+        }
+    }
+
     /// A number within bounds that must be there.
     pub fn needed(&mut self, key: &str, least: f64, most: f64) -> Option<f64> {
         if !self.all.iter().any(|field| field.key == key) {

@@ -9,7 +9,7 @@ use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
     let place = place(fields, "", true);
-    let serial_number = fields.number("serial_number", 0.0, 1e15);
+    let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {
         [letter @ b'A'..=b'H'] => char::from(*letter),
@@ -18,7 +18,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             'A'
         }
     };
-    let input = fields.number("input", 1.0, 8.0).unwrap_or(1.0);
+    let input = fields.whole("input", 1, 8).unwrap_or(1);
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
     let is_reversed = fields.choice(
         "direction",
@@ -58,7 +58,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let has_watchdog = fields.flag("watchdog").unwrap_or(true);
     let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
     // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
-    let sample_us = fields.number("sample_us", 500.0, 1000.0);
+    let sample_us = fields.whole("sample_us", 500, 1000);
     let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
     // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
     if acceleration / mm_per_pulse < 1024.0 {
@@ -90,7 +90,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             bits,
             // Without better knowledge, a count of the converter.
             noise: Volts(noise.unwrap_or(range.span().0 / counts)),
-            serial_number: serial_number.map(|number| number as u64),
+            serial_number,
             has_watchdog,
             filter,
             sampling: sampling?,

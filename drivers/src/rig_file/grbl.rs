@@ -2,7 +2,7 @@
 
 use super::fields::Fields;
 use super::place::place;
-use crate::grbl::{GrblSettings, HomeSwitch};
+use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
 use crate::wire::Place;
 use palpate_model::units::{MmPerS, MmPerS2, Position};
 
@@ -13,6 +13,12 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
+    if mm_per_pulse.is_some_and(|mm| mm < MM_PER_STEP_MIN) {
+        fields.mistake(
+            "mm_per_pulse",
+            "Grbl tells places in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
+        );
+    }
     let is_reversed = fields.choice(
         "direction",
         &[("forward", false), ("reverse", true)],
@@ -26,6 +32,13 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
         &[("limit", HomeSwitch::Limit), ("probe", HomeSwitch::Probe)],
         None,
     );
+    let is_closed_home = fields.flag("closed_is_home");
+    if is_closed_home.is_some() && home == Some(HomeSwitch::Probe) {
+        fields.mistake(
+            "closed_is_home",
+            "a home switch on the probe pin is known by itself; remove this",
+        );
+    }
     let build_info = fields.text("build_info");
     let is_unlocking = fields.flag("unlock").unwrap_or(false);
     Some((
@@ -39,6 +52,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             speed_max: MmPerS(speed_max?),
             acceleration: MmPerS2(acceleration?),
             home: home?,
+            is_closed_home: is_closed_home.unwrap_or(false),
             build_info,
             is_unlocking,
         },

@@ -13,7 +13,7 @@ pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Opti
     } else {
         None
     };
-    let baud = fields.number(&key("baud"), 300.0, 4e6);
+    let baud = fields.whole(&key("baud"), 300, 4_000_000);
     let has_handshake = fields.choice(
         &key("handshake"),
         &[("none", false), ("rts-cts", true)],
@@ -24,7 +24,7 @@ pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Opti
             port,
             // The factory setting of Galil boards with an USB port, and what gclib opens them with (gclib.h, `--baud`);
             // that of Grbl 1.1 (doc/markdown/interface.md), of Mark-10 stands, and of the sketch for HX711 boards.
-            baud: baud.unwrap_or(115_200.0) as u32,
+            baud: baud.map_or(115_200, |baud| baud as u32),
             has_handshake: has_handshake?,
         }),
         (None, Some(address)) => {

@@ -181,3 +181,39 @@ fn a_stand_is_one_device() {
     assert!(matches!(file, RigFile::Stand { .. }), "{file:?}");
     assert_eq!(file.places().len(), 1);
 }
+
+#[test]
+fn fractions_of_what_is_whole_are_refused_with_their_line() {
+    let text = THESIS.to_owned()
+        + "input = 1.9\nserial_number = 1820.7\nsample_us = 976.6\nbaud = 9600.5\n";
+    let told = mistakes(&text);
+    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [9, 10, 11, 12], "{told:?}");
+    assert!(told[0].1.contains("input: give a whole number from 1 to 8"));
+    let gauge = PARTS.replace("hx711", "mark10")
+        + "capacity_n = 25\nfilter = 4.5\nreadings_per_second = 50.5\nbaud = 9600.5\n";
+    let told = mistakes(&gauge);
+    let lines: Vec<usize> = told.iter().map(|(line, _)| *line).collect();
+    assert_eq!(lines, [13, 14, 15], "{told:?}");
+    // A whole number may be written with a point.
+    let whole = THESIS.to_owned() + "input = 2.0\n";
+    assert_eq!(galil("bench.toml", &whole).1.input, 2);
+}
+
+#[test]
+fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
+    let fine = PARTS.replace("0.0025", "0.000625");
+    let told = mistakes(&fine);
+    assert!(
+        told[0].0 == 3 && told[0].1.contains("thousandths"),
+        "{told:?}"
+    );
+    let probe = PARTS.replace("\"probe\"\n", "\"probe\"\nclosed_is_home = true\n");
+    assert_eq!(mistakes(&probe)[0].0, 8);
+    let RigFile::Grbl { settings, .. } =
+        RigFile::parse("bench.toml", &probe.replace("\"probe\"", "\"limit\"")).unwrap()
+    else {
+        panic!("no parts");
+    };
+    assert!(settings.is_closed_home);
+}

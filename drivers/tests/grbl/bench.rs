@@ -33,6 +33,8 @@ pub struct Wire {
     pub is_cut: bool,
     /// Bytes from the board that are lost, doubled or spoilt: what becomes of them.
     pub spoil: Box<dyn FnMut(u8) -> Vec<u8> + Send>,
+    /// Whether a byte from the host is lost.
+    pub lose: Box<dyn FnMut(u8) -> bool + Send>,
     /// All bytes from the host.
     pub sent: Vec<u8>,
 }
@@ -107,7 +109,11 @@ impl Link for Shared {
         }
         wire.sent.extend_from_slice(bytes);
         let at = wire.now + DELAY;
-        wire.leaving.extend(bytes.iter().map(|byte| (at, *byte)));
+        for byte in bytes {
+            if !(wire.lose)(*byte) {
+                wire.leaving.push_back((at, *byte));
+            }
+        }
         Ok(())
     }
 }
@@ -122,6 +128,7 @@ pub fn slide() -> GrblSettings {
         speed_max: MmPerS(20.0),
         acceleration: MmPerS2(60.0),
         home: HomeSwitch::Limit,
+        is_closed_home: false,
         build_info: None,
         is_unlocking: false,
     }
@@ -137,6 +144,7 @@ pub fn wired(settings: grbl::GrblSettings) -> Shared {
         arriving: VecDeque::new(),
         is_cut: false,
         spoil: Box::new(|byte| vec![byte]),
+        lose: Box::new(|_| false),
         sent: Vec::new(),
     })))
 }

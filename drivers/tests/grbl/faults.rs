@@ -8,7 +8,8 @@ use palpate_drivers::grbl::{GrblSettings, HomeSwitch};
 use palpate_drivers::wire::Dialogue;
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
-use palpate_model::rig::{Fault, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand};
+use palpate_model::units::{MmPerS, MmPerS2};
 
 #[test]
 fn a_cut_cable_stops_the_axis_within_the_stated_way() {
@@ -27,6 +28,148 @@ fn a_cut_cable_stops_the_axis_within_the_stated_way() {
         );
         wire.pass(Nanos::from_millis(1_000));
         assert_eq!(wire.board.place_mm() - before, way);
+    }
+}
+
+#[test]
+fn a_pulled_plug_ends_the_motion_for_the_samples_of_a_cell_that_lives() {
+    for (speed, after, is_stopped) in [
+        (20.0, 0.3, false),
+        (0.75, 1.0, false),
+        (9.0, 0.05, false),
+        (9.0, 0.6, true),
+    ] {
+        let mut host = Host::new(&slide());
+        host.tell(to(40_000, speed));
+        host.pass(after);
+        if is_stopped {
+            host.ask(RigCommand::Stop);
+            host.pass(0.02);
+        }
+        let Host {
+            wire,
+            session,
+            track,
+            ..
+        } = host;
+        wire.lock().is_cut = true;
+        drop(session);
+        // What the board has of the stop and of the jogs is done.
+        wire.lock().pass(Nanos::from_millis(5_000));
+        let now = wire.lock().now;
+        let placed = track.lock().expect("nobody panics with it").at(now);
+        assert!(!placed.status.has(AxisStatus::MOVING), "{speed}");
+        let truth = wire.lock().board.place_mm() / 0.0025;
+        assert!(
+            (placed.pulses - truth).abs() <= 2.0 + 0.02 * speed / 0.0025,
+            "{speed}: {} of {truth}",
+            placed.pulses
+        );
+    }
+}
+
+#[test]
+fn a_reset_that_is_lost_is_written_again() {
+    for lost in [1, 3] {
+        let mut host = Host::new(&slide());
+        host.tell(to(40_000, 20.0));
+        host.pass(1.0);
+        let mut left = lost;
+        host.wire.lock().lose = Box::new(move |byte| {
+            let is_lost = byte == 0x18 && left > 0;
+            left -= i32::from(is_lost);
+            is_lost
+        });
+        host.ask(RigCommand::Halt);
+        host.pass(0.05);
+        assert!(!host.acks.contains(&RigCommand::Halt));
+        assert!(host.has(AxisStatus::MOVING), "it moves and is said to rest");
+        host.tell(RigCommand::Halt);
+        let there = host.truth();
+        host.pass(1.0);
+        assert_eq!(host.truth(), there);
+        assert!(!host.has(AxisStatus::MOVING));
+        let halts = host.acks.iter().filter(|ack| **ack == RigCommand::Halt);
+        assert_eq!(halts.count(), 2);
+    }
+}
+
+#[test]
+fn a_halt_without_a_welcome_is_a_lost_link() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 5.0));
+    host.pass(0.5);
+    host.wire.lock().lose = Box::new(|byte| byte == 0x18);
+    host.ask(RigCommand::Halt);
+    host.until("dead", |host| host.session.is_dead(host.now()).is_some());
+    assert!(!host.acks.contains(&RigCommand::Halt));
+    let why = host.session.is_dead(host.now()).expect("dead");
+    assert!(why.contains("reset"), "{why}");
+}
+
+#[test]
+fn a_stop_is_told_when_the_axis_stands() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 20.0));
+    host.pass(1.0);
+    host.ask(RigCommand::Stop);
+    host.until("stopped", |host| host.acks.contains(&RigCommand::Stop));
+    let there = host.truth();
+    host.pass(0.5);
+    assert_eq!(host.truth(), there);
+}
+
+#[test]
+fn a_stop_of_an_axis_that_brakes_slowly_is_answered_within_a_second() {
+    let mut eeprom = grbl::Eeprom::slide();
+    eeprom.set(120, 5.0).expect("it takes it");
+    let wire = wired(grbl::GrblSettings {
+        eeprom,
+        ..grbl::GrblSettings::default()
+    });
+    let acceleration = MmPerS2(5.0);
+    let mut host = Host::on(
+        wire,
+        &GrblSettings {
+            acceleration,
+            ..slide()
+        },
+    );
+    host.tell(RigCommand::MoveTo(MoveTo {
+        target_pulses: 40_000,
+        speed: MmPerS(9.0),
+        acceleration,
+    }));
+    host.pass(3.0);
+    host.ask(RigCommand::Stop);
+    host.pass(0.5);
+    assert!(!host.acks.contains(&RigCommand::Stop));
+    host.pass(0.4);
+    assert!(host.acks.contains(&RigCommand::Stop));
+    host.settle();
+    assert_eq!((host.pulses(), host.faults.len()), (host.truth(), 0));
+}
+
+#[test]
+fn a_program_of_somebody_else_is_ended_by_a_reset() {
+    for command in [RigCommand::Halt, RigCommand::Stop] {
+        let mut host = Host::new(&slide());
+        {
+            let mut wire = host.wire.lock();
+            let now = wire.now;
+            wire.board.receive(now, b"G1X100F600\n");
+        }
+        host.until("noticed", |host| !host.faults.is_empty());
+        assert!(
+            host.faults[0].to_string().contains("Run"),
+            "{:?}",
+            host.faults
+        );
+        host.tell(command);
+        let there = host.truth();
+        assert!(there < 20_000.0);
+        host.pass(1.0);
+        assert_eq!(host.truth(), there);
     }
 }
 

@@ -63,8 +63,9 @@ fn a_stop_brakes_and_the_place_is_known() {
     host.tell(to(24_000, 9.0));
     host.pass(1.0);
     let before = host.truth();
-    assert_eq!(host.tell(RigCommand::Stop), RigCommand::Stop);
+    host.ask(RigCommand::Stop);
     host.until("braking", |host| host.has(AxisStatus::STOPPING));
+    host.until("stopped", |host| host.acks.contains(&RigCommand::Stop));
     host.settle();
     let way = (host.truth() - before) * 0.0025;
     // Braking from 9 mm/s takes 0.675 mm, and 60 ms go by before it.

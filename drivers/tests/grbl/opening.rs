@@ -47,6 +47,39 @@ fn settings_that_are_otherwise_are_told_with_the_line_that_mends_them() {
 }
 
 #[test]
+fn steps_that_are_finer_than_what_grbl_tells_are_refused() {
+    let fine = GrblSettings {
+        mm_per_pulse: 1.0 / 1_600.0,
+        ..slide()
+    };
+    let said = refused(&[(100, 1_600.0)], &fine);
+    assert!(
+        said.contains("$100=1600") && said.contains("thousandths"),
+        "{said}"
+    );
+}
+
+#[test]
+fn a_closed_limit_pin_that_both_ends_share_is_refused() {
+    for by in [-200.0, 200.0] {
+        let wire = wired(grbl::GrblSettings::default());
+        {
+            let mut wire = wire.lock();
+            wire.plant.shift(by);
+            wire.pass(Nanos::from_millis(10));
+        }
+        let err = try_connect(&wire, &slide()).expect_err("refused");
+        assert_eq!(err, GrblOpenError::OnASwitch { axis: 'X' });
+        assert!(err.to_string().contains("closed_is_home = true"), "{err}");
+        let settings = GrblSettings {
+            is_closed_home: true,
+            ..slide()
+        };
+        try_connect(&wire, &settings).expect("it connects");
+    }
+}
+
+#[test]
 fn a_locked_board_is_unlocked_only_when_the_rig_file_says_so() {
     let locked = [(22, 1.0)];
     let said = refused(&locked, &slide());

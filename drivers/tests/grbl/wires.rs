@@ -15,6 +15,7 @@ use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
 use std::io::Write;
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -39,6 +40,14 @@ impl Drop for Served {
 
 /// `None`, with a word, where there are no pseudo-terminals.
 fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
+    start_at(is_gauge, faults, vec![None, None])
+}
+
+fn start_at(
+    is_gauge: bool,
+    faults: Vec<ScheduledFault>,
+    links: Vec<Option<PathBuf>>,
+) -> Option<Served> {
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     let (orders, received) = sync_channel(4);
@@ -54,7 +63,7 @@ fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
             let board = Grbl::new(GrblSettings::default());
             let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
             let options = ServeOptions {
-                place: Place::Ptys(vec![None, None]),
+                place: Place::Ptys(links),
                 baud: None,
                 latency: Nanos::ZERO,
                 faults,
@@ -253,4 +262,52 @@ fn a_cell_that_falls_silent_stops_the_axis() {
     });
     client.until("at rest", |client| !client.is_moving());
     assert!(client.readings.last().expect("one").pulses < 30_000);
+}
+
+#[test]
+fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() {
+    let folder = tempfile::tempdir().expect("a folder");
+    let links = ["board", "cell"].map(|name| Some(folder.path().join(name)));
+    let Some(served) = start_at(false, Vec::new(), links.to_vec()) else {
+        return;
+    };
+    let mut client = Client::open(&served, HX711);
+    client.tell(RigCommand::EnableMotor);
+    client.tell(RigCommand::MoveTo(to(40_000, 5.0)));
+    client.until("moving", Client::is_moving);
+    served
+        .orders
+        .send("disconnect:2".into())
+        .expect("it listens");
+    client.until("told", |client| {
+        let lost = client
+            .faults
+            .iter()
+            .filter(|fault| matches!(fault, Fault::LinkLost { .. }));
+        lost.count() == 2
+    });
+    client.rig.reconnect().expect_err("nothing is there");
+    let end = now() + Duration::from_secs(30);
+    while let Err(err) = client.rig.reconnect() {
+        assert!(now() < end, "never again: {err}");
+        std::thread::sleep(Duration::from_millis(100));
+    }
+    client.readings.clear();
+    client.faults.clear();
+    client.until("samples", |client| client.readings.len() > 20);
+    let first = client.readings[0].pulses;
+    for reading in &client.readings {
+        assert_eq!(reading.pulses, first);
+        assert!(!reading.status.has(AxisStatus::MOVING));
+    }
+    assert_eq!(client.faults, []);
+    // It can be driven again.
+    client.tell(RigCommand::EnableMotor);
+    client.tell(RigCommand::MoveTo(to(first + 200, 5.0)));
+    client.until("there", |client| {
+        client
+            .readings
+            .last()
+            .is_some_and(|reading| reading.pulses == first + 200)
+    });
 }
