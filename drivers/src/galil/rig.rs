@@ -5,16 +5,12 @@ use super::model::{GalilBoard, GalilOpenError};
 use super::session::Session;
 use super::settings::GalilSettings;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
-use crate::wire::{HostClock, Line, LineSettings, LinkStats, Place};
+use crate::wire::{CallerTime, HostClock, Line, LineSettings, LinkStats, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::time::Duration;
-
-/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
-/// catch up a quarter of a second.
-const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 
 /// A controller that is connected, and the thread that talks to it.
 struct Open {
@@ -30,9 +26,7 @@ pub struct GalilRig {
     /// `None` while it is being connected anew, and after that has failed.
     line: Option<Line>,
     clock: HostClock,
-    /// The host's clock where the caller's time is zero.
-    origin: Option<Nanos>,
-    newest: Nanos,
+    time: CallerTime,
     /// Refusals of commands that found no room.
     refused: VecDeque<Fault>,
     /// Bytes of the time before the thread had the link.
@@ -53,9 +47,8 @@ impl GalilRig {
             first_raw: connected.raw.clone(),
             connected,
             line: Some(line),
+            time: CallerTime::new(Arc::clone(&clock)),
             clock,
-            origin: None,
-            newest: Nanos::ZERO,
             refused: VecDeque::new(),
         })
     }
@@ -75,7 +68,7 @@ impl GalilRig {
     /// The time that [`Rig::take_raw`] tells, now.
     #[must_use]
     pub fn now(&self) -> Nanos {
-        (self.clock)().since(self.origin.unwrap_or(Nanos::ZERO))
+        self.time.of((self.clock)())
     }
 
     /// How the link behaves.
@@ -86,13 +79,6 @@ impl GalilRig {
         stats
             .filter(|stats| stats.answers > 0)
             .unwrap_or(self.connected.stats)
-    }
-
-    /// The caller's time of a moment of the host's clock; never before what was told already.
-    fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
-        let origin = self.origin.unwrap_or(at);
-        self.newest = at.since(origin).max(self.newest).min(until);
-        self.newest
     }
 }
 
@@ -114,30 +100,18 @@ impl Rig for GalilRig {
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let now = (self.clock)();
-        let origin = *self
-            .origin
-            .get_or_insert_with(|| Nanos(now.0.saturating_sub(until.0)));
-        // A caller whose time stood still, as while the computer slept, begins anew.
-        let behind = now.since(origin).since(until);
-        let origin = if behind > BEHIND_MAX {
-            Nanos(now.0.saturating_sub(until.0))
-        } else {
-            origin
-        };
-        self.origin = Some(origin);
+        let (now, end) = self.time.asked(until);
         if let Some(fault) = self.refused.pop_front() {
-            let at = self.told(now, until);
+            let at = self.time.told(now, until);
             return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
         }
-        let end = origin + until;
         let wait = Duration::from_nanos(end.since(now).0);
         let Some(line) = &self.line else {
             std::thread::sleep(wait);
             return None;
         };
         let mut event = line.next_event(end, wait)?;
-        event.at = self.told(event.at, until);
+        event.at = self.time.told(event.at, until);
         Some(event)
     }
 
@@ -179,9 +153,8 @@ impl Rig for GalilRig {
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = std::mem::take(&mut self.first_raw);
         raw.extend(self.line.iter().flat_map(Line::take_raw));
-        let origin = self.origin.unwrap_or(Nanos::ZERO);
         for piece in &mut raw {
-            piece.at = piece.at.since(origin);
+            piece.at = self.time.of(piece.at);
         }
         raw
     }

@@ -4,7 +4,7 @@ use super::cell_line::{CellLine, TICK};
 use super::track::Track;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::OpenedCell;
-use crate::wire::{HostClock, Line, LineSettings, Link, LinkStats};
+use crate::wire::{CallerTime, HostClock, Line, LineSettings, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -12,9 +12,6 @@ use std::io;
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
-/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
-/// catch up a quarter of a second.
-const BEHIND_MAX: Nanos = Nanos::from_millis(250);
 /// Two lines are listened to in turns of this length.
 const TURN: Nanos = Nanos::from_millis(1);
 
@@ -44,9 +41,7 @@ pub struct PartsRig {
     clock: HostClock,
     /// The host's clock where ticks begin.
     start: Nanos,
-    /// The host's clock where the caller's time is zero.
-    origin: Option<Nanos>,
-    newest: Nanos,
+    time: CallerTime,
     refused: VecDeque<Fault>,
     first_raw: Vec<RawBytes>,
     /// Taken from a line, not told yet.
@@ -96,10 +91,9 @@ impl PartsRig {
             axis: Some(axis.line),
             cell: Some(cell_line),
             track: axis.track,
+            time: CallerTime::new(Arc::clone(&clock)),
             clock,
             start,
-            origin: None,
-            newest: Nanos::ZERO,
             refused: VecDeque::new(),
             first_raw: [axis.raw, raw].concat(),
             from_axis: None,
@@ -188,13 +182,6 @@ impl PartsRig {
         raw.sort_by_key(|piece| piece.at);
         raw
     }
-
-    /// The caller's time of a moment of the host's clock; never before what was told already.
-    fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
-        let origin = self.origin.unwrap_or(at);
-        self.newest = at.since(origin).max(self.newest).min(until);
-        self.newest
-    }
 }
 
 impl Rig for PartsRig {
@@ -215,25 +202,13 @@ impl Rig for PartsRig {
     }
 
     fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
-        let now = (self.clock)();
-        let origin = *self
-            .origin
-            .get_or_insert_with(|| Nanos(now.0.saturating_sub(until.0)));
-        // A caller whose time stood still, as while the computer slept, begins anew.
-        let behind = now.since(origin).since(until);
-        let origin = if behind > BEHIND_MAX {
-            Nanos(now.0.saturating_sub(until.0))
-        } else {
-            origin
-        };
-        self.origin = Some(origin);
+        let (now, end) = self.time.asked(until);
         if let Some(fault) = self.refused.pop_front() {
-            let at = self.told(now, until);
+            let at = self.time.told(now, until);
             return Some(RigEvent::new(at, RigEventBody::Fault(fault)));
         }
-        let end = origin + until;
         let event = self.next(end, end)?;
-        let at = self.told(event.at, until);
+        let at = self.time.told(event.at, until);
         let body = self.complete(event.body);
         Some(RigEvent::new(at, body))
     }
@@ -249,10 +224,12 @@ impl Rig for PartsRig {
         match opened {
             Ok(mut opened) => {
                 raw.append(&mut opened.first_raw);
+                // Whoever asks goes on with its own time.
+                let time =
+                    std::mem::replace(&mut self.time, CallerTime::new(Arc::clone(&self.clock)));
                 *self = Self {
                     first_raw: raw,
-                    origin: self.origin,
-                    newest: self.newest,
+                    time,
                     again: Some(again),
                     ..opened
                 };
@@ -285,9 +262,8 @@ impl Rig for PartsRig {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         let mut raw = self.take_raw_of_host();
-        let origin = self.origin.unwrap_or(Nanos::ZERO);
         for piece in &mut raw {
-            piece.at = piece.at.since(origin);
+            piece.at = self.time.of(piece.at);
         }
         raw
     }

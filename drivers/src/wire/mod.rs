@@ -4,6 +4,7 @@
 //! every protocol can be tested without a port, a thread or a clock. [`Line`] runs one on a link.
 
 mod answers;
+mod caller_time;
 mod dialogue;
 mod line;
 mod link;
@@ -11,6 +12,7 @@ mod memory;
 mod place;
 
 pub use answers::Answers;
+pub use caller_time::CallerTime;
 pub use dialogue::{Dialogue, LinkStats};
 pub use line::{Line, LineSettings};
 pub use link::{Link, SerialLink, TcpLink};

@@ -1,0 +1,54 @@
+//! The time of whoever asks a rig for events, laid on the host's clock.
+
+use super::HostClock;
+use palpate_model::Nanos;
+
+/// The caller's time may fall behind the host's clock by so much before it counts as given up: the runner does not
+/// catch up a quarter of a second.
+const BEHIND_MAX: Nanos = Nanos::from_millis(250);
+
+/// Where the caller's zero is on the host's clock, and what was told last.
+pub struct CallerTime {
+    clock: HostClock,
+    /// `None` until somebody has asked.
+    origin: Option<Nanos>,
+    newest: Nanos,
+}
+
+impl CallerTime {
+    /// Nobody has asked yet.
+    #[must_use]
+    pub const fn new(clock: HostClock) -> Self {
+        Self {
+            clock,
+            origin: None,
+            newest: Nanos::ZERO,
+        }
+    }
+
+    /// The caller asks for what comes until a time of its own: the host's time now, and of that end.
+    pub fn asked(&mut self, until: Nanos) -> (Nanos, Nanos) {
+        let now = (self.clock)();
+        let begun = Nanos(now.0.saturating_sub(until.0));
+        // A caller whose time stood still, as while the computer slept, begins anew.
+        let origin = match self.origin {
+            Some(origin) if now.since(origin).since(until) <= BEHIND_MAX => origin,
+            _ => begun,
+        };
+        self.origin = Some(origin);
+        (now, origin + until)
+    }
+
+    /// The caller's time of a moment of the host's clock; never before what was told already.
+    pub fn told(&mut self, at: Nanos, until: Nanos) -> Nanos {
+        let origin = self.origin.unwrap_or(at);
+        self.newest = at.since(origin).max(self.newest).min(until);
+        self.newest
+    }
+
+    /// The same without an order: of bytes that were exchanged.
+    #[must_use]
+    pub fn of(&self, at: Nanos) -> Nanos {
+        at.since(self.origin.unwrap_or(Nanos::ZERO))
+    }
+}
