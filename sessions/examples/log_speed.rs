@@ -76,6 +76,7 @@ fn manifest() -> Manifest {
             noise_expected: Volts(1e-3),
             pulse_lag: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
+            unseen_max: RigDescription::UNSEEN_USUAL,
         }),
         limits: Some(Limits::for_travel(travel)),
         calibration: serde_json::Value::Null,

@@ -644,3 +644,24 @@ fn the_programme_of_the_guide_is_one() {
     assert_eq!(second.specimen, "stomach 8, fundus");
     assert!(second.is_told("specimen.source") && second.is_told("specimen.thickness_mm"));
 }
+
+#[test]
+fn the_probe_leaves_the_tissue_before_a_specimen_is_looked_after_anew() {
+    let whole = programme(&TOLD.replace("specimen-source = \"x\"\n", ""));
+    let words = |remount| -> Vec<String> {
+        let plan = whole.tasks[2].plan(1, remount).unwrap();
+        let steps = plan.steps.iter().take(4);
+        steps.map(|one| format!("{:?}", one.step)).collect()
+    };
+    let fresh = words(None);
+    assert!(fresh[0].starts_with("Prompt"), "{fresh:?}");
+    // What broke off may have left it there, and the axis does not know where it is.
+    let again = words(Some(1));
+    for (at, name) in ["SelfTest", "Home", "Prompt", "SelfTest"]
+        .iter()
+        .enumerate()
+    {
+        assert!(again[at].starts_with(name), "{again:?}");
+    }
+    assert_eq!(again[2..], fresh[..2]);
+}

@@ -355,6 +355,7 @@ fn describe(
             || (pace.every.0 as f64 / pace.tick.0 as f64).max(1.0) * BETWEEN,
             |plan| plan.interval as f64,
         ),
+        unseen_max: settings.unseen,
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
     }
 }

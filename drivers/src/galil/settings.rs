@@ -116,6 +116,8 @@ pub struct GalilSettings {
     pub speed_max: MmPerS,
     /// Acceleration of every move.
     pub acceleration: MmPerS2,
+    /// How far the probe may go while no sample comes.
+    pub unseen: Position,
     /// How the drive wants its pulses.
     pub motor_type: MotorType,
     /// Limit switches.
@@ -195,6 +197,7 @@ pub mod tests {
             travel: Position(150.0),
             speed_max: MmPerS(20.0),
             acceleration: MmPerS2(61.44),
+            unseen: palpate_model::rig::RigDescription::UNSEEN_USUAL,
             motor_type: MotorType::ActiveLow,
             limits: Levels::ActiveLow,
             home: Levels::ActiveLow,

@@ -51,6 +51,7 @@ pub fn open(
         adc: None,
         noise_expected: Volts(0.0),
         ticks_per_sample: 1.0,
+        unseen_max: settings.unseen,
         pulse_lag: LAG,
     };
     Ok((description, Axis { line, track, raw }))

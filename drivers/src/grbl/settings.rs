@@ -28,6 +28,8 @@ pub struct GrblSettings {
     pub speed_max: MmPerS,
     /// Acceleration and deceleration.
     pub acceleration: MmPerS2,
+    /// How far the probe may go while no sample comes.
+    pub unseen: Position,
     /// Its home switch.
     pub home: HomeSwitch,
     /// A closed limit pin is home when the rig is opened: nothing else can have closed it.

@@ -1,6 +1,8 @@
 //! The keys of a file with their lines, taken one after the other; what is left over is a mistake too. A key of a table
 //! is called `table.key`.
 
+use palpate_model::rig::RigDescription;
+use palpate_model::units::Position;
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
@@ -147,6 +149,13 @@ impl Fields {
                 None
             }
         }
+    }
+
+    /// How far the probe may go while no sample comes.
+    pub fn unseen(&mut self) -> Position {
+        // Less is below what a desktop computer's pauses leave at any speed; more is deep for a force nobody saw.
+        let unseen = self.number("unseen_mm", 0.02, 0.5);
+        unseen.map_or(RigDescription::UNSEEN_USUAL, Position)
     }
 
     /// A number within bounds that must be there.

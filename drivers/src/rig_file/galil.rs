@@ -28,6 +28,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let travel = fields.needed("travel_mm", 1.0, 10_000.0);
     let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
     let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
+    let unseen = fields.unseen();
     let motor_type = fields.choice(
         "motor_type",
         &[
@@ -83,6 +84,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             travel: Position(travel?),
             speed_max: MmPerS(speed_max?),
             acceleration: MmPerS2(acceleration),
+            unseen,
             motor_type: motor_type?,
             limits: limits?,
             home: home?,

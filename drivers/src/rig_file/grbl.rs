@@ -27,6 +27,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
     let travel = fields.needed("travel_mm", 1.0, 10_000.0);
     let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
     let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
+    let unseen = fields.unseen();
     let home = fields.choice(
         "home_switch",
         &[("limit", HomeSwitch::Limit), ("probe", HomeSwitch::Probe)],
@@ -51,6 +52,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             travel: Position(travel?),
             speed_max: MmPerS(speed_max?),
             acceleration: MmPerS2(acceleration?),
+            unseen,
             home: home?,
             is_closed_home: is_closed_home.unwrap_or(false),
             build_info,

@@ -1,5 +1,7 @@
 use super::*;
 use crate::galil::{AnalogRange, Sampling};
+use palpate_model::rig::RigDescription;
+use palpate_model::units::Position;
 
 const THESIS: &str = r#"# The slide of the source thesis
 device = "galil"
@@ -216,4 +218,18 @@ fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
         panic!("no parts");
     };
     assert!(settings.is_closed_home);
+}
+
+#[test]
+fn how_far_it_may_go_unseen_stands_in_the_file() {
+    let usual = galil("bench.toml", THESIS).1.unseen;
+    assert_eq!(usual, RigDescription::UNSEEN_USUAL);
+    let further = THESIS.to_owned() + "unseen_mm = 0.3\n";
+    assert_eq!(galil("bench.toml", &further).1.unseen, Position(0.3));
+    let told = mistakes(&(THESIS.to_owned() + "unseen_mm = 5\n"));
+    assert!(
+        told[0]
+            .1
+            .contains("unseen_mm: give a number from 0.02 to 0.5")
+    );
 }

@@ -274,5 +274,6 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         noise_expected: load_cell::noise_expected(settings),
         pulse_lag: palpate_model::units::Seconds(0.0),
         ticks_per_sample: 1.0,
+        unseen_max: RigDescription::UNSEEN_USUAL,
     }
 }

@@ -9,7 +9,7 @@ use palpate_drivers::galil::{
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
@@ -105,6 +105,7 @@ pub fn thesis() -> GalilSettings {
         travel: Position(150.0),
         speed_max: MmPerS(20.0),
         acceleration: MmPerS2(61.44),
+        unseen: RigDescription::UNSEEN_USUAL,
         motor_type: MotorType::ActiveLow,
         limits: Levels::ActiveLow,
         home: Levels::ActiveLow,

@@ -11,7 +11,7 @@ use palpate_drivers::parts::Track;
 use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
@@ -127,6 +127,7 @@ pub fn slide() -> GrblSettings {
         travel: Position(150.0),
         speed_max: MmPerS(20.0),
         acceleration: MmPerS2(60.0),
+        unseen: RigDescription::UNSEEN_USUAL,
         home: HomeSwitch::Limit,
         is_closed_home: false,
         build_info: None,

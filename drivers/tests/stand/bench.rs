@@ -9,7 +9,9 @@ use palpate_drivers::mark10::stand::{ConnectedStand, StandSession, StandSettings
 use palpate_drivers::text::DeviceError;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathError, PathTracker, Reading, RigCommand};
+use palpate_model::rig::{
+    AxisStatus, Fault, MoveTo, PathError, PathTracker, Reading, RigCommand, RigDescription,
+};
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position};
 use std::collections::VecDeque;
 use std::io::{self, ErrorKind};
@@ -125,6 +127,7 @@ pub fn usual() -> StandSettings {
         travel: Position(100.0),
         speed_max: MmPerS(10.0),
         acceleration: MmPerS2(50.0),
+        unseen: RigDescription::UNSEEN_USUAL,
         is_upwards: false,
         gauge: GaugeSettings {
             capacity: Newtons(25.0),

@@ -49,6 +49,17 @@ pub struct RigDescription {
     /// is asked for its samples over a link, or whose load cell is slower than its clock.
     #[serde(default = "one", skip_serializing_if = "is_one")]
     pub ticks_per_sample: f64,
+    /// How far the probe may go while no sample comes; from 0.02 to 0.5 mm.
+    #[serde(default = "usual_unseen", skip_serializing_if = "is_usual_unseen")]
+    pub unseen_max: Position,
+}
+
+const fn usual_unseen() -> Position {
+    RigDescription::UNSEEN_USUAL
+}
+
+fn is_usual_unseen(distance: &Position) -> bool {
+    *distance == RigDescription::UNSEEN_USUAL
 }
 
 const fn one() -> f64 {
@@ -64,6 +75,10 @@ fn is_zero(span: &Seconds) -> bool {
 }
 
 impl RigDescription {
+    /// How far a probe may usually go while no sample comes: into tissue that resists with 0.5 N/mm, more than that of the
+    /// thesis does at 20 mm, until 0.05 N more than was last seen.
+    pub const UNSEEN_USUAL: Position = Position(0.1);
+
     /// Length of one controller clock count.
     #[must_use]
     pub fn tick(&self) -> Seconds {

@@ -34,12 +34,12 @@ impl Limits {
     }
 
     /// Longest tolerated age of the newest sample at a speed: the time in which the probe moves
-    /// 0.1 mm, kept between 20 ms (two scheduler slices of a desktop host) and 250 ms. A rig whose samples come `apart`,
+    /// as far as it may `unseen`, kept between 20 ms (two scheduler slices of a desktop host) and 250 ms. A rig whose samples come `apart`,
     /// as those of a slow load cell, has that time beside the 20 ms: its newest sample is as old by itself.
     #[must_use]
-    pub fn sample_age_max(speed: MmPerS, apart: Seconds) -> Seconds {
+    pub fn sample_age_max(speed: MmPerS, unseen: Position, apart: Seconds) -> Seconds {
         let span = if speed.0.abs() > 0.0 {
-            0.1 / speed.0.abs()
+            unseen.0 / speed.0.abs()
         } else {
             f64::INFINITY
         };

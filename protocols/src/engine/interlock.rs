@@ -334,7 +334,7 @@ fn age_trip(state: &State, now: Nanos) -> Option<Trip> {
     let speed = state.derived.velocity.0.abs().max(commanded);
     let rig = &state.config.rig;
     let apart = Seconds((rig.ticks_per_sample - 1.0) * rig.tick().0);
-    let age_max = Limits::sample_age_max(MmPerS(speed), apart);
+    let age_max = Limits::sample_age_max(MmPerS(speed), rig.unseen_max, apart);
     if age <= age_max {
         return None;
     }

@@ -42,6 +42,7 @@ fn rig() -> RigDescription {
         noise_expected: Volts(0.001),
         pulse_lag: palpate_model::units::Seconds(0.0),
         ticks_per_sample: 1.0,
+        unseen_max: RigDescription::UNSEEN_USUAL,
     }
 }
 
@@ -315,16 +316,21 @@ fn silence_trips_by_the_speed() {
         Some(Interlock::SampleAge)
     );
     assert_eq!(
-        Limits::sample_age_max(MmPerS(0.75), Seconds(0.0)),
+        Limits::sample_age_max(MmPerS(0.75), Position(0.1), Seconds(0.0)),
         Seconds(0.1 / 0.75)
     );
     assert_eq!(
-        Limits::sample_age_max(MmPerS(20.0), Seconds(0.0)),
+        Limits::sample_age_max(MmPerS(20.0), Position(0.1), Seconds(0.0)),
         Seconds(0.020)
+    );
+    // A rig whose file lets it go further unseen.
+    assert_eq!(
+        Limits::sample_age_max(MmPerS(1.5), Position(0.3), Seconds(0.0)),
+        Seconds(0.3 / 1.5)
     );
     // Eighty samples a second, one in 12.5 ms.
     assert_eq!(
-        Limits::sample_age_max(MmPerS(20.0), Seconds(0.0125)),
+        Limits::sample_age_max(MmPerS(20.0), Position(0.1), Seconds(0.0125)),
         Seconds(0.0325)
     );
 }

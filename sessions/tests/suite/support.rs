@@ -80,6 +80,7 @@ pub fn manifest() -> Manifest {
             noise_expected: Volts(0.1 + 0.2),
             pulse_lag: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
+            unseen_max: RigDescription::UNSEEN_USUAL,
         }),
         limits: Some(Limits::for_travel(Position(149.999_999_999_999_97))),
         calibration: serde_json::json!({"slope_n_per_v": 3.591_234_567_890_123_4}),

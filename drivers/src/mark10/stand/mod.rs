@@ -49,6 +49,8 @@ pub struct StandSettings {
     pub speed_max: MmPerS,
     /// Acceleration of the commanded course; the stand's own is not known and cannot be set.
     pub acceleration: MmPerS2,
+    /// How far the probe may go while no sample comes.
+    pub unseen: Position,
     /// Whether up is into the tissue; down without.
     pub is_upwards: bool,
     /// The gauge on it. Its `per_second` does not matter: the stand is asked.
