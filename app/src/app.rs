@@ -6,7 +6,10 @@ use crate::plots::force_time::TimeView;
 use crate::screens::calibration::{CalibrationScreen, Facts};
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
+use crate::screens::library::LibraryScreen;
 use crate::screens::models::ModelsScreen;
+use crate::screens::review::ReviewScreen;
+use crate::screens::rig::RigScreen;
 use crate::screens::run_middle::{Chooser, Middle};
 use crate::screens::trade::TradeScreen;
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
@@ -62,6 +65,9 @@ pub struct WorkbenchApp {
     pub(crate) chooser: Chooser,
     pub(crate) time_view: TimeView,
     pub(crate) screen: Screen,
+    pub(crate) rig_screen: RigScreen,
+    pub(crate) catalog: LibraryScreen,
+    pub(crate) review: ReviewScreen,
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
     pub(crate) trade: TradeScreen,
@@ -128,6 +134,9 @@ impl WorkbenchApp {
             chooser: Chooser::default(),
             time_view: TimeView::default(),
             screen: Screen::default(),
+            rig_screen: RigScreen::default(),
+            catalog: LibraryScreen::new(curves_in.clone()),
+            review: ReviewScreen::new(curves_in.clone()),
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
             calibration,
@@ -255,7 +264,7 @@ impl WorkbenchApp {
                 Command::TakeProtocol(name) => self.take_protocol(name),
                 Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
                 Command::Work => match self.screen {
-                    Screen::Run => {}
+                    Screen::Rig | Screen::Run | Screen::Library | Screen::Review => {}
                     Screen::Models => self.models.start(ctx),
                     Screen::Trade => {
                         if self.measure_verdict().is_ok() {
@@ -266,11 +275,19 @@ impl WorkbenchApp {
                     Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
-                    Screen::Run | Screen::Calibration => {}
+                    Screen::Rig
+                    | Screen::Run
+                    | Screen::Calibration
+                    | Screen::Library
+                    | Screen::Review => {}
                     Screen::Models => self.models.cancel(),
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),
                 },
+                Command::Review(sessions) => {
+                    self.screen = Screen::Review;
+                    self.review.open(sessions, ctx);
+                }
                 Command::Show(screen) => self.screen = screen,
                 Command::SwitchTheme => theme::switch(ctx),
             }
@@ -410,10 +427,15 @@ impl eframe::App for WorkbenchApp {
                 };
             }
         }
+        self.catalog.poll(ctx);
+        self.review.poll(ctx);
         self.models.poll();
         self.extremes.poll();
         self.trade.poll();
         self.calibration.poll();
+        if self.screen == Screen::Library {
+            self.catalog.shown(ctx);
+        }
         if self.screen == Screen::Trade {
             self.trade.shown(ctx);
         }

@@ -4,9 +4,10 @@ use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
 use crate::workers::path_dialog::Ask;
+use std::path::PathBuf;
 
 /// One thing the user asked for.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Command {
     /// Start the plan in the form.
     Start,
@@ -42,6 +43,8 @@ pub enum Command {
     CancelWork,
     /// Change between the light and the dark theme.
     SwitchTheme,
+    /// Look at sessions on the review screen, instead of those there.
+    Review(Vec<PathBuf>),
     /// Show a screen. What goes on goes on, and the stop control stays.
     Show(Screen),
 }

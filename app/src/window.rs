@@ -174,12 +174,42 @@ impl WorkbenchApp {
             .frame(frame(ui, true))
             .show(ui, |ui| self.events.ui(ui, &self.snapshot, commands));
         match self.screen {
+            Screen::Rig => self.rig_screen_ui(ui, commands),
+            Screen::Library => self.library_ui(ui, commands),
+            Screen::Review => self.review_ui(ui, commands),
             Screen::Run => self.run_ui(ui, commands),
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
             Screen::Trade => self.trade_ui(ui, commands),
             Screen::Calibration => self.calibration_ui(ui, commands),
         }
+    }
+
+    fn rig_screen_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        side_ui(ui, Side::Left, |ui| {
+            rig_ui(ui, &self.snapshot, &self.ports, commands);
+        });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| {
+                self.rig_screen.middle_ui(ui, &self.snapshot, commands)
+            });
+    }
+
+    fn library_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        side_ui(ui, Side::Left, |ui| self.catalog.left_ui(ui, commands));
+        side_ui(ui, Side::Right, |ui| self.catalog.right_ui(ui, commands));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.catalog.middle_ui(ui, commands));
+    }
+
+    fn review_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        side_ui(ui, Side::Left, |ui| self.review.left_ui(ui, commands));
+        side_ui(ui, Side::Right, |ui| self.review.right_ui(ui, commands));
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.review.middle_ui(ui, commands));
     }
 
     fn trade_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {

@@ -37,7 +37,7 @@ fn screen(flow: &mut Flow, key: Key) {
 #[test]
 fn models_are_compared_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num2);
+    screen(&mut flow, Key::Num6);
     assert!(!flow.is_enabled("Compare models  F6"));
     assert!(flow.says("add a recording first"));
     for (name, speed) in [("slow.csv", 0.8), ("fast.csv", 4.0)] {
@@ -88,7 +88,7 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
     let mut flow = Flow::open(TimeScale::Factor(20.0));
     flow.click("Start  F5");
     flow.wait_for_phase(palpate_model::rig::Phase::Contact);
-    screen(&mut flow, Key::Num4);
+    screen(&mut flow, Key::Num8);
     assert!(flow.says("nothing tested yet"));
     flow.window.key_press(Key::F12);
     flow.wait("the axis at rest", |window| {
@@ -101,7 +101,7 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
 #[test]
 fn the_trade_is_measured_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num3);
+    screen(&mut flow, Key::Num7);
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
@@ -122,7 +122,7 @@ fn the_trade_is_measured_in_the_window() {
 #[test]
 fn the_extremes_are_tested_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num4);
+    screen(&mut flow, Key::Num8);
     flow.click("Test the extremes  F6");
     flow.wait("progress", |window| {
         window.state().extremes_rows().is_none()

@@ -9,49 +9,65 @@ pub const WIDTH: f32 = 100.0;
 /// What stands between the top bar and the event log.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Screen {
+    /// The rig: what it reports, and moving it by hand.
+    Rig,
+    /// Which calibrations there are and what they are worth.
+    Calibration,
     /// A protocol: rig, parameters, plots, what is known.
     #[default]
     Run,
+    /// Sessions found by what is known of them.
+    Library,
+    /// One session or several, as they were measured.
+    Review,
     /// Which model a recording needs.
     Models,
     /// What accuracy costs on this machine.
     Trade,
     /// What happens at the ends of every range.
     Extremes,
-    /// Which calibrations there are and what they are worth.
-    Calibration,
 }
 
 impl Screen {
     /// All, in the order of a day's work.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 8] = [
+        Self::Rig,
+        Self::Calibration,
         Self::Run,
+        Self::Library,
+        Self::Review,
         Self::Models,
         Self::Trade,
         Self::Extremes,
-        Self::Calibration,
     ];
 
     /// Name on the rail.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
+            Self::Rig => "Rig",
+            Self::Calibration => "Calibration",
             Self::Run => "Run",
+            Self::Library => "Library",
+            Self::Review => "Review",
             Self::Models => "Models",
             Self::Trade => "Trade",
             Self::Extremes => "Extremes",
-            Self::Calibration => "Calibration",
         }
     }
 
     /// What it is for, for the rail's hint.
-    const fn purpose(self) -> &'static str {
+    #[must_use]
+    pub const fn purpose(self) -> &'static str {
         match self {
+            Self::Rig => "what the rig reports, and moving it by hand",
+            Self::Calibration => "volts to newtons: which calibrations there are",
             Self::Run => "run a protocol and see what comes of it",
+            Self::Library => "find sessions",
+            Self::Review => "look at sessions: one closely, several beside each other",
             Self::Models => "how much model a recording needs",
             Self::Trade => "what accuracy costs on this machine",
             Self::Extremes => "what is right and what is refused at the ends of every range",
-            Self::Calibration => "volts to newtons: which calibrations there are",
         }
     }
 
@@ -59,11 +75,14 @@ impl Screen {
     #[must_use]
     pub const fn key(self) -> Key {
         match self {
-            Self::Run => Key::Num1,
-            Self::Models => Key::Num2,
-            Self::Trade => Key::Num3,
-            Self::Extremes => Key::Num4,
-            Self::Calibration => Key::Num5,
+            Self::Rig => Key::Num1,
+            Self::Calibration => Key::Num2,
+            Self::Run => Key::Num3,
+            Self::Library => Key::Num4,
+            Self::Review => Key::Num5,
+            Self::Models => Key::Num6,
+            Self::Trade => Key::Num7,
+            Self::Extremes => Key::Num8,
         }
     }
 }

@@ -56,3 +56,45 @@ impl PathDialog {
         self.0.poll().flatten()
     }
 }
+
+/// What a file is written as.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct SaveAs {
+    /// Head of the dialog.
+    pub title: &'static str,
+    /// Name that stands there.
+    pub name: String,
+    /// Ending without its dot.
+    pub ending: &'static str,
+}
+
+/// The dialog for a file to write, which may be open.
+#[derive(Debug, Default)]
+pub struct SaveDialog(Job<Option<PathBuf>>);
+
+impl SaveDialog {
+    /// Whether the dialog is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.0.is_busy()
+    }
+
+    /// Opens the dialog, unless it is open.
+    pub fn open(&mut self, wanted: SaveAs, ctx: &Context) -> std::io::Result<()> {
+        let ctx = ctx.clone();
+        let pick = move || {
+            rfd::FileDialog::new()
+                .set_title(wanted.title)
+                .set_file_name(wanted.name)
+                .add_filter(wanted.ending, &[wanted.ending])
+                .save_file()
+        };
+        self.0
+            .start("save-dialog", pick, move || ctx.request_repaint())
+    }
+
+    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
+    pub fn poll(&mut self) -> Option<PathBuf> {
+        self.0.poll().flatten()
+    }
+}
