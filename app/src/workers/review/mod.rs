@@ -1,6 +1,7 @@
 //! Sessions as the review screen shows them: read block by block on a thread of their own, shown as they come.
 
 mod facts;
+pub mod fit;
 mod read;
 
 pub use facts::{Event, Facts, Leader};
