@@ -40,6 +40,8 @@ pub enum Request {
     Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
     Operator(Operator),
+    /// Write something down in the run in progress.
+    Note(String),
     /// Connect the rig anew after its link was lost. Nothing moves, and it has to be zeroed again. Not while a run goes on.
     Reconnect,
     /// Stop motion and end the thread.
@@ -343,6 +345,7 @@ impl MainLoop {
                     self.is_homed = false;
                 }
             }
+            Request::Note(text) => self.feed(Input::Note { text }),
             Request::Reconnect if self.is_running() => {}
             Request::Reconnect => {
                 self.reading = None;
