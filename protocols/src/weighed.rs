@@ -2,6 +2,7 @@
 
 use crate::engine::Record;
 use palpate_model::calibration::{Direction, SeriesStep};
+use palpate_model::rig::Phase;
 use palpate_model::units::Volts;
 
 /// One reading.
@@ -50,7 +51,10 @@ impl Readings {
     pub fn record(&mut self, record: &Record) {
         match record {
             // Where the run went back, what was read from there on will be read again.
-            Record::PhaseStarted { step_index, .. } => {
+            Record::PhaseStarted {
+                phase: Phase::Prompt | Phase::Weigh,
+                step_index,
+            } => {
                 self.step_index = *step_index;
                 self.all.retain(|one| one.step_index < *step_index);
             }
@@ -94,7 +98,6 @@ impl Readings {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::rig::Phase;
     use palpate_model::units::Seconds;
 
     fn reading(step_index: usize, mass_g: f64, volts: f64) -> [Record; 2] {
@@ -135,5 +138,11 @@ mod tests {
             .map(|one| (one.mass_g(), one.volts().0))
             .collect();
         assert_eq!(found, [(0.0, 1.28), (140.0, 1.5), (240.0, 1.6)]);
+        // The end of the run is none of its steps.
+        records.push(Record::PhaseStarted {
+            phase: Phase::Stopped,
+            step_index: 5,
+        });
+        assert_eq!(Readings::of(&records).all().len(), 3);
     }
 }

@@ -4,6 +4,7 @@ use super::interlock::Interlock;
 use super::state::Drift;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
+use palpate_model::Nanos;
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
@@ -29,6 +30,11 @@ pub enum Input {
     Note {
         /// What, in their words.
         text: String,
+    },
+    /// The computer itself stood still so long, all its programs, and goes on: silence in it is not the rig's.
+    HostLate {
+        /// How long.
+        late: Nanos,
     },
     /// The live fit has a new answer. It enters only here, so a replay decides from the record.
     LiveFit(LiveEstimate),

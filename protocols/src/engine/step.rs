@@ -40,6 +40,7 @@ pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) 
         Input::Ack(ack) => on_ack(&mut cx, ack),
         Input::Fault(fault) => on_fault(&mut cx, &fault),
         Input::Operator { choice } => on_operator(&mut cx, choice),
+        Input::HostLate { late } => cx.state.watch.excuse(late),
         Input::Note { text } => cx.record(Record::Noted { text }),
         Input::LiveFit(estimate) => {
             cx.state.live = Some(estimate);
