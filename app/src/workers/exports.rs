@@ -194,6 +194,15 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &Progress)
         .iter()
         .map(|path| format!("{}: left out, its recovered copy is chosen too", name(path)))
         .collect();
+    if let Destination::Tables(_, folder) = to
+        && let Err(err) = std::fs::create_dir_all(folder)
+    {
+        let sentence = format!(
+            "{} cannot be made ({err}); nothing was written",
+            folder.display()
+        );
+        return Exported { sentence, remarks };
+    }
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {
         if progress.tell(done, of, &name(session)).is_break() {
