@@ -63,11 +63,6 @@ impl FilesPanel {
         }
     }
 
-    /// What came of the last export.
-    pub fn exported(&self) -> Option<&Result<Exported, String>> {
-        self.task.answer()
-    }
-
     fn verdict(&self, chosen: usize) -> Result<(), String> {
         if chosen == 0 {
             return Err("choose sessions first".into());

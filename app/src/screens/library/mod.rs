@@ -12,7 +12,6 @@ use crate::command::{Command, Commands};
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::standing_ui;
-use crate::workers::exports::Exported;
 use crate::workers::find::{Found, Search, Told, entries, search, told, update};
 use crate::workers::latest::Latest;
 use crate::workers::task::Task;
@@ -98,29 +97,9 @@ impl LibraryScreen {
         }
     }
 
-    /// How many sessions the last search found, and in how many seconds.
-    #[must_use]
-    pub fn found(&self) -> Option<(usize, f64)> {
-        let heading = self.heading.as_ref()?.as_ref().ok()?;
-        Some((heading.count, heading.seconds))
-    }
-
-    /// Searches answered so far.
-    #[must_use]
-    pub fn searches(&self) -> u64 {
-        self.searches
-    }
-
     /// Whether sessions are being read or searched.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
+    fn is_busy(&self) -> bool {
         self.search.is_busy() || self.is_update_wanted || self.update.standing().is_some()
-    }
-
-    /// What came of the last export.
-    #[must_use]
-    pub fn exported(&self) -> Option<&Result<Exported, String>> {
-        self.files.exported()
     }
 
     /// Called in every frame in which the screen is shown.
