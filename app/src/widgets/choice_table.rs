@@ -230,7 +230,11 @@ impl ChoiceTable<'_> {
         let (line, is_chosen) = ((self.line)(index), (self.is_chosen)(index));
         let (rect, _) = ui.allocate_exact_size(vec2(width, ROW), Sense::hover());
         // Not to be walked through by Tab: the table has the focus, and keys choose in it.
-        let row = ui.interact(rect, id.with(index), Sense::CLICK);
+        let in_sight = rect.intersect(ui.clip_rect());
+        if !in_sight.is_positive() {
+            return;
+        }
+        let row = ui.interact(in_sight, id.with(index), Sense::CLICK);
         row.widget_info(|| WidgetInfo::selected(Role::ListBoxOption, true, is_chosen, &line.name));
         if is_chosen {
             ui.painter().rect_filled(rect, 0.0, tokens.selection);

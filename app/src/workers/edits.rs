@@ -301,7 +301,10 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
 pub fn take_back(act: &Act, by: &str, progress: &Progress) -> Said {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
     let mut said = each("", &act.steps, progress, |step| &step.folder, one);
-    said.words = format!("taken back: {}", act.words);
+    said.words = match said.act {
+        Some(_) => act.words.clone(),
+        None => "nothing was written".into(),
+    };
     if let Some(opposite) = &mut said.act {
         opposite.words.clone_from(&act.words);
     }

@@ -6,6 +6,7 @@ pub mod exports;
 pub mod extremes;
 pub mod find;
 pub mod fit;
+pub mod imports;
 pub mod latest;
 pub mod path_dialog;
 pub mod player;

@@ -103,10 +103,10 @@ impl SearchForm {
             let text = RichText::new(err.to_string());
             ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
         }
-        self.specimen.ui(ui, "specimen", &choices.specimens);
-        self.operator.ui(ui, "operator", &choices.operators);
-        self.protocol.ui(ui, "protocol", &choices.protocols);
-        self.tag.ui(ui, "tag", &choices.tags);
+        self.specimen.ui(ui, "specimen is", &choices.specimens);
+        self.operator.ui(ui, "operator is", &choices.operators);
+        self.protocol.ui(ui, "protocol is", &choices.protocols);
+        self.tag.ui(ui, "tag is", &choices.tags);
         self.verdict.ui(ui, "verdict is", &words(&VERDICTS));
         self.review.ui(ui, "review is", &words(&REVIEWS));
         text_ui(ui, "from", "2026-03-05", &mut self.since);

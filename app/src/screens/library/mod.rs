@@ -4,6 +4,7 @@
 
 mod files;
 mod form;
+mod import;
 mod list;
 mod say;
 mod session;
@@ -18,6 +19,7 @@ use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, RichText, TextStyle, Ui, vec2};
 use files::FilesPanel;
 use form::SearchForm;
+use import::ImportPanel;
 use list::{List, Wanted};
 use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
 use say::{SayPanel, sentence};
@@ -67,6 +69,7 @@ pub struct LibraryScreen {
     list: List,
     say: SayPanel,
     files: FilesPanel,
+    import: ImportPanel,
     was_shown: bool,
     is_back: bool,
 }
@@ -92,6 +95,7 @@ impl LibraryScreen {
             list: List::default(),
             say: SayPanel::default(),
             files: FilesPanel::default(),
+            import: ImportPanel::default(),
             was_shown: false,
             is_back: true,
         }
@@ -137,9 +141,7 @@ impl LibraryScreen {
         {
             known.told = Some(told);
         }
-        if self.say.poll() {
-            self.is_update_wanted = true;
-        }
+        self.is_update_wanted |= self.say.poll() | self.import.poll();
         self.files.poll();
         self.poll_update(ctx);
         self.ask_for_more(ctx);
@@ -240,6 +242,11 @@ impl LibraryScreen {
         }
     }
 
+    /// Takes files of other programs that were dropped on the window, to be imported.
+    pub fn take_files(&mut self, files: &[PathBuf]) {
+        self.import.add(files);
+    }
+
     /// Draws what is searched for.
     pub fn left_ui(&mut self, ui: &mut Ui, _commands: &mut Commands) {
         let ctx = ui.ctx().clone();
@@ -272,6 +279,9 @@ impl LibraryScreen {
         }
         let chosen = self.chosen();
         self.files.ui(ui, &chosen);
+        if let Ok(library) = &self.library {
+            self.import.ui(ui, library);
+        }
         let is_new = match self.form.query() {
             Ok(query) => self.asked.as_ref() != Some(&query),
             // What is wrong is told beside its field; the list stays as it was.

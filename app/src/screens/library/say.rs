@@ -212,7 +212,12 @@ impl SayPanel {
         } else {
             match self.task.answer() {
                 Some(Ok(said)) => {
-                    sentence(ui, &said.words, false);
+                    let done = match self.doing {
+                        Doing::Undo if said.act.is_some() => "taken back: ",
+                        Doing::Redo if said.act.is_some() => "done again: ",
+                        _ => "",
+                    };
+                    sentence(ui, &format!("{done}{}", said.words), false);
                     said.failed.iter().for_each(|why| sentence(ui, why, true));
                 }
                 Some(Err(err)) => sentence(ui, err, true),
@@ -234,7 +239,7 @@ impl SayPanel {
                 break;
             }
         }
-        if self.undo.is_empty() && self.redo.is_empty() {
+        if self.undo.is_empty() && self.redo.is_empty() && self.task.answer().is_none() {
             let text = "Tags and verdicts given here can be taken back, by a record of their own; notes and reviews stay.";
             sentence(ui, text, false);
         }

@@ -106,7 +106,7 @@ pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, 
         [] => "none".to_owned(),
         tags => one_line(&tags.join(", ")),
     };
-    fact_ui(ui, "tags", tags);
+    fact_ui(ui, "tagged", tags);
     let analyses: Vec<String> = entry
         .analyses
         .iter()
@@ -134,7 +134,7 @@ fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
             for note in &told.notes {
                 fact_ui(
                     ui,
-                    "note",
+                    "noted",
                     format!("{} ({})", one_line(&note.reason), note.by),
                 );
             }
