@@ -257,6 +257,7 @@ fn edit_text(edit: &Edit) -> String {
     let at = edit.at.format("%Y-%m-%d %H:%M:%SZ");
     let what = match &edit.change {
         Change::Verdict { verdict } => verdict.to_string(),
+        Change::Note => "note".to_owned(),
         Change::Tags { add, remove } => {
             let added = add.iter().map(|tag| format!("+{tag}"));
             let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
