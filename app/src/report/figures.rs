@@ -88,9 +88,20 @@ pub struct Traces {
     /// Time of the first ramp and of the last contact before it, in s.
     ramp: Option<f64>,
     contact: Option<f64>,
+    /// Stretches whose forces do not count, in s.
+    left_out_s: Vec<[f64; 2]>,
 }
 
 impl Traces {
+    /// The same, stretches marked whose forces do not count.
+    #[must_use]
+    pub fn leaving_out(self, left_out_s: &[[f64; 2]]) -> Self {
+        Self {
+            left_out_s: left_out_s.to_vec(),
+            ..self
+        }
+    }
+
     /// The traces of a session within a window of time.
     #[must_use]
     pub fn of(name: &str, session: &Session, window: Window) -> Self {
@@ -153,6 +164,7 @@ impl Traces {
             samples: [within.len(), known],
             ramp: ramp.map(time),
             contact: contact.last().map(time),
+            left_out_s: Vec::new(),
         }
     }
 
@@ -239,6 +251,15 @@ pub fn force_time(traces: &Traces) -> Drawing {
         if right - left > LETTER * name.chars().count() as f64 {
             let ink = Ink::plain(LIGHT.text_quiet).anchored(Anchor::Middle);
             svg.text([0.5 * (left + right), TOP + 14.0], ink, name);
+        }
+    }
+    for [from, until] in &traces.left_out_s {
+        let [first, last] = traces.ends;
+        let [from, until] = [from.max(first), until.min(last)];
+        if from < until {
+            panel.shade(&mut svg, [from, until], LIGHT.notice_fill);
+            let place = [panel.at([from, 0.0])[0] + 3.0, BOTTOM - 6.0];
+            svg.text(place, Ink::plain(LIGHT.text), "left out");
         }
     }
     panel.axes(

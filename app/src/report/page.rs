@@ -40,6 +40,11 @@ impl Body {
         self.0 += &format!("<p>{}</p>\n", escape(text));
     }
 
+    /// A paragraph with this start tag, alone on its line.
+    pub fn opened(&mut self, start: &str, text: &str) {
+        self.0 += &format!("{start}{}</p>\n", escape(text));
+    }
+
     /// A paragraph that must be seen.
     pub fn strong(&mut self, text: &str) {
         self.0 += &format!("<p><strong>{}</strong></p>\n", escape(text));
