@@ -193,23 +193,64 @@ impl Figure {
     }
 }
 
-/// One figure of a session, of a stretch of it where it is over time or depth.
-pub fn figure(wanted: &Wanted, figure: Figure, window: Window) -> Result<Drawing, String> {
-    let opened = analysed::open(&wanted.session, wanted.analysis.as_deref());
-    let opened = opened.map_err(|err| err.to_string())?;
+/// One figure of a session, of a stretch of it where it is over time or depth; or why it cannot be drawn, though the
+/// session could be read.
+pub fn figure(
+    wanted: &Wanted,
+    figure: Figure,
+    window: Window,
+) -> Result<Result<Drawing, String>, SourceError> {
+    let opened = analysed::open(&wanted.session, wanted.analysis.as_deref())?;
     let (session, left_out_s) = (opened.edited.session, opened.left_out_s);
     let name = name_of(&wanted.session);
     let traces = || Traces::of(&name, &session, window).leaving_out(&left_out_s);
-    match figure {
+    Ok(match figure {
         Figure::ForceTime => Ok(super::figures::force_time(&traces())),
         Figure::ForceDepth => Ok(super::figures::force_depth(&traces())),
         Figure::Residual => fit(&name, session, &left_out_s).map(|part| part.figure),
         Figure::Calibration => {
-            let calibration = analysis::calibration_of(&session).map_err(|err| err.to_string())?;
-            let told = Told::of(&calibration).map_err(|err| err.to_string())?;
-            Ok(calibration_plot::drawing(&calibration, &told))
+            let calibration = analysis::calibration_of(&session)?;
+            match Told::of(&calibration) {
+                Ok(told) => Ok(calibration_plot::drawing(&calibration, &told)),
+                Err(err) => Err(err.to_string()),
+            }
+        }
+    })
+}
+
+/// What a figure is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Lines and text, at any size.
+    Svg,
+}
+
+impl Ending {
+    /// By the name of the file.
+    pub fn of(file: &Path) -> Result<Self, String> {
+        let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
+        match ending.as_deref().and_then(|ending| ending.to_str()) {
+            Some("svg") => Ok(Self::Svg),
+            _ => Err(format!(
+                "{} is no name of a figure; let it end in .svg",
+                file.display()
+            )),
         }
     }
+
+    /// The bytes of the file.
+    pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Svg => Ok(drawing.svg().into_bytes()),
+        }
+    }
+}
+
+/// When and with which version a page is made, in words.
+#[must_use]
+pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    format!("Made {} by palpate {version}", super::said::at(&now))
 }
 
 /// Nobody wants the report any more, or a session cannot be read.
