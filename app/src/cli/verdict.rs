@@ -3,6 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use crate::report::catalog::one_line;
+use crate::workers::analyses::login;
 use clap::Args;
 use palpate_model::units::Position;
 use palpate_protocols::edited::{self, Edited};
@@ -66,11 +67,7 @@ impl Why {
 
 /// The name given, or that of the login.
 pub(super) fn author(given: Option<&str>) -> String {
-    let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    given.map_or_else(
-        || login().unwrap_or_else(|_| "somebody".into()),
-        str::to_owned,
-    )
+    given.map_or_else(login, str::to_owned)
 }
 
 fn add(folder: &Path, edited: &Edited, edit: &Edit) -> Result<(), Failure> {

@@ -152,7 +152,7 @@ impl Traces {
         let ramp = session.rows.iter().position(|row| row.phase == Phase::Ramp);
         let found = contacts(&session.entries);
         let contact = found.iter().map(|one| one.after_sample as usize);
-        let contact =
+        let mut contact =
             contact.filter(|at| ramp.is_none_or(|ramp| *at <= ramp) && *at < session.rows.len());
         Self {
             name: name.to_owned(),
@@ -163,7 +163,7 @@ impl Traces {
             limit: session.manifest.limits.map(|limits| limits.force_max),
             samples: [within.len(), known],
             ramp: ramp.map(time),
-            contact: contact.last().map(time),
+            contact: contact.next_back().map(time),
             left_out_s: Vec::new(),
         }
     }

@@ -326,6 +326,10 @@ fn figures_are_drawn_and_wrong_use_is_told() {
         );
         assert!(svg.contains("<title>") && !svg.contains("NaN"), "{of}");
     }
+    let png = ["report", "press", "--figure", "figure.png"];
+    succeeded(&palpate(at, &png));
+    let pixels = fs::read(at.join("figure.png")).unwrap();
+    assert!(pixels.starts_with(b"\x89PNG\r\n\x1a\n") && pixels.len() > 10_000);
     let part = [
         "report", "press", "--figure", "part.svg", "--from", "70", "--until", "71",
     ];

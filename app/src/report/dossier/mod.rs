@@ -223,6 +223,8 @@ pub fn figure(
 pub enum Ending {
     /// Lines and text, at any size.
     Svg,
+    /// Pixels.
+    Png,
 }
 
 impl Ending {
@@ -231,8 +233,9 @@ impl Ending {
         let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
         match ending.as_deref().and_then(|ending| ending.to_str()) {
             Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
             _ => Err(format!(
-                "{} is no name of a figure; let it end in .svg",
+                "{} is no name of a figure; let it end in .svg or .png",
                 file.display()
             )),
         }
@@ -242,6 +245,7 @@ impl Ending {
     pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
         match self {
             Self::Svg => Ok(drawing.svg().into_bytes()),
+            Self::Png => super::raster::png(drawing).map_err(|err| err.to_string()),
         }
     }
 }

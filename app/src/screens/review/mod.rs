@@ -1,6 +1,6 @@
 //! The review screen: one session closely, several beside each other.
 
-mod analyses;
+pub mod analyses;
 
 use crate::command::Commands;
 use analyses::AnalysesPanel;
@@ -55,6 +55,7 @@ impl ReviewScreen {
 
     /// Draws what is known of the session in front, and what can be made of it.
     pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        self.analyses.set_shown(&self.sessions);
         if let Some(front) = self.sessions.first_mut() {
             self.analyses.ui(ui, front, commands);
         }
