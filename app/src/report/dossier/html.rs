@@ -9,7 +9,7 @@ use super::{FitPart, Subject};
 use crate::report::figures::Align;
 use crate::widgets::uncertain::{error_alone, interval};
 use palpate_model::fit::Parameter;
-use palpate_protocols::engine::Effect;
+use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::fidelity::{Achieved, Fidelity};
 use palpate_sessions::analyses::Analysed;
 use palpate_sessions::record::EntryKind;
@@ -291,29 +291,38 @@ fn fidelity(body: &mut Body, found: &Fidelity) {
 }
 
 fn events(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "Events");
     let entries = subject.entries.iter();
-    let told = entries.filter(|entry| entry.kind == EntryKind::Decision);
-    let told = told.filter_map(|entry| {
+    let decided = entries.filter(|entry| entry.kind == EntryKind::Decision);
+    let records = decided.filter_map(|entry| {
         let Ok(Effect::Record(record)) = serde_json::from_value(entry.body.clone()) else {
             return None;
         };
-        Some(vec![
-            format!("{:.3}", entry.now.seconds().0),
-            record.to_string(),
-        ])
+        Some((format!("{:.3}", entry.now.seconds().0), record))
     });
-    let mut rows: Vec<Vec<String>> = told.collect();
+    let (notes, others): (Vec<_>, Vec<_>) =
+        records.partition(|(_, record)| matches!(record, Record::Noted { .. }));
+    let row = |(at, record): (String, Record)| {
+        let text = match record {
+            Record::Noted { text } => text,
+            other => other.to_string(),
+        };
+        vec![at, text]
+    };
+    if !notes.is_empty() {
+        body.heading(level, "Notes of the run");
+        let rows: Vec<Vec<String>> = notes.into_iter().map(row).collect();
+        let heads = ["session time (s)", "note"];
+        body.table("Written down while it ran", &heads, &rows);
+    }
+    body.heading(level, "Events");
+    let mut rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
     let left = rows.len().saturating_sub(EVENTS_MAX);
     rows.truncate(EVENTS_MAX);
     if rows.is_empty() {
         body.paragraph("None were recorded.");
     } else {
-        body.table(
-            "What was decided in the run",
-            &["session time (s)", "what"],
-            &rows,
-        );
+        let heads = ["session time (s)", "what"];
+        body.table("What was decided in the run", &heads, &rows);
     }
     if left > 0 {
         body.paragraph(&format!("{left} more are in the log."));
