@@ -376,3 +376,48 @@ fn figures_are_drawn_and_wrong_use_is_told() {
         assert!(!at.join("p.html").exists() && !at.join("a.svg").exists());
     }
 }
+
+#[test]
+fn an_imported_session_has_a_page_that_says_what_is_not_known() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let row = |i: u32| {
+        let t = 0.1 * f64::from(i);
+        let depth = t.min(5.0);
+        let force = 0.2 * depth * (1.0 + (-(t - 5.0).max(0.0) / 3.0).exp());
+        format!("{t},{depth},{force}\n")
+    };
+    let table =
+        "time (s),depth (mm),force (N)\n".to_owned() + &(0..200).map(row).collect::<String>();
+    fs::write(at.join("gel <3>.csv"), table).unwrap();
+    succeeded(&palpate(at, &["import", "gel <3>.csv", "--into", "in"]));
+    let session = fs::read_dir(at.join("in"))
+        .unwrap()
+        .next()
+        .unwrap()
+        .unwrap()
+        .path();
+    let session = session.display().to_string();
+    succeeded(&palpate(at, &["report", &session, "--html", "page.html"]));
+    let texts = strict(&fs::read_to_string(at.join("page.html")).unwrap()).join("\n");
+    for words in [
+        "imported from",
+        "its forces are those of its file",
+        "tau_eps",
+        "no plan and no decisions",
+    ] {
+        assert!(texts.contains(words), "no '{words}'");
+    }
+    let refused = palpate(
+        at,
+        &[
+            "report",
+            &session,
+            "--figure",
+            "c.svg",
+            "--of",
+            "calibration",
+        ],
+    );
+    assert_eq!(refused.status.code(), Some(1), "{}", stderr(&refused));
+}

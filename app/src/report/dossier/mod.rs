@@ -15,7 +15,7 @@ use super::picture;
 use super::svg::Drawing;
 use crate::workers::fit::Fitted;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
-use palpate_model::fit::{FitOptions, FitReport, Systematic};
+use palpate_model::fit::{FitOptions, FitReport};
 use palpate_protocols::analysed::{self, Opened};
 use palpate_protocols::analysis::{self, SourceError, Stretch};
 use palpate_protocols::base::FoundBase;
@@ -150,10 +150,9 @@ fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart,
     let report = fitted.result.map_err(|err| err.to_string())?;
     let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
     let uncertainty = uncertainty.and_then(Result::ok);
-    let systematic = fitted.systematic.iter().map(Systematic::sentence);
     Ok(FitPart {
         figure: picture::of_fit(name, &fitted.samples, &report, uncertainty.as_ref()),
-        remarks: systematic.chain(fitted.notes).collect(),
+        remarks: fitted.notes,
         report,
     })
 }
