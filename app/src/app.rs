@@ -18,10 +18,11 @@ use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progre
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
-use crate::shell::palette::Palette;
+use crate::shell::palette::{Action, Palette};
 use crate::shell::rail::Screen;
 use crate::shell::tour::Tour;
 use crate::theme;
+use crate::widgets::places::places;
 use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
@@ -329,6 +330,7 @@ impl WorkbenchApp {
                     };
                     ctx.set_zoom_factor(zoom.clamp(*ZOOM.start(), *ZOOM.end()));
                 }
+                Command::Focus(id) => ctx.memory_mut(|memory| memory.request_focus(id)),
                 Command::Palette => self.palette.toggle(),
                 Command::TourStart => {
                     self.tour.start();
@@ -612,7 +614,12 @@ impl eframe::App for WorkbenchApp {
         let activity = activity(&self.snapshot, self.intent());
         self.draw(ui, &activity, &mut commands);
         if self.palette.is_open() {
-            let actions = self.actions();
+            let mut actions = self.actions();
+            actions.extend(
+                places(ui.ctx())
+                    .into_iter()
+                    .map(|(name, id)| Action::new(format!("Go to {name}"), "", Command::Focus(id))),
+            );
             self.palette.ui(ui, &actions, &mut commands);
         }
         if !std::mem::replace(&mut self.are_fonts_warm, true) {

@@ -4,6 +4,7 @@ use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
 use crate::workers::path_dialog::Ask;
+use eframe::egui::Id;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
@@ -54,6 +55,8 @@ pub enum Command {
     Review(Vec<PathBuf>),
     /// Make text and everything else larger or smaller.
     TextSize(TextSize),
+    /// Put the keyboard's focus on something.
+    Focus(Id),
     /// Open or close the list of everything that can be asked for.
     Palette,
     /// Begin the tour of the window.

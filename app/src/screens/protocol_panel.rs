@@ -6,6 +6,7 @@ use super::run_middle::Middle;
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::workers::path_dialog::Ask;
@@ -104,7 +105,11 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
             } else {
                 input
             };
-            let input = ui.add(input).labelled_by(label.id).on_hover_text(&hint);
+            let input = ui
+                .add(input)
+                .labelled_by(label.id)
+                .place(&field.parameter.name)
+                .on_hover_text(&hint);
             if !is_wide {
                 ui.label(RichText::new(field.unit_beside()).color(tokens.text_quiet));
             }
@@ -159,6 +164,7 @@ fn one_told_ui(ui: &mut Ui, field: &mut ToldField) {
         };
         ui.add(input)
             .labelled_by(label.id)
+            .place(field.key.name)
             .on_hover_text(field.key.meaning);
     });
     if let Some(reason) = &field.error {
@@ -183,7 +189,7 @@ fn folder_ui(
             .desired_width(width)
             .char_limit(4096)
             .hint_text(hint.to_owned());
-        ui.add(input).labelled_by(label.id);
+        ui.add(input).labelled_by(label.id).place("sessions in");
         let button = Button::new("Choose...");
         if ui.add_enabled(!facts.is_dialog_open, button).clicked() {
             commands.push(Command::Choose(Ask::NewSessions));

@@ -5,6 +5,7 @@ use super::protocol_panel::ProtocolFacts;
 use crate::command::{Command, Commands};
 use crate::plots::course::course_ui;
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::workers::Job;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
@@ -182,7 +183,7 @@ impl Chooser {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("a TOML file");
-            ui.add(input).labelled_by(label.id);
+            ui.add(input).labelled_by(label.id).place("protocol file");
             let can_open = !self.typed.trim().is_empty() && !self.reading.is_busy();
             if ui.add_enabled(can_open, Button::new("Open")).clicked() {
                 commands.push(Command::OpenProtocol);

@@ -6,6 +6,7 @@ use super::rail::Screen;
 use super::run_strip::Wish;
 use crate::app::WorkbenchApp;
 use crate::command::{Aside, Command, TextSize};
+use crate::screens::calibration::can_keep;
 use crate::screens::run_middle::{Middle, is_offered};
 use crate::workers::path_dialog::Ask;
 use palpate_protocols::file::BUILT_IN;
@@ -81,9 +82,19 @@ impl WorkbenchApp {
             actions
                 .push(Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone()));
         }
+        let is_on_tour = match self.tour.is_on() {
+            true => Ok(()),
+            false => Err("no tour is under way".to_owned()),
+        };
         actions.extend([
             Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)),
             Action::new("Measure a calibration", "", Command::MeasureCalibration).if_ok(is_free),
+            Action::new(
+                "Keep the calibration that was measured",
+                "",
+                Command::KeepCalibration,
+            )
+            .if_ok(can_keep(self.snapshot.run.as_ref()).map(|_| ())),
             Action::new("Light or dark screen", "", Command::SwitchTheme),
             Action::new("Larger text", "Ctrl++", Command::TextSize(TextSize::Larger)),
             Action::new(
@@ -97,6 +108,7 @@ impl WorkbenchApp {
                 Command::TextSize(TextSize::Usual),
             ),
             Action::new("Take the tour", "", Command::TourStart),
+            Action::new("End the tour", "", Command::TourEnd).if_ok(is_on_tour),
             Action::new("This list", "Ctrl+K, F1", Command::Palette),
         ]);
         actions

@@ -2,6 +2,7 @@
 
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
 use palpate_protocols::runner::{LogLine, Snapshot};
 
@@ -61,7 +62,8 @@ impl EventLog {
                     .desired_width(160.0)
                     .char_limit(100),
             )
-            .labelled_by(label.id);
+            .labelled_by(label.id)
+            .place("filter of the events");
             if ui.button("Copy").clicked() {
                 let lines: Vec<String> = shown.iter().map(|line| line_text(line)).collect();
                 ui.ctx().copy_text(lines.join("\n"));

@@ -3,6 +3,7 @@
 
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::widgets::uncertain::clock;
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
@@ -125,7 +126,7 @@ fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
         .desired_width(180.0)
         .char_limit(NOTE_MAX);
     // Drawn from the right, so the label comes after its field.
-    let input = ui.add(input);
+    let input = ui.add(input).place("note");
     let label = ui.label("note");
     let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
     input.labelled_by(label.id);

@@ -4,6 +4,7 @@ pub mod choice_box;
 pub mod choice_table;
 pub mod fact_row;
 pub mod mark;
+pub mod places;
 pub mod quantity_input;
 pub mod reason_button;
 pub mod state_badge;

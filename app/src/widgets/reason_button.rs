@@ -1,5 +1,6 @@
 //! A button that, when it cannot be pressed, says why in words beside it.
 
+use super::places::Place;
 use crate::theme::Tokens;
 use eframe::egui::{Button, Label, RichText, Ui, Vec2};
 
@@ -13,6 +14,7 @@ pub fn reason_button(
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let is_pressed = ui
         .add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size))
+        .place(text)
         .clicked();
     if let Err(reason) = verdict {
         let reason = RichText::new(reason).color(tokens.text_quiet).small();

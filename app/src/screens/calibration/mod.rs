@@ -7,6 +7,7 @@ use crate::command::{Command, Commands};
 use crate::report::calibration::Entry;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::workers::Job;
@@ -187,7 +188,7 @@ impl CalibrationScreen {
             let input = TextEdit::singleline(&mut self.name)
                 .desired_width(ui.available_width() - 10.0)
                 .char_limit(80);
-            ui.add(input).labelled_by(label.id);
+            ui.add(input).labelled_by(label.id).place("name");
         });
         let verdict = match (can_keep(facts.run), self.name.trim().is_empty()) {
             (Err(reason), _) => Err(reason),

@@ -1,0 +1,146 @@
+//! A picture of every screen in light and dark, drawn without a graphics card and compared with the one that is kept.
+//!
+//! Where no software renderer (Mesa's lavapipe) is installed they are left out, and say so. After a change that is meant,
+//! `UPDATE_SNAPSHOTS=true cargo test --workspace --test gui_pictures` keeps the new ones; look at them before.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
+use egui_kittest::{Harness, SnapshotOptions, SnapshotResults};
+use palpate_app::app::WorkbenchApp;
+use palpate_app::shell::rail::Screen;
+use palpate_app::window::WindowOptions;
+use palpate_drivers::sim::{SimProfile, SimSettings};
+use palpate_protocols::runner::TimeScale;
+use palpate_tests::workspace;
+use std::path::{Path, PathBuf};
+use std::time::Duration;
+
+type Window = Harness<'static, WorkbenchApp>;
+
+/// Whether a software renderer is there.
+fn has_renderer() -> bool {
+    let folders = ["/usr/share/vulkan/icd.d", "/etc/vulkan/icd.d"];
+    let mut files = folders
+        .iter()
+        .flat_map(std::fs::read_dir)
+        .flatten()
+        .flatten();
+    files.any(|file| file.file_name().to_string_lossy().starts_with("lvp"))
+}
+
+/// A folder with the same name on every computer, for it stands in pictures; with the recorded sessions in it.
+fn library() -> PathBuf {
+    let folder = Path::new("/tmp/palpate-pictures").to_owned();
+    let _ = std::fs::remove_dir_all(&folder);
+    for name in ["ramp-hold-lab", "every-motion", "over-force-galil"] {
+        let to = folder.join(name);
+        std::fs::create_dir_all(&to).unwrap();
+        for item in std::fs::read_dir(workspace().join("tests/sessions").join(name)).unwrap() {
+            let item = item.unwrap();
+            std::fs::copy(item.path(), to.join(item.file_name())).unwrap();
+        }
+    }
+    std::fs::create_dir_all(folder.join("trade")).unwrap();
+    folder
+}
+
+fn open(library: &Path) -> Window {
+    // Without noise the numbers stand still.
+    let settings = SimSettings {
+        seed: 7,
+        profile: SimProfile::Ideal,
+        noise: "0".parse().unwrap(),
+        ..SimSettings::default()
+    };
+    let mut options = WindowOptions::open("sim", &settings, TimeScale::Max).unwrap();
+    options.sessions = Some(library.to_owned());
+    Harness::builder()
+        .with_size((1360.0, 820.0))
+        .wgpu()
+        .build_eframe(|cc| WorkbenchApp::new(options, &cc.egui_ctx).unwrap())
+}
+
+/// Lets threads answer until nothing on the screen waits.
+fn settle(window: &mut Window) {
+    for _ in 0..2000 {
+        window.step();
+        let waits = [
+            "still reading",
+            "waits to be read",
+            "looking for",
+            "reading the library",
+            "searching",
+        ];
+        let is_waiting = waits
+            .iter()
+            .any(|words| window.query_all_by_label_contains(words).next().is_some());
+        if !is_waiting && window.state().snapshot().rig.reading.is_some() {
+            // What came last is drawn, and what it made wide has its width.
+            window.run_steps(5);
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("the screen never settled");
+}
+
+/// Shows a session on the review screen, unless it is there.
+fn show(window: &mut Window, session: &Path) {
+    if window.query_by_label("no session is shown").is_none() {
+        return;
+    }
+    let path = session.display().to_string();
+    window.get_by_label("session").focus();
+    window.step();
+    window
+        .get_by_label("session")
+        .set_text_value_accesskit(&path);
+    window.run_steps(2);
+    window.get_by_label("Show besides").click_accesskit();
+    window.run_steps(3);
+}
+
+#[test]
+fn every_screen_looks_as_it_did() {
+    if !has_renderer() {
+        println!("skipped: no software renderer (mesa-vulkan-drivers) is installed");
+        return;
+    }
+    let library = library();
+    let mut window = open(&library);
+    let mut results = SnapshotResults::new();
+    // Other versions of the renderer place some pixels otherwise: fewer than a letter has.
+    let options = SnapshotOptions::new()
+        .output_path(workspace().join("tests/pictures"))
+        .failed_pixel_count_threshold(40);
+    settle(&mut window);
+    if window.query_by_label("none on this computer").is_none() {
+        println!("skipped: the serial ports of this computer would be in the pictures");
+        return;
+    }
+    for theme in ["light", "dark"] {
+        for screen in Screen::ALL {
+            window.key_press_modifiers(Modifiers::COMMAND, screen.key());
+            window.run_steps(3);
+            if screen == Screen::Review {
+                show(&mut window, &library.join("ramp-hold-lab"));
+            }
+            settle(&mut window);
+            let name = format!("{}-{theme}", screen.name().to_lowercase());
+            results.add(window.try_snapshot_options(name, &options));
+        }
+        window.key_press(Key::F1);
+        settle(&mut window);
+        results.add(window.try_snapshot_options(format!("palette-{theme}"), &options));
+        window.key_press(Key::F1);
+        window.run_steps(2);
+        let name = if theme == "light" {
+            "Dark screen"
+        } else {
+            "Light screen"
+        };
+        window.get_by_label(name).click_accesskit();
+        window.run_steps(3);
+    }
+}
