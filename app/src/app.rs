@@ -115,7 +115,7 @@ impl WorkbenchApp {
             wake.request_repaint_after(FRAME_IDLE);
         })
         .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
-        let mut ports = Ports::default();
+        let mut ports = Ports::new(options.list_ports);
         ports.refresh(ctx);
         let curves_in = match &options.sessions {
             Some(folder) => Ok(folder.clone()),
@@ -291,8 +291,14 @@ impl WorkbenchApp {
                     self.screen = Screen::Calibration;
                     self.calibration.keep(self.snapshot.run.as_ref(), ctx);
                 }
-                Command::View(view) => self.middle = view,
-                Command::TakeProtocol(name) => self.take_protocol(name),
+                Command::View(view) => {
+                    self.screen = Screen::Run;
+                    self.middle = view;
+                }
+                Command::TakeProtocol(name) => {
+                    self.screen = Screen::Run;
+                    self.take_protocol(name);
+                }
                 Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
                 Command::Work => match self.screen {
                     Screen::Rig | Screen::Run | Screen::Library | Screen::Review => {}

@@ -19,11 +19,13 @@ use crate::shell::run_strip::{is_controllable, run_strip_ui};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use crate::workers::fit::Refit;
+use crate::workers::ports::ListPorts;
 use eframe::egui::{
     CentralPanel, Context, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder,
     ViewportCommand, vec2,
 };
 use palpate_drivers::Rig;
+use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
@@ -54,6 +56,8 @@ pub struct WindowOptions {
     pub scale: TimeScale,
     /// Folder for new sessions; the library if none.
     pub sessions: Option<PathBuf>,
+    /// Lists the serial ports of this computer.
+    pub list_ports: ListPorts,
     /// File in which the window remembers how it looked; nothing is remembered without one.
     pub settings: Option<PathBuf>,
 }
@@ -70,6 +74,7 @@ impl WindowOptions {
             to_acknowledge: Vec::new(),
             scale,
             sessions: None,
+            list_ports,
             settings: None,
         })
     }

@@ -283,6 +283,7 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
         to_acknowledge: gate.to_acknowledge(),
         scale,
         sessions: None,
+        list_ports: palpate_drivers::serial::list_ports,
         settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
     })
     .map_err(Failure::Failed)

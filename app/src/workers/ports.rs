@@ -2,22 +2,36 @@
 
 use super::Job;
 use eframe::egui::Context;
-use palpate_drivers::serial::{PortInfo, SerialError, list_ports};
+use palpate_drivers::serial::{PortInfo, SerialError};
+
+/// Lists ports: those of this computer, or in a test those that it wants.
+pub type ListPorts = fn() -> Result<Vec<PortInfo>, SerialError>;
 
 /// The serial ports found, and whether a listing is under way.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Ports {
+    list: ListPorts,
     job: Job<Result<Vec<PortInfo>, SerialError>>,
     found: Option<Result<Vec<PortInfo>, String>>,
 }
 
 impl Ports {
+    /// None is known yet.
+    #[must_use]
+    pub fn new(list: ListPorts) -> Self {
+        Self {
+            list,
+            job: Job::default(),
+            found: None,
+        }
+    }
+
     /// Lists the ports anew.
     pub fn refresh(&mut self, ctx: &Context) {
         let ctx = ctx.clone();
         let started = self
             .job
-            .start("serial-ports", list_ports, move || ctx.request_repaint());
+            .start("serial-ports", self.list, move || ctx.request_repaint());
         if let Err(err) = started {
             self.found = Some(Err(format!("the serial ports cannot be listed: {err}")));
         }
