@@ -135,7 +135,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     flow.click("Over time");
     flow.click("Residuals of the fit");
     flow.click("Parameters");
-    let tau = format!("{:.3}", report.value("tau_eps").unwrap());
+    let tau = palpate_app::report::text::cell(report.parameter("tau_eps").unwrap());
     assert!(flow.says("tau_eps (s)") && flow.says(&tau), "{tau}");
     flow.window.check_accessibility();
     flow.click("Prediction");
