@@ -5,7 +5,9 @@
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
-use eframe::egui::{Context, Event, Modifiers, MouseWheelUnit, RawInput, Rect, TouchPhase, Ui};
+use eframe::egui::{
+    Context, Event, Id, Modifiers, MouseWheelSource, MouseWheelUnit, RawInput, Rect, TouchPhase, Ui,
+};
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
 use palpate_app::command::Commands;
@@ -165,6 +167,7 @@ impl Bench {
                         unit: MouseWheelUnit::Point,
                         delta: vec2(0.0, if number < FRAMES / 2 { 12.0 } else { -12.0 }),
                         phase: TouchPhase::Move,
+                        source: MouseWheelSource::Wheel,
                         modifiers: Modifiers::NONE,
                     }
                 } else {
@@ -184,7 +187,7 @@ fn plain(ui: &mut Ui, all: &[[Vec<PlotPoint>; 3]]) {
     let height = ui.available_height() / 3.0;
     for number in 0..3 {
         let plot = Plot::new(("plain", number)).height(height);
-        plot.link_axis("plain".into(), [true, false])
+        plot.link_axis(Id::unique("plain"), [true, false])
             .show(ui, |plot_ui| {
                 for (session, columns) in all.iter().enumerate() {
                     let points = PlotPoints::Borrowed(&columns[number]);
@@ -199,7 +202,7 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     let mut bench = Bench::new();
     let mut screen = ReviewScreen::new(Err("no library".into()));
     let start = Instant::now();
-    let mut draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
+    let draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
         screen.poll(&ui.ctx().clone());
         screen.middle_ui(ui, &mut Commands::default());
     };
