@@ -98,9 +98,10 @@ pub struct ReviewScreen {
     prediction: Task<Prediction>,
     prediction_of: Option<[String; 2]>,
     prediction_lines: [crate::plots::stretches::Stretches; 2],
+    cycle_rows: cycles::CycleRows,
     path: String,
     next_id: u64,
-    /// Raised where the time axis of a plot is other than it was.
+    /// The most samples that share a lowest and a highest one in the plots over time.
     thinned: usize,
 }
 
@@ -126,6 +127,7 @@ impl ReviewScreen {
             prediction: Task::default(),
             prediction_of: None,
             prediction_lines: Default::default(),
+            cycle_rows: cycles::CycleRows::default(),
             path: String::new(),
             next_id: 0,
             thinned: 1,
