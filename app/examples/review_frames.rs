@@ -11,7 +11,7 @@ use eframe::egui::{
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
 use palpate_app::command::Commands;
-use palpate_app::screens::review::ReviewScreen;
+use palpate_app::screens::review::{ReviewScreen, View};
 use palpate_app::shell::frame_meter::thread_cpu_s;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
@@ -238,6 +238,22 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     };
     tell("moved", bench.frames(false, |ui| draw(&mut screen, ui)));
     tell("zoomed", bench.frames(true, |ui| draw(&mut screen, ui)));
+    screen.show(View::OverDepth);
+    let start = Instant::now();
+    bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    while !screen.is_settled() {
+        std::thread::sleep(Duration::from_millis(4));
+        bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    }
+    println!(
+        "loops over depth found after {:.2} s",
+        start.elapsed().as_secs_f64()
+    );
+    tell(
+        "over depth, moved",
+        bench.frames(false, |ui| draw(&mut screen, ui)),
+    );
     drop(screen);
     // Twice as many points as fit into memory help nobody: the same samples, made again.
     let points: Vec<[Vec<PlotPoint>; 3]> = (0..sessions.len())

@@ -203,11 +203,11 @@ impl ReviewScreen {
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let sources: Vec<Source> = self
+        let sources: Vec<Source<'_>> = self
             .subjects
             .iter()
             .map(|subject| Source {
-                track: subject.recording.track.clone(),
+                track: &subject.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
                 // While it is read the lines are found again for every fifth of it, not for every piece.
                 version: match subject.is_settled() {

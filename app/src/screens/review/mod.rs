@@ -164,6 +164,19 @@ impl ReviewScreen {
         self.poll(ctx);
     }
 
+    /// Shows another view of them.
+    pub fn show(&mut self, view: View) {
+        self.view = view;
+    }
+
+    /// Whether nothing is being read, fitted or looked for.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        let is_working = self.fits.standing().is_some() || self.prediction.standing().is_some();
+        let is_read = self.subjects.iter().all(Subject::is_settled);
+        is_read && !is_working && !self.depth_lines.is_busy()
+    }
+
     /// Fetches what threads have answered.
     pub fn poll(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
