@@ -1,8 +1,14 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
+pub mod analyses;
 pub mod calibrations;
+pub mod edits;
+pub mod exports;
 pub mod extremes;
+pub mod find;
 pub mod fit;
+pub mod imports;
+pub mod latest;
 pub mod path_dialog;
 pub mod player;
 pub mod pool;
