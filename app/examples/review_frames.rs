@@ -5,11 +5,13 @@
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
-use eframe::egui::{Context, Event, Modifiers, MouseWheelUnit, RawInput, Rect, TouchPhase, Ui};
+use eframe::egui::{
+    Context, Event, Id, Modifiers, MouseWheelSource, MouseWheelUnit, RawInput, Rect, TouchPhase, Ui,
+};
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
 use palpate_app::command::Commands;
-use palpate_app::screens::review::ReviewScreen;
+use palpate_app::screens::review::{ReviewScreen, View};
 use palpate_app::shell::frame_meter::thread_cpu_s;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
@@ -165,6 +167,7 @@ impl Bench {
                         unit: MouseWheelUnit::Point,
                         delta: vec2(0.0, if number < FRAMES / 2 { 12.0 } else { -12.0 }),
                         phase: TouchPhase::Move,
+                        source: MouseWheelSource::Wheel,
                         modifiers: Modifiers::NONE,
                     }
                 } else {
@@ -184,7 +187,7 @@ fn plain(ui: &mut Ui, all: &[[Vec<PlotPoint>; 3]]) {
     let height = ui.available_height() / 3.0;
     for number in 0..3 {
         let plot = Plot::new(("plain", number)).height(height);
-        plot.link_axis("plain".into(), [true, false])
+        plot.link_axis(Id::unique("plain"), [true, false])
             .show(ui, |plot_ui| {
                 for (session, columns) in all.iter().enumerate() {
                     let points = PlotPoints::Borrowed(&columns[number]);
@@ -199,7 +202,7 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     let mut bench = Bench::new();
     let mut screen = ReviewScreen::new(Err("no library".into()));
     let start = Instant::now();
-    let mut draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
+    let draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
         screen.poll(&ui.ctx().clone());
         screen.middle_ui(ui, &mut Commands::default());
     };
@@ -235,6 +238,22 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     };
     tell("moved", bench.frames(false, |ui| draw(&mut screen, ui)));
     tell("zoomed", bench.frames(true, |ui| draw(&mut screen, ui)));
+    screen.show(View::OverDepth);
+    let start = Instant::now();
+    bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    while !screen.is_settled() {
+        std::thread::sleep(Duration::from_millis(4));
+        bench.frame(Vec::new(), |ui| draw(&mut screen, ui));
+    }
+    println!(
+        "loops over depth found after {:.2} s",
+        start.elapsed().as_secs_f64()
+    );
+    tell(
+        "over depth, moved",
+        bench.frames(false, |ui| draw(&mut screen, ui)),
+    );
     drop(screen);
     // Twice as many points as fit into memory help nobody: the same samples, made again.
     let points: Vec<[Vec<PlotPoint>; 3]> = (0..sessions.len())

@@ -64,9 +64,17 @@ fn one_session_is_looked_at_closely() {
     assert!(flow.says("F at A") && !flow.says("dF"));
     flow.window.key_press(Key::B);
     flow.window.run_steps(2);
-    for words in ["t at A", "t at B", "dt +", "dF", "ddepth", "signal at B"] {
+    for words in ["t at A", "t at B", "dt +", "dF", "d signal", "signal at B"] {
         assert!(flow.says(words), "{words}");
     }
+    // A quarter of the picture on, behind contact.
+    for _ in 0..100 {
+        flow.window
+            .key_press_modifiers(Modifiers::ALT, Key::ArrowRight);
+        flow.window.step();
+    }
+    flow.window.run_steps(2);
+    assert!(flow.says("d depth"));
     flow.click("Copy readout");
     flow.click("No cursors");
     assert!(!flow.says("F at A"));
@@ -135,7 +143,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     flow.click("Over time");
     flow.click("Residuals of the fit");
     flow.click("Parameters");
-    let tau = format!("{:.3}", report.value("tau_eps").unwrap());
+    let tau = palpate_app::report::text::cell(report.parameter("tau_eps").unwrap());
     assert!(flow.says("tau_eps (s)") && flow.says(&tau), "{tau}");
     flow.window.check_accessibility();
     flow.click("Prediction");

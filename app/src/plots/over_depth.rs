@@ -12,10 +12,10 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// What of one session is drawn.
-#[derive(Clone, Debug)]
-pub struct Source {
+#[derive(Clone, Copy, Debug)]
+pub struct Source<'a> {
     /// Its samples.
-    pub track: Track,
+    pub track: &'a Track,
     /// Columns of depth and force in them.
     pub columns: [usize; 2],
     /// Number that changes with the samples.
@@ -56,7 +56,7 @@ impl DepthLines {
     pub fn update(
         &mut self,
         ctx: &Context,
-        sources: &[Source],
+        sources: &[Source<'_>],
         [depth, force]: [&Span; 2],
         pixels: [f64; 2],
     ) {
@@ -84,8 +84,11 @@ impl DepthLines {
         }
         self.is_unwanted = Arc::default();
         self.sought = Some(key.clone());
-        let (sources, is_unwanted) = (sources.to_vec(), Arc::clone(&self.is_unwanted));
-        let wake = ctx.clone();
+        let own = sources.iter();
+        let sources: Vec<Owned> = own
+            .map(|one| (one.track.clone(), one.columns, one.id))
+            .collect();
+        let (is_unwanted, wake) = (Arc::clone(&self.is_unwanted), ctx.clone());
         // Without a thread the lines there stay; it is tried again in the next frame.
         let _ = self.job.start(
             "review-loops",
@@ -121,18 +124,21 @@ impl DepthLines {
     }
 }
 
-fn reduce(key: Key, sources: &[Source], is_unwanted: &AtomicBool) -> Option<(Key, Vec<Reduced>)> {
+/// Samples, columns of depth and force, and number of a session.
+type Owned = (Track, [usize; 2], u64);
+
+fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<(Key, Vec<Reduced>)> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
     let mut lines = Vec::with_capacity(sources.len());
-    for source in sources {
+    for (track, columns, id) in sources {
         let mut reducer = Reducer::new(width, height);
-        for segment in source.track.segments() {
+        for segment in track.segments() {
             if is_unwanted.load(Ordering::Relaxed) {
                 return None;
             }
-            let [depths, forces] = source.columns.map(|column| segment.values(column));
+            let [depths, forces] = columns.map(|column| segment.values(column));
             for (depth, force) in depths.iter().zip(forces) {
                 let place = [f64::from(*depth) - x[0], f64::from(*force) - y[0]];
                 reducer.push(place[0] * scale[0], place[1] * scale[1]);
@@ -145,7 +151,7 @@ fn reduce(key: Key, sources: &[Source], is_unwanted: &AtomicBool) -> Option<(Key
             .map(|stretch| stretch.into_iter().map(point).collect())
             .collect();
         lines.push(Reduced {
-            id: source.id,
+            id: *id,
             points: stretches.iter().map(Vec::len).sum(),
             stretches,
             samples,

@@ -160,6 +160,28 @@ mod tests {
     }
 
     #[test]
+    fn an_hour_and_a_half_holds_no_more_than_minutes_do() {
+        // A thousand samples a second; a day is an example of its own.
+        let force = |i: i32| f64::from(i % 977);
+        let mut most = 0;
+        let mut trace = LiveTrace::new(2048);
+        for i in 0..5_400_000 {
+            let t = f64::from(i) * 1e-3;
+            trace.push(Seconds(t), Depth(1.0), Newtons(force(i)));
+            if i % 60_000 == 0 {
+                most = most.max(trace.buckets.capacity());
+                let points = trace.points();
+                assert!(points.len() <= 2 * 2048 + 2, "{}", points.len());
+                // What is newest is there, however coarse the rest is.
+                let newest = points[points.len() - 1].t;
+                let bucket = trace.samples_per_bucket() as f64 * 1e-3;
+                assert!(t - newest <= bucket, "{newest} at {t}");
+            }
+        }
+        assert!(most <= 2 * 2048, "{most}");
+    }
+
+    #[test]
     fn short_histories_are_drawn_whole_and_gaps_break_the_line() {
         let trace = trace_of([1.0, 2.0, f64::NAN, 3.0].into_iter(), 64);
         let forces: Vec<f64> = trace.points().iter().map(|point| point.force).collect();

@@ -54,10 +54,58 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
     found
 }
 
+/// The rows of the table, and what they were made of: made anew only where that is other.
+#[derive(Debug, Default)]
+pub(super) struct CycleRows {
+    key: Vec<(u64, u64)>,
+    rows: Vec<Row>,
+}
+
+impl CycleRows {
+    fn update(&mut self, subjects: &[Subject]) {
+        let versions = subjects.iter().map(|one| (one.id, one.recording.version));
+        if versions.clone().eq(self.key.iter().copied()) {
+            return;
+        }
+        self.key = versions.collect();
+        self.rows = subjects.iter().flat_map(rows_of).collect();
+    }
+}
+
+fn rows_of(subject: &Subject) -> Vec<Row> {
+    let own = cycles(subject);
+    let first = own.first().map(|cycle| cycle.peak_n);
+    let row = |cycle: &Cycle| {
+        let share = first.filter(|first| *first != 0.0);
+        let share = share.map(|first| 100.0 * cycle.peak_n / first);
+        let cells = vec![
+            subject.name.clone(),
+            cycle.number.to_string(),
+            format!("{:.2}", cycle.t[0]),
+            format!("{:.2}", cycle.t[1] - cycle.t[0]),
+            format!("{:.4}", cycle.peak_n),
+            cycle
+                .depth_mm
+                .map_or("-".into(), |depth| format!("{depth:.4}")),
+            share.map_or("-".into(), |share| format!("{share:.2}")),
+        ];
+        Row {
+            cells,
+            ..Row::default()
+        }
+    };
+    own.iter().map(row).collect()
+}
+
 impl ReviewScreen {
-    pub(super) fn cycles_ui(&self, ui: &mut Ui) {
-        let words = "the highest force of every cycle; 'palpate cycles' tells hysteresis, relaxation and shift";
+    pub(super) fn cycles_ui(&mut self, ui: &mut Ui) {
+        let words = "the highest force of every cycle; 'palpate analyse' tells hysteresis, relaxation and shift";
         head_ui(ui, "Cycles", words);
+        self.cycle_rows.update(&self.subjects);
+        if self.cycle_rows.rows.is_empty() {
+            quiet_ui(ui, "no session shown has cycles");
+            return;
+        }
         let columns = [
             Column::words("session", 200.0),
             Column::numbers("cycle", 50.0),
@@ -67,33 +115,6 @@ impl ReviewScreen {
             Column::numbers("depth there (mm)", 120.0),
             Column::numbers("of the first (%)", 110.0),
         ];
-        let mut rows = Vec::new();
-        for subject in &self.subjects {
-            let own = cycles(subject);
-            let first = own.first().map(|cycle| cycle.peak_n);
-            rows.extend(own.iter().map(|cycle| {
-                let share = first
-                    .filter(|first| *first != 0.0)
-                    .map(|first| cycle.peak_n / first);
-                let cells = vec![
-                    subject.name.clone(),
-                    cycle.number.to_string(),
-                    format!("{:.2}", cycle.t[0]),
-                    format!("{:.2}", cycle.t[1] - cycle.t[0]),
-                    format!("{:.4}", cycle.peak_n),
-                    cycle.depth_mm.map_or("-".into(), |mm| format!("{mm:.4}")),
-                    share.map_or("-".into(), |share| format!("{:.2}", 100.0 * share)),
-                ];
-                Row {
-                    cells,
-                    ..Row::default()
-                }
-            }));
-        }
-        if rows.is_empty() {
-            quiet_ui(ui, "no session shown has cycles");
-            return;
-        }
-        table_ui(ui, "review_cycles", &columns, &rows);
+        table_ui(ui, "review_cycles", &columns, &self.cycle_rows.rows);
     }
 }

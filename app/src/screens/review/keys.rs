@@ -2,7 +2,7 @@
 
 use super::{ReviewScreen, View};
 use crate::plots::navigate::{PAN_STEP, ZOOM_STEP};
-use eframe::egui::{Context, Key};
+use eframe::egui::{Context, Event, Key, Modifiers};
 
 /// Cursor A at the left third and B at the right one, where no pointer says where.
 const CURSOR_SHARES: [f64; 2] = [1.0 / 3.0, 2.0 / 3.0];
@@ -62,42 +62,84 @@ impl ReviewScreen {
         if ctx.egui_wants_keyboard_input() {
             return;
         }
-        let (mut moves, mut steps) = (Vec::new(), Vec::new());
-        ctx.input(|input| {
-            let (is_a, is_b) = (input.modifiers.alt, input.modifiers.shift);
-            // Ctrl with a sign makes the text larger.
-            if input.modifiers.command {
-                return;
-            }
-            for (key, way) in [(Key::ArrowLeft, -1.0), (Key::ArrowRight, 1.0)] {
-                if !input.key_pressed(key) {
-                    continue;
-                }
-                match (is_a, is_b) {
-                    (true, _) => steps.push((0, way)),
-                    (_, true) => steps.push((1, way)),
-                    _ if way < 0.0 => moves.push(Move::Back),
-                    _ => moves.push(Move::On),
-                }
-            }
-            for (keys, to) in [
-                (&[Key::Plus, Key::Equals][..], Move::ZoomIn),
-                (&[Key::Minus], Move::ZoomOut),
-                (&[Key::Home], Move::All),
-                (&[Key::A], Move::Cursor(0)),
-                (&[Key::B], Move::Cursor(1)),
-                (&[Key::Delete], Move::NoCursors),
-            ] {
-                if keys.iter().any(|key| input.key_pressed(*key)) {
-                    moves.push(to);
-                }
-            }
+        // The modifiers are the event's own: those of the frame may have been let go already.
+        let pressed: Vec<(Key, Modifiers)> = ctx.input(|input| {
+            let events = input.events.iter();
+            events
+                .filter_map(|event| match event {
+                    Event::Key {
+                        key,
+                        pressed: true,
+                        modifiers,
+                        ..
+                    } => Some((*key, *modifiers)),
+                    _ => None,
+                })
+                .collect()
         });
-        moves.into_iter().for_each(|to| self.go(to));
+        for (key, modifiers) in pressed {
+            match asked(key, modifiers) {
+                Some(Asked::Go(to)) => self.go(to),
+                Some(Asked::Step(number, way)) => self.step_cursor(number, way),
+                None => {}
+            }
+        }
+    }
+
+    /// Moves a cursor a little, one way or the other.
+    fn step_cursor(&mut self, number: usize, way: f64) {
         let [low, high] = self.time.shown();
-        for (number, way) in steps {
-            let from = self.cursors[number].unwrap_or(self.time.at(CURSOR_SHARES[number]));
-            self.cursors[number] = Some(from + way * CURSOR_STEP * (high - low));
+        let from = self.cursors[number].unwrap_or(self.time.at(CURSOR_SHARES[number]));
+        self.cursors[number] = Some(from + way * CURSOR_STEP * (high - low));
+    }
+}
+
+/// What a key asks for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Asked {
+    Go(Move),
+    /// A cursor moves: which, and to which side.
+    Step(usize, f64),
+}
+
+/// What a key asks for with the modifiers held; with Ctrl it belongs to the window.
+fn asked(key: Key, modifiers: Modifiers) -> Option<Asked> {
+    if modifiers.command || modifiers.ctrl {
+        return None;
+    }
+    Some(match (key, modifiers.alt, modifiers.shift) {
+        (Key::ArrowLeft, true, _) => Asked::Step(0, -1.0),
+        (Key::ArrowRight, true, _) => Asked::Step(0, 1.0),
+        (Key::ArrowLeft, _, true) => Asked::Step(1, -1.0),
+        (Key::ArrowRight, _, true) => Asked::Step(1, 1.0),
+        (Key::ArrowLeft, ..) => Asked::Go(Move::Back),
+        (Key::ArrowRight, ..) => Asked::Go(Move::On),
+        // On many keyboards the plus is the shifted equals sign.
+        (Key::Plus | Key::Equals, ..) => Asked::Go(Move::ZoomIn),
+        (Key::Minus, ..) => Asked::Go(Move::ZoomOut),
+        (Key::Home, ..) => Asked::Go(Move::All),
+        (Key::A, ..) => Asked::Go(Move::Cursor(0)),
+        (Key::B, ..) => Asked::Go(Move::Cursor(1)),
+        (Key::Delete, ..) => Asked::Go(Move::NoCursors),
+        _ => return None,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn arrows_move_the_picture_and_with_alt_or_shift_a_cursor() {
+        for (key, modifiers, wanted) in [
+            (Key::ArrowLeft, Modifiers::NONE, Some(Asked::Go(Move::Back))),
+            (Key::ArrowRight, Modifiers::ALT, Some(Asked::Step(0, 1.0))),
+            (Key::ArrowLeft, Modifiers::SHIFT, Some(Asked::Step(1, -1.0))),
+            (Key::Equals, Modifiers::SHIFT, Some(Asked::Go(Move::ZoomIn))),
+            (Key::Plus, Modifiers::COMMAND, None),
+            (Key::F5, Modifiers::NONE, None),
+        ] {
+            assert_eq!(asked(key, modifiers), wanted, "{key:?} {modifiers:?}");
         }
     }
 }

@@ -37,7 +37,7 @@ impl ReviewScreen {
             ui.radio_value(&mut self.leader, leader, leader.name());
         }
         self.leaders_missing_ui(ui);
-        section_ui(ui, "Over time");
+        section_ui(ui, "Shown over time");
         for quantity in Quantity::ALL {
             let mut is_shown = self.quantities.contains(&quantity);
             if ui.checkbox(&mut is_shown, quantity.name()).changed() {

@@ -14,6 +14,8 @@ use eframe::egui::{Button, Label, RichText, Ui, vec2};
 /// Points that the axes beside and below a plot take of it.
 const AXIS_WIDTH: f32 = 58.0;
 const AXIS_HEIGHT: f32 = 34.0;
+/// Sessions that are drawn with two points a pixel each; of more than that, each has fewer.
+const FULL_LINES: usize = 8;
 
 impl ReviewScreen {
     pub(super) fn draw_middle(&mut self, ui: &mut Ui) {
@@ -128,6 +130,8 @@ impl ReviewScreen {
         let width = ui.available_width();
         let scale = f64::from(ui.ctx().pixels_per_point());
         let pixels = (f64::from((width - AXIS_WIDTH).max(64.0)) * scale).round();
+        // Many lines over each other share the points that a few have.
+        let pixels = pixels / self.subjects.len().div_ceil(FULL_LINES) as f64;
         let window = self.time.shown();
         self.thinned = 1;
         for subject in &mut self.subjects {
@@ -203,11 +207,11 @@ impl ReviewScreen {
 
     fn over_depth_ui(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
-        let sources: Vec<Source> = self
+        let sources: Vec<Source<'_>> = self
             .subjects
             .iter()
             .map(|subject| Source {
-                track: subject.recording.track.clone(),
+                track: &subject.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
                 // While it is read the lines are found again for every fifth of it, not for every piece.
                 version: match subject.is_settled() {

@@ -98,9 +98,10 @@ pub struct ReviewScreen {
     prediction: Task<Prediction>,
     prediction_of: Option<[String; 2]>,
     prediction_lines: [crate::plots::stretches::Stretches; 2],
+    cycle_rows: cycles::CycleRows,
     path: String,
     next_id: u64,
-    /// Raised where the time axis of a plot is other than it was.
+    /// The most samples that share a lowest and a highest one in the plots over time.
     thinned: usize,
 }
 
@@ -126,6 +127,7 @@ impl ReviewScreen {
             prediction: Task::default(),
             prediction_of: None,
             prediction_lines: Default::default(),
+            cycle_rows: cycles::CycleRows::default(),
             path: String::new(),
             next_id: 0,
             thinned: 1,
@@ -160,6 +162,19 @@ impl ReviewScreen {
         self.subjects.push(Subject::new(looked, self.next_id));
         self.next_id += 1;
         self.poll(ctx);
+    }
+
+    /// Shows another view of them.
+    pub fn show(&mut self, view: View) {
+        self.view = view;
+    }
+
+    /// Whether nothing is being read, fitted or looked for.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        let is_working = self.fits.standing().is_some() || self.prediction.standing().is_some();
+        let is_read = self.subjects.iter().all(Subject::is_settled);
+        is_read && !is_working && !self.depth_lines.is_busy()
     }
 
     /// Fetches what threads have answered.

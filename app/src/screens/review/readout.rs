@@ -44,7 +44,12 @@ impl Reading {
                 }
             }
             if let [Some(a), Some(b)] = ends {
-                words.push(format!("d{name} {:+.digits$} {unit}", b - a));
+                let name = if name.len() == 1 {
+                    format!("d{name}")
+                } else {
+                    format!("d {name}")
+                };
+                words.push(format!("{name} {:+.digits$} {unit}", b - a));
             }
         };
         tell("t", "s", 4, self.t);

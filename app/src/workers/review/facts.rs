@@ -170,7 +170,7 @@ fn event(entry: &Entry) -> Option<Event> {
     match entry.kind {
         EntryKind::Fit => None,
         EntryKind::Decision if entry.body["record"] == "noted" => {
-            made(words(&entry.body["text"]), false, true)
+            made(entry.body["text"].as_str()?.to_owned(), false, true)
         }
         EntryKind::Decision => match serde_json::from_value(entry.body.clone()).ok()? {
             Effect::Record(Record::PhaseStarted { .. }) => None,
