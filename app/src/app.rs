@@ -1,8 +1,9 @@
 //! The workbench's window as an eframe app: `logic` reads keys and answers, `ui` draws a snapshot.
 
-use crate::command::{Command, Commands};
+use crate::command::{Aside, Command, Commands, TextSize};
 use crate::plots::PlotCache;
 use crate::plots::force_time::TimeView;
+use crate::screens::approach::Approach;
 use crate::screens::calibration::{CalibrationScreen, Facts};
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
@@ -10,13 +11,16 @@ use crate::screens::library::LibraryScreen;
 use crate::screens::models::ModelsScreen;
 use crate::screens::review::ReviewScreen;
 use crate::screens::rig::RigScreen;
-use crate::screens::run_middle::{Chooser, Middle};
+use crate::screens::run_middle::{Chooser, Middle, first_view};
 use crate::screens::trade::TradeScreen;
+use crate::settings::{Kept, ZOOM};
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
+use crate::shell::palette::Palette;
 use crate::shell::rail::Screen;
+use crate::shell::tour::Tour;
 use crate::theme;
 use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
@@ -24,11 +28,12 @@ use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
 use crate::workers::recovery::Recovery;
 use crate::workers::select::Selected;
-use eframe::egui::{Context, Ui, ViewportCommand};
+use eframe::egui::{Context, Theme, Ui, ViewportCommand};
 use palpate_model::extremes::Row;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
-use palpate_protocols::runner::{Request, Runner, Snapshot, StartError};
+use palpate_protocols::runner::{Request, RunRequest, Runner, Snapshot, StartError};
+use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 use std::time::Duration;
@@ -74,6 +79,12 @@ pub struct WorkbenchApp {
     pub(crate) calibration: CalibrationScreen,
     pub(crate) events: EventLog,
     pub(crate) refusal: Option<String>,
+    pub(crate) note: String,
+    pub(crate) approach: Approach,
+    pub(crate) palette: Palette,
+    pub(crate) tour: Tour,
+    pub(crate) settings: Kept,
+    is_zoom_set: bool,
     start: Start,
     is_closing: bool,
     are_fonts_warm: bool,
@@ -85,6 +96,14 @@ impl WorkbenchApp {
     /// Starts the runner on the rig of the options. Opens no window; what is read from disk is read on threads.
     pub fn new(options: WindowOptions, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
+        let (settings, told) = Kept::open(options.settings);
+        if settings.now.is_dark {
+            theme::switch(ctx);
+        }
+        let mut tour = Tour::default();
+        if settings.is_kept() && !settings.now.is_tour_over {
+            tour.start();
+        }
         let curve = options
             .calibration
             .curve()
@@ -106,6 +125,8 @@ impl WorkbenchApp {
             recovery.start(library.clone(), ctx);
         }
         let mut form = ProtocolForm::default();
+        form.folder.clone_from(&settings.now.sessions);
+        form.set_told("operator", &settings.now.operator);
         if let Some(folder) = options.sessions {
             form.folder = folder.display().to_string();
         }
@@ -133,7 +154,7 @@ impl WorkbenchApp {
             middle: Middle::default(),
             chooser: Chooser::default(),
             time_view: TimeView::default(),
-            screen: Screen::default(),
+            screen: Screen::by_name(&settings.now.screen).unwrap_or_default(),
             rig_screen: RigScreen::default(),
             catalog: LibraryScreen::new(curves_in.clone()),
             review: ReviewScreen::new(curves_in.clone()),
@@ -142,7 +163,13 @@ impl WorkbenchApp {
             calibration,
             trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
-            refusal: None,
+            refusal: told,
+            note: String::new(),
+            approach: Approach::default(),
+            palette: Palette::default(),
+            tour,
+            settings,
+            is_zoom_set: false,
             start: Start::None,
             is_closing: false,
             are_fonts_warm: false,
@@ -227,7 +254,10 @@ impl WorkbenchApp {
         for command in commands.take() {
             match command {
                 Command::Start => self.start(),
-                Command::Stop => self.operator(Operator::Stop),
+                Command::Stop => {
+                    self.palette.close();
+                    self.operator(Operator::Stop);
+                }
                 Command::Halt => self.operator(Operator::Halt),
                 Command::Wish(wish) => {
                     let choice = run_in_progress(&self.snapshot).map(|run| wish.operator(run));
@@ -290,6 +320,38 @@ impl WorkbenchApp {
                 }
                 Command::Show(screen) => self.screen = screen,
                 Command::SwitchTheme => theme::switch(ctx),
+                Command::TextSize(size) => {
+                    let zoom = ctx.zoom_factor();
+                    let zoom = match size {
+                        TextSize::Larger => zoom * 1.1,
+                        TextSize::Smaller => zoom / 1.1,
+                        TextSize::Usual => 1.0,
+                    };
+                    ctx.set_zoom_factor(zoom.clamp(*ZOOM.start(), *ZOOM.end()));
+                }
+                Command::Palette => self.palette.toggle(),
+                Command::TourStart => {
+                    self.tour.start();
+                    self.screen = Screen::Run;
+                }
+                Command::TourNext => match self.tour.go_on() {
+                    Some(screen) => self.screen = screen,
+                    None => self.settings.now.is_tour_over = true,
+                },
+                Command::TourEnd => {
+                    self.tour.end();
+                    self.settings.now.is_tour_over = true;
+                }
+                Command::Note(text) => self.write_note(text),
+                Command::NoteTyped => {
+                    let text = std::mem::take(&mut self.note);
+                    let text = match text.trim() {
+                        "" => "mark".to_owned(),
+                        text => text.to_owned(),
+                    };
+                    self.write_note(text);
+                }
+                Command::Aside(aside) => self.run_aside(&aside),
             }
             ctx.request_repaint();
         }
@@ -330,6 +392,84 @@ impl WorkbenchApp {
         }
     }
 
+    /// Something is written down in the run in progress; without one there is nowhere to write it.
+    fn write_note(&mut self, text: String) {
+        if run_in_progress(&self.snapshot).is_some()
+            && let Err(err) = self.runner.request(Request::Note(text))
+        {
+            self.refusal = Some(err);
+        }
+    }
+
+    /// Whether the axis may be moved by hand now, or why not.
+    pub(crate) fn aside_verdict(&self) -> Result<(), String> {
+        if let Some(reason) = &self.snapshot.rig.link_error {
+            return Err(format!("the link to the rig is lost ({reason})"));
+        }
+        match (run_in_progress(&self.snapshot), self.intent()) {
+            (Some(run), _) if run.holding.is_some() => {
+                Err("the stopped run waits: retract or close it first".into())
+            }
+            (Some(_), _) => Err("a run is in progress".into()),
+            (None, Intent::Closing) => Err("the window is closing".into()),
+            (None, Intent::Starting) => Err("starting".into()),
+            (None, Intent::None) => Ok(()),
+        }
+    }
+
+    fn run_aside(&mut self, aside: &Aside) {
+        if self.aside_verdict().is_err() {
+            return;
+        }
+        match self.form.aside(aside, &self.snapshot.rig, &self.bench) {
+            Ok(request) => self.ask_to_run(request),
+            Err(reason) => self.refusal = Some(reason),
+        }
+    }
+
+    /// Takes over what is remembered until the window is opened again.
+    fn remember(&mut self, ctx: &Context) {
+        let now = &mut self.settings.now;
+        now.is_dark = ctx.theme() == Theme::Dark;
+        now.zoom = ctx.zoom_factor();
+        now.screen = self.screen.name().to_owned();
+        now.operator = self.form.told_text("operator").to_owned();
+        now.sessions.clone_from(&self.form.folder);
+    }
+
+    /// Files dropped on the window go where they belong.
+    fn take_dropped(&mut self, ctx: &Context) {
+        let dropped = ctx.input(|input| input.raw.dropped_files.clone());
+        let paths: Vec<PathBuf> = dropped
+            .into_iter()
+            .map(|file| file.path().to_owned())
+            .collect();
+        if paths.is_empty() {
+            return;
+        }
+        let ends = |path: &PathBuf, wanted: &[&str]| {
+            let ending = path.extension().and_then(|one| one.to_str());
+            ending.is_some_and(|one| wanted.contains(&one.to_lowercase().as_str()))
+        };
+        let (protocols, others): (Vec<_>, Vec<_>) =
+            paths.into_iter().partition(|path| ends(path, &["toml"]));
+        let (tables, sessions): (Vec<_>, Vec<_>) = others
+            .into_iter()
+            .partition(|path| ends(path, &["csv", "tsv", "txt"]));
+        if let Some(path) = protocols.first() {
+            self.screen = Screen::Run;
+            self.read_protocol(|chooser| chooser.read(path, ctx));
+        }
+        if !tables.is_empty() {
+            self.screen = Screen::Models;
+            tables.iter().for_each(|path| self.models.add(path));
+        }
+        if !sessions.is_empty() {
+            self.screen = Screen::Review;
+            self.review.open(sessions, ctx);
+        }
+    }
+
     fn read_protocol(&mut self, read: impl FnOnce(&mut Chooser) -> std::io::Result<()>) {
         if let Err(err) = read(&mut self.chooser) {
             self.refusal = Some(format!("the protocol cannot be read: {err}"));
@@ -347,15 +487,19 @@ impl WorkbenchApp {
         if self.start_verdict().is_err() {
             return;
         }
-        let Some(request) = self.form.request(&self.bench) else {
-            return;
-        };
+        if let Some(request) = self.form.request(&self.bench) {
+            self.ask_to_run(request);
+        }
+    }
+
+    fn ask_to_run(&mut self, request: RunRequest) {
+        let view = first_view(&request.plan);
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
         match self.runner.request(Request::Run(Box::new(request), reply)) {
             Ok(()) => {
                 self.start = Start::Asked(answer);
-                self.middle = Middle::Measured;
+                self.middle = view;
             }
             Err(reason) => self.refusal = Some(reason),
         }
@@ -407,6 +551,10 @@ impl eframe::App for WorkbenchApp {
         self.meter.begin(frame.info().cpu_usage);
         let mut commands = Commands::default();
         self.keys.read(ctx, &mut commands);
+        if !std::mem::replace(&mut self.is_zoom_set, true) {
+            ctx.set_zoom_factor(self.settings.now.zoom);
+        }
+        self.take_dropped(ctx);
         self.snapshot = self.runner.snapshot();
         self.poll_start();
         self.ports.poll();
@@ -452,6 +600,7 @@ impl eframe::App for WorkbenchApp {
         self.refitter.update(ctx, self.snapshot.run.as_ref());
         self.act(ctx, &mut commands);
         self.handle_close(ctx);
+        self.remember(ctx);
         let is_quiet = run_in_progress(&self.snapshot).is_none()
             && self.intent() == Intent::None
             && !is_motion_possible(&self.snapshot);
@@ -462,6 +611,10 @@ impl eframe::App for WorkbenchApp {
         let mut commands = Commands::default();
         let activity = activity(&self.snapshot, self.intent());
         self.draw(ui, &activity, &mut commands);
+        if self.palette.is_open() {
+            let actions = self.actions();
+            self.palette.ui(ui, &actions, &mut commands);
+        }
         if !std::mem::replace(&mut self.are_fonts_warm, true) {
             theme::warm_up_fonts(ui.ctx());
         }
@@ -474,6 +627,10 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn on_exit(&mut self) {
+        if let Err(err) = self.settings.store() {
+            let _ =
+                std::io::Write::write_all(&mut std::io::stderr(), format!("{err}\n").as_bytes());
+        }
         if let Err(err) = self.meter.write_report() {
             // Nobody is left to read a screen; standard error is the last place to say it.
             let _ = std::io::Write::write_all(

@@ -4,6 +4,7 @@ use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
 use crate::workers::path_dialog::Ask;
+use std::collections::BTreeMap;
 use std::path::PathBuf;
 
 /// One thing the user asked for.
@@ -33,6 +34,12 @@ pub enum Command {
     TakeProtocol(&'static str),
     /// Read the protocol file whose path is typed.
     OpenProtocol,
+    /// Write something down in the run in progress.
+    Note(String),
+    /// Write down what stands in the field for notes; a mark if nothing does.
+    NoteTyped,
+    /// Move by hand: a short run beside the protocol in the form.
+    Aside(Aside),
     /// Take the protocol that calibrates the load cell.
     MeasureCalibration,
     /// Store the calibration that the last run measured.
@@ -45,8 +52,66 @@ pub enum Command {
     SwitchTheme,
     /// Look at sessions on the review screen, instead of those there.
     Review(Vec<PathBuf>),
+    /// Make text and everything else larger or smaller.
+    TextSize(TextSize),
+    /// Open or close the list of everything that can be asked for.
+    Palette,
+    /// Begin the tour of the window.
+    TourStart,
+    /// Go on with it.
+    TourNext,
+    /// End it.
+    TourEnd,
     /// Show a screen. What goes on goes on, and the stop control stays.
     Show(Screen),
+}
+
+/// A run beside the protocol in the form.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Aside {
+    /// Name of the built-in protocol.
+    pub protocol: &'static str,
+    /// Its values, as they would be typed.
+    pub values: BTreeMap<String, String>,
+}
+
+impl Aside {
+    /// Move by a distance in mm, towards the tissue where it is positive, at a speed in mm/s.
+    #[must_use]
+    pub fn jog(distance: f64, speed: f64) -> Self {
+        let values = [
+            ("distance".to_owned(), format!("{distance} mm")),
+            ("speed".to_owned(), format!("{speed} mm/s")),
+        ];
+        Self {
+            protocol: "free-jog",
+            values: values.into(),
+        }
+    }
+
+    /// Find home, and touch it once more.
+    #[must_use]
+    pub fn home() -> Self {
+        let values = [
+            ("repeats".to_owned(), "1".to_owned()),
+            ("distance".to_owned(), "1 mm".to_owned()),
+        ];
+        Self {
+            protocol: "check-home",
+            values: values.into(),
+        }
+    }
+}
+
+/// How the size of text changes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum TextSize {
+    /// By a tenth.
+    Larger,
+    /// By a tenth.
+    Smaller,
+    /// As it is made.
+    Usual,
 }
 
 /// What was asked for since the app last acted.

@@ -11,6 +11,7 @@ pub mod playback;
 pub mod plots;
 pub mod report;
 pub mod screens;
+pub mod settings;
 pub mod shell;
 pub mod theme;
 pub mod trade;

@@ -9,8 +9,10 @@ use crate::screens::calibration::Facts;
 use crate::screens::form::Checked;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
+use crate::screens::rig::Facts as RigFacts;
 use crate::screens::rig_panel::rig_ui;
 use crate::screens::run_middle::{Middle, expected_ui, views_ui};
+use crate::screens::weighing::weighing_ui;
 use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
@@ -52,6 +54,8 @@ pub struct WindowOptions {
     pub scale: TimeScale,
     /// Folder for new sessions; the library if none.
     pub sessions: Option<PathBuf>,
+    /// File in which the window remembers how it looked; nothing is remembered without one.
+    pub settings: Option<PathBuf>,
 }
 
 impl WindowOptions {
@@ -66,6 +70,7 @@ impl WindowOptions {
             to_acknowledge: Vec::new(),
             scale,
             sessions: None,
+            settings: None,
         })
     }
 }
@@ -161,7 +166,13 @@ impl WorkbenchApp {
             Panel::top("run_strip")
                 .resizable(false)
                 .frame(frame(ui, false))
-                .show(ui, |ui| run_strip_ui(ui, run, commands));
+                .show(ui, |ui| run_strip_ui(ui, run, &mut self.note, commands));
+        }
+        if self.tour.is_on() {
+            Panel::top("tour")
+                .resizable(false)
+                .frame(frame(ui, false))
+                .show(ui, |ui| self.tour.ui(ui, commands));
         }
         Panel::left("rail")
             .exact_size(rail::WIDTH)
@@ -192,7 +203,17 @@ impl WorkbenchApp {
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| {
-                self.rig_screen.middle_ui(ui, &self.snapshot, commands)
+                let verdict = self.aside_verdict();
+                let curve = &self.bench.curve;
+                let reading = self.snapshot.rig.reading;
+                let facts = RigFacts {
+                    limits: &self.bench.limits,
+                    force: reading.map(|reading| curve.newtons_from_volts(reading.volts)),
+                    verdict: &verdict,
+                    refusal: self.refusal.as_deref(),
+                };
+                self.rig_screen
+                    .middle_ui(ui, &self.snapshot, &facts, commands);
             });
     }
 
@@ -317,8 +338,21 @@ impl WorkbenchApp {
     }
 
     fn middle_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        views_ui(ui, self.middle, commands);
+        let run = self.snapshot.run.as_ref();
+        views_ui(ui, self.middle, run, commands);
+        let reading = self.snapshot.rig.reading;
         match self.middle {
+            Middle::Weighing => {
+                if let Some(run) = run {
+                    let signal = reading.map(|reading| reading.volts);
+                    weighing_ui(ui, run, signal, &self.bench, commands);
+                }
+            }
+            Middle::Approach => {
+                if let Some(run) = run {
+                    self.approach.ui(ui, run);
+                }
+            }
             Middle::Choose => {
                 let facts = ProtocolFacts {
                     is_busy: self.is_busy(),

@@ -4,6 +4,7 @@
 use crate::analysis::{SourceError, calibration_of, decisions};
 use crate::engine::{Effect, EndingKind, Record};
 use crate::plans::{Plan, Step};
+use crate::weighed::{Readings, Weighed};
 use palpate_model::calibration::{Calibration, KnownWeight};
 use palpate_model::units::Volts;
 use palpate_sessions::checks::{CheckFileError, CheckPart, DailyCheck, last_of_day, read_checks};
@@ -62,15 +63,15 @@ pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
 }
 
 /// Mass in g and signal of every reading, in order.
-fn readings<'a>(records: &'a [&Record]) -> impl Iterator<Item = (f64, Volts)> + 'a {
-    records.iter().filter_map(|record| match record {
-        Record::Weighed { mass_g, volts, .. } => Some((*mass_g, *volts)),
-        _ => None,
-    })
+fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
+    let readings = Readings::of(records.iter().copied());
+    let pair = |one: &Weighed| (one.mass_g(), one.volts());
+    readings.all().iter().map(pair).collect()
 }
 
 fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let (_, volts) = readings(records)
+        .into_iter()
         .find(|(mass_g, _)| *mass_g == 0.0)
         .ok_or("the empty cell was not read; make the check again")?;
     let curve = calibration.curve().map_err(|err| err.to_string())?;
@@ -94,7 +95,7 @@ fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String)
 
 fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
     let mut tare = None;
-    let known = readings(records).find(|(mass_g, volts)| {
+    let known = readings(records).into_iter().find(|(mass_g, volts)| {
         if *mass_g == 0.0 {
             tare = Some(*volts);
         }

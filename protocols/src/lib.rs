@@ -21,3 +21,4 @@ pub mod preview;
 pub mod programme;
 pub mod replay;
 pub mod runner;
+pub mod weighed;

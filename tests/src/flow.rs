@@ -155,6 +155,7 @@ impl Flow {
         std::fs::read_dir(self.folder.path())
             .unwrap()
             .map(|item| item.unwrap().path())
+            .filter(|path| path.is_dir())
             .collect()
     }
 

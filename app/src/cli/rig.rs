@@ -3,6 +3,7 @@
 use super::Failure;
 use super::calibration::source::Source;
 use super::output::Output;
+use crate::settings::SETTINGS_FILE;
 use crate::window::{WindowOptions, run_window};
 use clap::Args;
 use palpate_drivers::Rig;
@@ -282,6 +283,7 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
         to_acknowledge: gate.to_acknowledge(),
         scale,
         sessions: None,
+        settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
     })
     .map_err(Failure::Failed)
 }

@@ -1,6 +1,7 @@
 //! The panels around the plots: rig and protocol on the left, what is known on the right.
 
 pub mod after_stop;
+pub mod approach;
 pub mod calibration;
 pub mod exact_fit;
 pub mod extremes;
@@ -16,3 +17,4 @@ pub mod rig;
 pub mod rig_panel;
 pub mod run_middle;
 pub mod trade;
+pub mod weighing;

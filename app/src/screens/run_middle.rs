@@ -8,7 +8,10 @@ use crate::theme::Tokens;
 use crate::workers::Job;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, vec2};
+use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
+use palpate_protocols::plans::{Plan, Step};
+use palpate_protocols::runner::RunView;
 use palpate_sessions::text::read_if_present;
 use std::path::{Path, PathBuf};
 
@@ -22,25 +25,64 @@ pub enum Middle {
     Course,
     /// What was measured.
     Measured,
+    /// One weight after the other.
+    Weighing,
+    /// The search for the surface.
+    Approach,
 }
 
 /// Views and their names.
-const VIEWS: [(Middle, &str); 3] = [
+const VIEWS: [(Middle, &str); 5] = [
     (Middle::Choose, "Protocols"),
     (Middle::Course, "Expected course"),
     (Middle::Measured, "Measured"),
+    (Middle::Weighing, "Weights"),
+    (Middle::Approach, "Surface"),
 ];
 
 /// Draws the switch between the views.
-pub fn views_ui(ui: &mut Ui, shown: Middle, commands: &mut Commands) {
+pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mut Commands) {
     ui.horizontal(|ui| {
         for (view, name) in VIEWS {
+            if !is_offered(view, run) {
+                continue;
+            }
             if ui.selectable_label(shown == view, name).clicked() {
                 commands.push(Command::View(view));
             }
         }
     });
     ui.separator();
+}
+
+/// Whether a view has anything to show.
+#[must_use]
+pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
+    match view {
+        Middle::Choose | Middle::Course | Middle::Measured => true,
+        Middle::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
+        Middle::Approach => run.is_some_and(|run| {
+            run.approach.samples_per_bucket() > 1
+                || !run.touches.is_empty()
+                || run.phase == Phase::Contact
+        }),
+    }
+}
+
+/// The view that shows most of a run that begins.
+#[must_use]
+pub fn first_view(plan: &Plan) -> Middle {
+    let has = |is: fn(&Step) -> bool| plan.steps.iter().any(|planned| is(&planned.step));
+    if has(|step| matches!(step, Step::Weigh(_))) {
+        Middle::Weighing
+    } else if has(|step| matches!(step, Step::FindContact(_) | Step::FindBase(_)))
+        && !has(|step| matches!(step, Step::Ramp { .. } | Step::LoadTo(_) | Step::Sine(_)))
+    {
+        // It looks for the surface and no more.
+        Middle::Approach
+    } else {
+        Middle::Measured
+    }
 }
 
 /// A file read, or why not.

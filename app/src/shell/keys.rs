@@ -6,11 +6,13 @@ use crate::command::{Command, Commands};
 use eframe::egui::{Context, InputState, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
-pub const KEYS: [(Key, Command); 11] = [
+pub const KEYS: [(Key, Command); 13] = [
+    (Key::F1, Command::Palette),
     (Key::F12, Command::Stop),
     (Key::Escape, Command::Stop),
     (Key::F11, Command::Halt),
     (Key::F2, Command::Wish(Wish::Confirm)),
+    (Key::F3, Command::NoteTyped),
     (Key::F4, Command::Wish(Wish::PauseAfter)),
     (Key::F5, Command::Start),
     (Key::F6, Command::Work),
@@ -40,6 +42,9 @@ impl Keys {
                 if is_pressed(input, key, false) {
                     commands.push(command);
                 }
+            }
+            if is_pressed(input, Key::K, true) {
+                commands.push(Command::Palette);
             }
             for screen in Screen::ALL {
                 if is_pressed(input, screen.key(), true) {

@@ -1,9 +1,12 @@
 //! What stands on every screen: the state, the numbers, the stop control, the event log.
 
+pub mod actions;
 pub mod activity;
 pub mod event_log;
 pub mod frame_meter;
 pub mod keys;
+pub mod palette;
 pub mod rail;
 pub mod run_strip;
 pub mod top_bar;
+pub mod tour;

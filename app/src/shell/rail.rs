@@ -56,6 +56,12 @@ impl Screen {
         }
     }
 
+    /// The screen of this name.
+    #[must_use]
+    pub fn by_name(name: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|screen| screen.name() == name)
+    }
+
     /// What it is for, for the rail's hint.
     #[must_use]
     pub const fn purpose(self) -> &'static str {

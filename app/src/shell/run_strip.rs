@@ -4,7 +4,9 @@
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::uncertain::clock;
-use eframe::egui::{Button, Frame, Label, Margin, RichText, Stroke, Ui, vec2};
+use eframe::egui::{
+    Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
+};
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{Operator, PauseView};
 use palpate_protocols::runner::{PromptView, RunView};
@@ -26,6 +28,8 @@ pub enum Wish {
     Confirm,
     /// The prompt's work will not be done.
     Decline,
+    /// Read the last weight again.
+    Redo,
 }
 
 impl Wish {
@@ -62,6 +66,7 @@ impl Wish {
             }
             (Self::Confirm, _) => Ok(Operator::Confirm),
             (Self::Decline, _) => Ok(Operator::Decline),
+            (Self::Redo, _) => run.can_redo.clone().map(|()| Operator::Redo),
         }
     }
 }
@@ -73,7 +78,7 @@ pub fn is_controllable(run: &RunView) -> bool {
 }
 
 /// Draws the buttons, the state of the pause in words, and the prompt if there is one.
-pub fn run_strip_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
+pub fn run_strip_ui(ui: &mut Ui, run: &RunView, note: &mut String, commands: &mut Commands) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         let after = match &run.next_checkpoint {
@@ -91,10 +96,41 @@ pub fn run_strip_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
             wish_ui(ui, run, wish, text, commands);
         }
         let words = RichText::new(pause_words(run)).color(tokens.text_quiet);
-        ui.add(Label::new(words).wrap());
+        ui.add(Label::new(words).truncate());
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            note_ui(ui, note, commands);
+        });
     });
     if let Some(prompt) = &run.prompt {
         prompt_ui(ui, run, prompt, commands);
+    }
+}
+
+/// Most characters of a note.
+const NOTE_MAX: usize = 300;
+
+/// What somebody at the rig wants to have written down, at the time at which it is.
+fn note_ui(ui: &mut Ui, note: &mut String, commands: &mut Commands) {
+    let name = match note.trim().is_empty() {
+        true => "Mark  F3",
+        false => "Note  F3",
+    };
+    if ui
+        .add(Button::new(name).min_size(vec2(74.0, 28.0)))
+        .clicked()
+    {
+        commands.push(Command::NoteTyped);
+    }
+    let input = TextEdit::singleline(note)
+        .desired_width(180.0)
+        .char_limit(NOTE_MAX);
+    // Drawn from the right, so the label comes after its field.
+    let input = ui.add(input);
+    let label = ui.label("note");
+    let is_taken = input.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter));
+    input.labelled_by(label.id);
+    if is_taken {
+        commands.push(Command::NoteTyped);
     }
 }
 
@@ -147,6 +183,9 @@ fn prompt_ui(ui: &mut Ui, run: &RunView, prompt: &PromptView, commands: &mut Com
             ui.horizontal(|ui| {
                 wish_ui(ui, run, Wish::Confirm, "Done  F2", commands);
                 wish_ui(ui, run, Wish::Decline, "Not done", commands);
+                if run.can_redo.is_ok() {
+                    wish_ui(ui, run, Wish::Redo, "Last weight again", commands);
+                }
                 let left = match run.pause {
                     PauseView::Paused { .. } => "the pause stops this clock".into(),
                     _ => format!("{} left to answer", clock(prompt.time_left.0)),

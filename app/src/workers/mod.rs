@@ -13,6 +13,7 @@ pub mod player;
 pub mod pool;
 pub mod ports;
 pub mod recovery;
+pub mod review;
 pub mod select;
 pub mod task;
 

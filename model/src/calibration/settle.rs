@@ -83,6 +83,23 @@ pub enum Settle {
     TimedOut(Unsettled),
 }
 
+/// How far a signal has come to rest, for an indicator.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SettlingNow {
+    /// Time waited so far.
+    pub waited: Seconds,
+    /// Longest time to wait.
+    pub timeout: Seconds,
+    /// Share of the window that is filled, 0 to 1.
+    pub filled: f64,
+    /// The last window, once one was full.
+    pub last: Option<Steady>,
+    /// The slope in V/s that counts as rest; 0 before a window was full.
+    pub slope_max_v_per_s: f64,
+    /// The scatter that counts as rest.
+    pub noise_max: Volts,
+}
+
 /// A signal that did not settle in time; prints as one sentence.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Unsettled {
@@ -195,6 +212,19 @@ impl Settling {
             });
         }
         self.verdict
+    }
+
+    /// How far it has come.
+    #[must_use]
+    pub fn now(&self) -> SettlingNow {
+        SettlingNow {
+            waited: self.waited(),
+            timeout: self.rule.timeout,
+            filled: self.blocks.len() as f64 / BLOCKS as f64,
+            last: self.last.map(|(steady, _)| steady),
+            slope_max_v_per_s: self.last.map_or(0.0, |(_, slope_max)| slope_max),
+            noise_max: self.rule.noise_max,
+        }
     }
 
     fn waited(&self) -> Seconds {

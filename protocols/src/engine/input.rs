@@ -4,6 +4,7 @@ use super::interlock::Interlock;
 use super::state::Drift;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
+use palpate_model::Nanos;
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
@@ -24,6 +25,16 @@ pub enum Input {
     Operator {
         /// What.
         choice: Operator,
+    },
+    /// Somebody at the rig writes something down; nothing follows from it.
+    Note {
+        /// What, in their words.
+        text: String,
+    },
+    /// The computer itself stood still so long, all its programs, and goes on: silence in it is not the rig's.
+    HostLate {
+        /// How long.
+        late: Nanos,
     },
     /// The live fit has a new answer. It enters only here, so a replay decides from the record.
     LiveFit(LiveEstimate),
@@ -64,6 +75,8 @@ pub enum Operator {
     Confirm,
     /// The prompt is answered: it will not be done.
     Decline,
+    /// Go back to the weight before and read it again.
+    Redo,
 }
 
 impl fmt::Display for Operator {
@@ -84,6 +97,7 @@ impl fmt::Display for Operator {
             Self::Finish => "finish early",
             Self::Confirm => "done",
             Self::Decline => "not done",
+            Self::Redo => "weigh again",
         })
     }
 }
@@ -265,6 +279,11 @@ pub enum Record {
         samples: u64,
         /// Time until the signal had come to rest.
         waited: Seconds,
+    },
+    /// Somebody wrote something down.
+    Noted {
+        /// What.
+        text: String,
     },
     /// The home switch was touched again.
     HomeChecked {
@@ -466,6 +485,7 @@ impl fmt::Display for Record {
                 let way = if *is_loading { "loading" } else { "unloading" };
                 write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
             }
+            Self::Noted { text } => write!(f, "note: {text}"),
             Self::HomeChecked { missed_pulses } => match missed_pulses {
                 0 => f.write_str("home is where it was; no pulse was missed"),
                 missed => write!(f, "home is {missed} pulses from where it was"),

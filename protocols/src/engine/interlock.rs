@@ -77,6 +77,10 @@ const STUCK_MS: u32 = 100;
 const RETRACT_HEADROOM: Newtons = Newtons(0.5);
 const RETRACT_HEADROOM_VOLTS: Volts = Volts(0.05);
 
+/// A pause of the computer that is over when it is noticed is no silence of the rig, and no stop could have left in it:
+/// what counts is whether samples come now. A longer one is silence, as long as a rig may keep silent at rest.
+const PAUSE_MAX: Nanos = Nanos::from_millis(250);
+
 /// What the interlocks remember between samples.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct Watch {
@@ -119,6 +123,15 @@ impl Watch {
     /// Samples are expected from now on.
     pub fn start(&mut self, now: Nanos) {
         self.last_at.get_or_insert(now);
+    }
+
+    /// The computer stood still so long.
+    pub fn excuse(&mut self, late: Nanos) {
+        if late <= PAUSE_MAX
+            && let Some(last) = &mut self.last_at
+        {
+            *last = *last + late;
+        }
     }
 
     /// The operator retracts: what is felt now may stay, but not grow.

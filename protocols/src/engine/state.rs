@@ -14,7 +14,7 @@ use super::tare::Taring;
 use super::weigh::Weighing;
 use crate::plans::{Plan, Prompt, Step};
 use palpate_model::Nanos;
-use palpate_model::calibration::Curve;
+use palpate_model::calibration::{Curve, SettlingNow};
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
@@ -304,6 +304,20 @@ impl State {
             }
             _ => None,
         }
+    }
+
+    /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
+    #[must_use]
+    pub fn settling(&self) -> Option<SettlingNow> {
+        match &self.activity {
+            Activity::Step(Active::Weigh(weighing)) => Some(weighing.now()),
+            _ => None,
+        }
+    }
+
+    /// Whether the last weight can be read again now, or why not.
+    pub fn can_redo(&self) -> Result<(), &'static str> {
+        super::weigh::redo_step(self).map(|_| ())
     }
 
     /// Index of the step in progress, and since when.

@@ -13,7 +13,7 @@ use super::self_test::SelfTest;
 use super::state::{Active, Activity, Derived, Pause, PauseView, Power, State};
 use super::tare::Taring;
 use super::weigh::Weighing;
-use super::{between, monitor, pause, prompt, stop};
+use super::{between, monitor, pause, prompt, stop, weigh};
 use crate::plans::Step;
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Phase, Reading, RigCommand};
@@ -40,6 +40,8 @@ pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) 
         Input::Ack(ack) => on_ack(&mut cx, ack),
         Input::Fault(fault) => on_fault(&mut cx, &fault),
         Input::Operator { choice } => on_operator(&mut cx, choice),
+        Input::HostLate { late } => cx.state.watch.excuse(late),
+        Input::Note { text } => cx.record(Record::Noted { text }),
         Input::LiveFit(estimate) => {
             cx.state.live = Some(estimate);
             hold::on_live_fit(&mut cx);
@@ -407,6 +409,7 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         Operator::Finish => pause::finish(cx),
         Operator::Confirm => prompt::answer(cx, Answer::Confirmed),
         Operator::Decline => prompt::answer(cx, Answer::Declined),
+        Operator::Redo => weigh::redo(cx),
     }
 }
 

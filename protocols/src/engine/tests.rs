@@ -613,3 +613,30 @@ fn a_probe_on_the_far_switch_may_leave_it_but_not_press_on() {
     assert!(matches!(sent[..], [RigCommand::MoveTo(command)] if command.target_pulses == 0));
     assert_eq!(tripped(&bench.sample(volts(0.0))), None);
 }
+
+#[test]
+fn a_pause_of_the_computer_is_no_silence_of_the_rig() {
+    let late = |ms| Input::HostLate {
+        late: Nanos::from_millis(ms),
+    };
+    let wait = |bench: &mut Bench, ms| bench.now = bench.now + Nanos::from_millis(ms);
+    // 0.1 mm at 9 mm/s is 11 ms; the floor is 20 ms. Sixty of 75 were the computer's.
+    let mut bench = jogging();
+    bench.give(late(60));
+    wait(&mut bench, 75);
+    assert_eq!(tripped(&bench.give(Input::Tick)), None);
+    // What is silent then is silent.
+    wait(&mut bench, 6);
+    assert_eq!(
+        tripped(&bench.give(Input::Tick)),
+        Some(Interlock::SampleAge)
+    );
+    // A computer that stood still for longer than a rig may keep silent at rest has no excuse.
+    let mut bench = jogging();
+    bench.give(late(251));
+    wait(&mut bench, 21);
+    assert_eq!(
+        tripped(&bench.give(Input::Tick)),
+        Some(Interlock::SampleAge)
+    );
+}

@@ -2,8 +2,10 @@
 
 use super::context::{Context, Progress};
 use super::input::Record;
-use crate::plans::Weigh;
-use palpate_model::calibration::{Settle, SettleRule, Settling};
+use super::state::{Active, Activity, Pause, State};
+use super::{pause, step};
+use crate::plans::{Step, Weigh};
+use palpate_model::calibration::{Settle, SettleRule, Settling, SettlingNow};
 use palpate_model::rig::Reading;
 use palpate_model::units::Volts;
 
@@ -57,6 +59,44 @@ impl Weighing {
                 });
                 Progress::Done
             }
+        }
+    }
+
+    /// How far the signal has come to rest.
+    pub fn now(&self) -> SettlingNow {
+        self.settling.now()
+    }
+}
+
+/// The prompt to go back to for weighing again what was weighed last, or what is being weighed; or why there is none.
+pub(super) fn redo_step(state: &State) -> Result<usize, &'static str> {
+    let steps = &state.config.plan.steps;
+    let at = state.step_index;
+    let is_weigh = |index: usize| matches!(steps[index].step, Step::Weigh(_));
+    let is_prompt = |index: usize| matches!(steps[index].step, Step::Prompt(_));
+    match &state.activity {
+        Activity::Step(Active::Weigh(_)) if at >= 1 && is_prompt(at - 1) => Ok(at - 1),
+        Activity::Step(Active::Prompt { .. })
+            if at >= 2 && is_weigh(at - 1) && is_prompt(at - 2) =>
+        {
+            Ok(at - 2)
+        }
+        _ => Err("no weight was read just before"),
+    }
+}
+
+/// The operator wants to read a weight again.
+pub(super) fn redo(cx: &mut Context<'_>) {
+    match redo_step(cx.state) {
+        Ok(step_index) => {
+            if cx.state.pause == Some(Pause::Extended) {
+                pause::resume(cx);
+            }
+            step::begin(cx, step_index);
+        }
+        Err(reason) => {
+            let reason = reason.to_owned();
+            cx.record(Record::Refused { reason });
         }
     }
 }

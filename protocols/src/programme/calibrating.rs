@@ -1,9 +1,8 @@
 //! From a session of weight steps to the calibration it measured.
 
 use crate::engine::{Effect, PLAN_COMPLETE, Record};
-use palpate_model::calibration::{
-    CALIBRATION_FORMAT, Calibration, CalibrationError, Direction, Series, SeriesStep,
-};
+use crate::weighed::Readings;
+use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, CalibrationError, Series};
 use palpate_model::units::Volts;
 use palpate_sessions::{EntryKind, Session};
 use thiserror::Error;
@@ -48,32 +47,22 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
             ending: ending.into(),
         });
     }
+    // Decisions of other kinds are other types; a reading that cannot be read back would be no reading.
     let decisions = session
         .entries
         .iter()
-        .filter(|entry| entry.kind == EntryKind::Decision);
+        .filter(|one| one.kind == EntryKind::Decision);
+    let records: Vec<Record> = decisions
+        .filter_map(|one| match serde_json::from_value(one.body.clone()) {
+            Ok(Effect::Record(record)) => Some(record),
+            _ => None,
+        })
+        .collect();
+    let readings = Readings::of(&records);
     let mut series: Vec<Series> = Vec::new();
     let mut empty: Vec<Volts> = Vec::new();
-    for entry in decisions {
-        // Decisions of other kinds are other types; a reading that cannot be read back would be no reading.
-        let Ok(Effect::Record(Record::Weighed {
-            mass_g,
-            is_loading,
-            repeat,
-            volts,
-            noise,
-            slope_v_per_s,
-            samples,
-            waited,
-        })) = serde_json::from_value(entry.body.clone())
-        else {
-            continue;
-        };
-        let direction = if is_loading {
-            Direction::Loading
-        } else {
-            Direction::Unloading
-        };
+    for one in readings.all() {
+        let (direction, repeat) = (one.direction, one.repeat);
         let is_same = |one: &Series| (one.direction, one.repeat) == (direction, repeat);
         if !series.last().is_some_and(is_same) {
             series.push(Series {
@@ -82,20 +71,11 @@ pub fn calibration_of(session: &Session, name: &str) -> Result<Calibration, Cali
                 steps: Vec::new(),
             });
         }
-        if mass_g == 0.0 {
-            empty.push(volts);
+        if one.mass_g() == 0.0 {
+            empty.push(one.volts());
         }
-        let step = SeriesStep {
-            mass_g,
-            weights: Vec::new(),
-            volts,
-            noise: Some(noise),
-            samples: Some(samples),
-            slope_v_per_s: Some(slope_v_per_s),
-            waited_s: Some(waited.0),
-        };
         if let Some(last) = series.last_mut() {
-            last.steps.push(step);
+            last.steps.push(one.step.clone());
         }
     }
     if series.is_empty() {

@@ -1,10 +1,12 @@
 //! What is shown of a run, gathered from what goes into its engine and what comes out: the same for a run in
 //! progress and for one that is replayed.
 
-use super::snapshot::{Lateness, LogLine, PromptView, RunView};
+use super::snapshot::{Lateness, LogLine, PromptView, RunView, ToWeigh, Touch};
 use crate::base::FoundBase;
 use crate::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
+use crate::plans::Step;
 use crate::preview::StepPreview;
+use crate::weighed::{Readings, Weighed};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use palpate_model::signal::LiveTrace;
@@ -32,6 +34,12 @@ pub(crate) struct Board {
     phases: Arc<Vec<(f64, Phase)>>,
     cycle_starts: Arc<Vec<(f64, u32)>>,
     cycles: u32,
+    to_weigh: Arc<Vec<ToWeigh>>,
+    readings: Readings,
+    weighed: Arc<Vec<Weighed>>,
+    /// Force over position while the surface is searched.
+    approach: Arc<LiveTrace>,
+    touches: Arc<Vec<Touch>>,
     outcome: Option<Outcome>,
 }
 
@@ -62,6 +70,11 @@ impl Board {
             phases: Arc::new(Vec::new()),
             cycle_starts: Arc::new(Vec::new()),
             cycles: cycles.unwrap_or(0),
+            to_weigh: Arc::new(to_weigh(config)),
+            readings: Readings::default(),
+            weighed: Arc::default(),
+            approach: Arc::new(LiveTrace::new(TRACE_BUCKETS)),
+            touches: Arc::default(),
             outcome: None,
         }
     }
@@ -105,6 +118,10 @@ impl Board {
             }
             let depth = derived.depth.unwrap_or(Depth(f64::NAN));
             Arc::make_mut(&mut self.trace).push(self.now.seconds(), depth, force);
+            if state.phase() == Phase::Contact {
+                let position = Depth(derived.position.0);
+                Arc::make_mut(&mut self.approach).push(self.now.seconds(), position, force);
+            }
         }
     }
 
@@ -112,6 +129,28 @@ impl Board {
     pub fn record(&mut self, record: &Record) {
         if let Record::PhaseStarted { phase, .. } = record {
             Arc::make_mut(&mut self.phases).push((self.now.seconds().0, *phase));
+            if *phase == Phase::Contact {
+                self.approach = Arc::new(LiveTrace::new(TRACE_BUCKETS));
+                self.touches = Arc::default();
+            }
+        }
+        if let Record::ContactTriggered {
+            pass,
+            position,
+            force,
+            ..
+        } = record
+        {
+            let (pass, position, force) = (*pass, *position, *force);
+            Arc::make_mut(&mut self.touches).push(Touch {
+                pass,
+                position,
+                force,
+            });
+        }
+        self.readings.record(record);
+        if self.readings.all() != self.weighed.as_slice() {
+            self.weighed = Arc::new(self.readings.all().to_vec());
         }
         if let Record::ContactFound {
             position,
@@ -187,6 +226,12 @@ impl Board {
             cycle: state.cycle(),
             cycles: self.cycles,
             cycle_starts: Arc::clone(&self.cycle_starts),
+            to_weigh: Arc::clone(&self.to_weigh),
+            weighed: Arc::clone(&self.weighed),
+            settling: state.settling(),
+            can_redo: state.can_redo().map_err(String::from),
+            approach: Arc::clone(&self.approach),
+            touches: Arc::clone(&self.touches),
             holding: state.holding().cloned(),
             can_retract: state.can_retract().map_err(String::from),
             outcome: self.outcome.clone(),
@@ -228,6 +273,21 @@ impl Board {
         let done = self.now.seconds().0;
         (Seconds(left), done / (done + left).max(1e-9))
     }
+}
+
+/// The readings under known masses that a plan has.
+fn to_weigh(config: &Config) -> Vec<ToWeigh> {
+    let steps = config.plan.steps.iter().enumerate();
+    let weigh = steps.filter_map(|(step_index, planned)| match &planned.step {
+        Step::Weigh(weigh) => Some(ToWeigh {
+            step_index,
+            mass_g: weigh.mass_g,
+            is_loading: weigh.is_loading,
+            repeat: weigh.repeat,
+        }),
+        _ => None,
+    });
+    weigh.collect()
 }
 
 /// The nearest place ahead where a pause spoils nothing, by its name.

@@ -11,6 +11,7 @@ use arc_swap::ArcSwap;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand, RigDescription};
+use palpate_model::units::Seconds;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
@@ -40,6 +41,8 @@ pub enum Request {
     Run(Box<RunRequest>, SyncSender<Result<(), StartError>>),
     /// The operator's choice for the run in progress. A stop without a run stops the axis.
     Operator(Operator),
+    /// Write something down in the run in progress.
+    Note(String),
     /// Connect the rig anew after its link was lost. Nothing moves, and it has to be zeroed again. Not while a run goes on.
     Reconnect,
     /// Stop motion and end the thread.
@@ -132,6 +135,8 @@ pub(super) struct MainLoop {
     now: Nanos,
     next_tick: Nanos,
     is_sample_seen: bool,
+    /// How late the loop was at its last turn.
+    behind: Duration,
     reading: Option<Reading>,
     is_homed: bool,
     link_error: Option<String>,
@@ -149,6 +154,7 @@ impl MainLoop {
             now: Nanos::ZERO,
             next_tick: TICK,
             is_sample_seen: false,
+            behind: Duration::ZERO,
             reading: None,
             is_homed: false,
             link_error: None,
@@ -178,6 +184,7 @@ impl MainLoop {
                 run.keep_lateness(pacer.lateness());
             }
             self.watch(pacer.behind());
+            self.heed_pause(pacer.behind());
             let is_ending = match wake_up {
                 Wake::Time => {
                     self.advance(target);
@@ -219,6 +226,15 @@ impl MainLoop {
         let now = run.session_time(self.now);
         let rig = &mut self.rig;
         run.watch(now, lateness, &mut |asked| act(rig.as_mut(), asked));
+    }
+
+    /// Tells the run of a pause of the computer. The time of a simulated rig waits for it.
+    fn heed_pause(&mut self, behind: Duration) {
+        let late = behind.saturating_sub(std::mem::replace(&mut self.behind, behind));
+        let late = Nanos::from_seconds(Seconds(late.as_secs_f64()));
+        if late > TICK && !self.rig.is_virtual() {
+            self.feed(Input::HostLate { late });
+        }
     }
 
     fn is_running(&self) -> bool {
@@ -343,6 +359,7 @@ impl MainLoop {
                     self.is_homed = false;
                 }
             }
+            Request::Note(text) => self.feed(Input::Note { text }),
             Request::Reconnect if self.is_running() => {}
             Request::Reconnect => {
                 self.reading = None;

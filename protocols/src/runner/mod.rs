@@ -21,5 +21,5 @@ pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
 pub(crate) use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;
-pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot};
+pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot, ToWeigh, Touch};
 pub use start::{AfterStop, Answers, RunRequest, StartError};

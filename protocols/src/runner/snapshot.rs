@@ -3,11 +3,13 @@
 use crate::base::FoundBase;
 use crate::engine::{Contact, Derived, Outcome, PauseView, Power, Tare};
 use crate::preview::StepPreview;
+use crate::weighed::Weighed;
 use palpate_model::Nanos;
+use palpate_model::calibration::SettlingNow;
 use palpate_model::fit::LiveEstimate;
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::signal::LiveTrace;
-use palpate_model::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Position, Seconds};
 use palpate_sessions::edits::Verdict;
 use std::path::PathBuf;
 use std::sync::Arc;
@@ -106,6 +108,18 @@ pub struct RunView {
     pub cycles: u32,
     /// Session time in s at which each repeat began, with its number.
     pub cycle_starts: Arc<Vec<(f64, u32)>>,
+    /// Every reading under a known mass that the plan has.
+    pub to_weigh: Arc<Vec<ToWeigh>>,
+    /// Readings under known masses so far.
+    pub weighed: Arc<Vec<Weighed>>,
+    /// How far the signal under the mass on the cell has come to rest; `None` where nothing is weighed.
+    pub settling: Option<SettlingNow>,
+    /// Whether the last weight can be read again now, or why not.
+    pub can_redo: Result<(), String>,
+    /// Force over machine position (as its depth) of the last search for the surface.
+    pub approach: Arc<LiveTrace>,
+    /// What that search felt.
+    pub touches: Arc<Vec<Touch>>,
     /// Set while the run waits for retract or close after a stop.
     pub holding: Option<Outcome>,
     /// Whether a retract is possible now, or why not.
@@ -125,6 +139,30 @@ pub struct RunView {
 impl RunView {
     /// Most lines of the event log kept for the screen. The session log keeps them all.
     pub const EVENTS_MAX: usize = 500;
+}
+
+/// A reading under a known mass as the plan has it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ToWeigh {
+    /// Its step of the plan.
+    pub step_index: usize,
+    /// The mass in g, platform included.
+    pub mass_g: f64,
+    /// Whether the masses go up.
+    pub is_loading: bool,
+    /// Which pass through the masses, from 1.
+    pub repeat: u32,
+}
+
+/// Where a search for the surface felt something.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Touch {
+    /// 1 for the approach, 2 for the slow pass.
+    pub pass: u8,
+    /// Where, from home.
+    pub position: Position,
+    /// The filtered force above tare there.
+    pub force: Newtons,
 }
 
 /// A question to a person.

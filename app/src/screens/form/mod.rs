@@ -4,12 +4,13 @@ mod field;
 
 pub use field::{ParamField, ToldField};
 
+use crate::command::Aside;
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::file::{Problem, Protocol, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
-use palpate_protocols::runner::{AfterStop, Answers, Labels, RunRequest};
+use palpate_protocols::runner::{AfterStop, Answers, Labels, RigView, RunRequest};
 use palpate_sessions::about::KEYS;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -183,6 +184,55 @@ impl ProtocolForm {
                 field.error = told.err().map(|err| err.to_string());
             }
         }
+    }
+
+    /// Writes into a field of what is told; a name that is none changes nothing.
+    pub fn set_told(&mut self, name: &str, text: &str) {
+        let field = self.told.iter_mut().find(|field| field.key.name == name);
+        if let Some(field) = field {
+            text.clone_into(&mut field.text);
+        }
+    }
+
+    /// What stands in a field of what is told.
+    #[must_use]
+    pub fn told_text(&self, name: &str) -> &str {
+        let field = self.told.iter().find(|field| field.key.name == name);
+        field.map_or("", |field| &field.text)
+    }
+
+    /// The request for a run beside what stands in the form, or why there is none.
+    pub fn aside(&self, aside: &Aside, rig: &RigView, bench: &Bench) -> Result<RunRequest, String> {
+        let words = |problems: &[Problem]| {
+            problems
+                .first()
+                .map_or_else(String::new, ToString::to_string)
+        };
+        let protocol = built_in(aside.protocol)
+            .ok_or("the protocol is not built in")?
+            .map_err(|problems| words(&problems))?;
+        let plan = protocol
+            .plan(&aside.values)
+            .map_err(|problems| words(&problems))?;
+        let preview = preview(
+            &plan,
+            &rig.description,
+            &bench.limits,
+            &bench.curve,
+            rig.is_homed,
+        );
+        preview.verdict(false)?;
+        Ok(RunRequest {
+            plan,
+            calibration: bench.calibration.clone(),
+            limits: bench.limits,
+            out: self.session_folder(),
+            labels: self.labels.clone(),
+            is_acknowledged: false,
+            to_acknowledge: Vec::new(),
+            after_stop: AfterStop::Wait,
+            answers: Answers::Operator,
+        })
     }
 
     /// What is indented, as far as it is told.

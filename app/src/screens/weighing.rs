@@ -1,0 +1,279 @@
+//! One weight after the other: what is asked for, whether the signal is steady, what was read against what the
+//! calibration in use expects, and how far both are apart.
+
+use super::form::Bench;
+use crate::command::{Command, Commands};
+use crate::plots::style::quiet;
+use crate::shell::run_strip::{Wish, is_controllable};
+use crate::theme::{Tokens, reading_style};
+use crate::widgets::reason_button::reason_button;
+use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
+use egui_plot::{HLine, MarkerShape, Plot, PlotPoints, Points};
+use palpate_model::calibration::{Curve, Direction, SettlingNow, newtons_of};
+use palpate_model::units::Volts;
+use palpate_protocols::runner::{RunView, ToWeigh};
+use palpate_protocols::weighed::Weighed;
+
+/// Height of the table in points.
+const TABLE_HEIGHT: f32 = 250.0;
+
+/// Draws the readings of a run that weighs.
+pub fn weighing_ui(
+    ui: &mut Ui,
+    run: &RunView,
+    signal: Option<Volts>,
+    bench: &Bench,
+    commands: &mut Commands,
+) {
+    let next = next_of(run);
+    now_ui(ui, run, next, signal, &bench.curve);
+    let verdict = match is_controllable(run) {
+        true => run.can_redo.clone(),
+        false => Err("the run does not go on".into()),
+    };
+    ui.horizontal(|ui| {
+        if reason_button(
+            ui,
+            "Read the last weight again",
+            vec2(190.0, 28.0),
+            &verdict,
+        ) {
+            commands.push(Command::Wish(Wish::Redo));
+        }
+    });
+    ui.add_space(4.0);
+    let rows: Vec<Row> = run
+        .to_weigh
+        .iter()
+        .map(|planned| row(planned, run, next, &bench.curve))
+        .collect();
+    let columns = [
+        Column::numbers("pass", 40.0),
+        Column::words("masses go", 76.0),
+        Column::numbers("mass (g)", 70.0),
+        Column::numbers("expected (V)", 90.0),
+        Column::numbers("measured (V)", 90.0),
+        Column::numbers("apart (mV)", 80.0),
+        Column::numbers("apart (N)", 80.0),
+        Column::words("", 120.0),
+    ];
+    ui.allocate_ui(vec2(ui.available_width(), TABLE_HEIGHT), |ui| {
+        table_ui(ui, "readings", &columns, &rows);
+    });
+    residuals_ui(ui, run, bench);
+}
+
+/// The reading that comes next or is under way.
+fn next_of(run: &RunView) -> Option<&ToWeigh> {
+    let is_over = run.outcome.is_some();
+    let mut ahead = run.to_weigh.iter();
+    ahead.find(|one| !is_over && one.step_index >= run.step_index)
+}
+
+fn now_ui(
+    ui: &mut Ui,
+    run: &RunView,
+    next: Option<&ToWeigh>,
+    signal: Option<Volts>,
+    curve: &Curve,
+) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let place = match next {
+        Some(next) => {
+            let done = run.weighed.len();
+            let expected = curve.volts_from_newtons(newtons_of(next.mass_g));
+            format!(
+                "Reading {} of {}: {} g in all, {:.4} expected",
+                done + 1,
+                run.to_weigh.len(),
+                next.mass_g,
+                expected
+            )
+        }
+        None => format!(
+            "{} of {} readings taken",
+            run.weighed.len(),
+            run.to_weigh.len()
+        ),
+    };
+    ui.label(RichText::new(place).heading().strong());
+    ui.horizontal(|ui| {
+        let signal = signal.map_or_else(|| "--".to_owned(), |volts| format!("{volts:.4}"));
+        ui.label(RichText::new(signal).text_style(reading_style()));
+        ui.add_space(12.0);
+        match &run.settling {
+            Some(settling) => steady_ui(ui, settling),
+            None => {
+                let words = "The signal is watched once the weight lies on the cell and Done F2 is pressed.";
+                ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
+            }
+        }
+    });
+}
+
+/// The stability indicator: how full the window is that must be steady, and what keeps it from being so.
+fn steady_ui(ui: &mut Ui, settling: &SettlingNow) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.vertical(|ui| {
+        ui.add(
+            ProgressBar::new(settling.filled as f32)
+                .desired_width(240.0)
+                .desired_height(10.0)
+                .corner_radius(2)
+                .fill(tokens.text_quiet),
+        );
+        ui.label(steady_words(settling));
+    });
+}
+
+/// The same in words.
+fn steady_words(settling: &SettlingNow) -> String {
+    let left = (settling.timeout.0 - settling.waited.0).max(0.0);
+    match &settling.last {
+        None => format!("watching for {:.1} s; {left:.0} s left", settling.waited.0),
+        Some(last) if last.noise.0 > settling.noise_max.0 => format!(
+            "it scatters by {:.2} mV, {:.2} mV are steady; {left:.0} s left",
+            last.noise.0 * 1e3,
+            settling.noise_max.0 * 1e3
+        ),
+        Some(last) => format!(
+            "it moves by {:+.2} mV/s, {:.2} mV/s are steady; {left:.0} s left",
+            last.slope_v_per_s * 1e3,
+            settling.slope_max_v_per_s * 1e3
+        ),
+    }
+}
+
+fn row(planned: &ToWeigh, run: &RunView, next: Option<&ToWeigh>, curve: &Curve) -> Row {
+    let taken = run
+        .weighed
+        .iter()
+        .find(|one| one.step_index == planned.step_index);
+    let is_next = next == Some(planned);
+    let expected = curve.volts_from_newtons(newtons_of(planned.mass_g));
+    let apart = taken.map(|one| Apart::of(one, curve));
+    let cells = vec![
+        planned.repeat.to_string(),
+        if planned.is_loading { "up" } else { "down" }.into(),
+        planned.mass_g.to_string(),
+        format!("{:.4}", expected.0),
+        taken.map_or_else(String::new, |one| format!("{:.4}", one.volts().0)),
+        apart
+            .as_ref()
+            .map_or_else(String::new, |apart| format!("{:+.1}", apart.mv)),
+        apart
+            .as_ref()
+            .map_or_else(String::new, |apart| format!("{:+.3}", apart.newtons)),
+        match (taken, is_next) {
+            (Some(_), _) => "read".into(),
+            (None, true) => "now".into(),
+            (None, false) => String::new(),
+        },
+    ];
+    Row {
+        cells,
+        look: match (taken, is_next) {
+            (_, true) => RowLook::Marked,
+            (None, false) => RowLook::Quiet,
+            (Some(_), false) => RowLook::Plain,
+        },
+        hint: None,
+    }
+}
+
+/// A reading against what the calibration in use expects.
+struct Apart {
+    mv: f64,
+    newtons: f64,
+}
+
+impl Apart {
+    fn of(one: &Weighed, curve: &Curve) -> Self {
+        let known = newtons_of(one.mass_g());
+        Self {
+            mv: (one.volts().0 - curve.volts_from_newtons(known).0) * 1e3,
+            newtons: curve.newtons_from_volts(one.volts()).0 - known.0,
+        }
+    }
+}
+
+fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let words = format!(
+        "Force by the calibration in use ({}) less the weight's",
+        bench.calibration.name
+    );
+    ui.label(RichText::new(words).strong());
+    let heaviest = run
+        .to_weigh
+        .iter()
+        .map(|one| one.mass_g)
+        .fold(0.0, f64::max);
+    quiet(Plot::new("weighing residuals"), tokens)
+        .x_axis_label("weight (N)")
+        .y_axis_label("apart (N)")
+        .include_x(0.0)
+        .include_x(newtons_of(heaviest).0)
+        .show(ui, |plot_ui| {
+            plot_ui.hline(
+                HLine::new("none", 0.0)
+                    .color(tokens.line)
+                    .allow_hover(false),
+            );
+            for (name, direction, shape) in [
+                ("masses go up", Direction::Loading, MarkerShape::Up),
+                ("masses go down", Direction::Unloading, MarkerShape::Down),
+            ] {
+                let points: Vec<[f64; 2]> = run
+                    .weighed
+                    .iter()
+                    .filter(|one| one.direction == direction)
+                    .map(|one| {
+                        [
+                            newtons_of(one.mass_g()).0,
+                            Apart::of(one, &bench.curve).newtons,
+                        ]
+                    })
+                    .collect();
+                plot_ui.points(
+                    Points::new(name, PlotPoints::from(points))
+                        .shape(shape)
+                        .radius(4.0)
+                        .color(tokens.series),
+                );
+            }
+        });
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::calibration::Steady;
+    use palpate_model::units::Seconds;
+
+    #[test]
+    fn the_indicator_says_what_is_missing() {
+        let mut settling = SettlingNow {
+            waited: Seconds(1.2),
+            timeout: Seconds(30.0),
+            filled: 0.5,
+            last: None,
+            slope_max_v_per_s: 0.0,
+            noise_max: Volts(0.005),
+        };
+        assert_eq!(steady_words(&settling), "watching for 1.2 s; 29 s left");
+        let mut steady = Steady {
+            mean: Volts(1.3),
+            noise: Volts(0.02),
+            slope_v_per_s: 0.004,
+            samples: 2000,
+            waited: Seconds(2.5),
+        };
+        settling.last = Some(steady);
+        assert!(steady_words(&settling).starts_with("it scatters by 20.00 mV, 5.00 mV are"));
+        steady.noise = Volts(0.001);
+        settling.last = Some(steady);
+        assert!(steady_words(&settling).starts_with("it moves by +4.00 mV/s"));
+    }
+}

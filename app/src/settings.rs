@@ -1,0 +1,179 @@
+//! What the window remembers of its user, as one small JSON file in the library: how it looked when it was last closed.
+
+use serde::{Deserialize, Serialize};
+use std::io::ErrorKind;
+use std::path::{Path, PathBuf};
+
+/// Name of the file in the library.
+pub const SETTINGS_FILE: &str = "window.json";
+
+/// A longer file is something else.
+const BYTES_MAX: usize = 64 * 1024;
+
+/// Text may be half to twice and a half as large as it is made.
+pub const ZOOM: std::ops::RangeInclusive<f32> = 0.5..=2.5;
+
+/// What is remembered.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(default)]
+pub struct Settings {
+    /// Whether the dark theme is on.
+    pub is_dark: bool,
+    /// Size of everything, 1 as it is made.
+    pub zoom: f32,
+    /// Name of the screen shown last.
+    pub screen: String,
+    /// Widths of the panels left and right of the middle, and height of the event log, in points; none as they are made.
+    pub left: Option<f32>,
+    /// See [`Self::left`].
+    pub right: Option<f32>,
+    /// See [`Self::left`].
+    pub log: Option<f32>,
+    /// Who ran the last protocol.
+    pub operator: String,
+    /// Folder for new sessions; empty for the library.
+    pub sessions: String,
+    /// Whether the tour was taken or put away.
+    pub is_tour_over: bool,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            is_dark: false,
+            zoom: 1.0,
+            screen: String::new(),
+            left: None,
+            right: None,
+            log: None,
+            operator: String::new(),
+            sessions: String::new(),
+            is_tour_over: false,
+        }
+    }
+}
+
+impl Settings {
+    /// Those of a file; the usual ones where there is none.
+    pub fn read(path: &Path) -> Result<Self, String> {
+        let text = match std::fs::read_to_string(path) {
+            Ok(text) => text,
+            Err(err) if err.kind() == ErrorKind::NotFound => return Ok(Self::default()),
+            Err(err) => return Err(unreadable(path, &err.to_string())),
+        };
+        if text.len() > BYTES_MAX {
+            return Err(unreadable(path, "it is too long"));
+        }
+        let read: Self =
+            serde_json::from_str(&text).map_err(|err| unreadable(path, &err.to_string()))?;
+        Ok(Self {
+            zoom: if read.zoom.is_finite() {
+                read.zoom.clamp(*ZOOM.start(), *ZOOM.end())
+            } else {
+                1.0
+            },
+            ..read
+        })
+    }
+
+    /// Writes them; the file is replaced as a whole.
+    pub fn write(&self, path: &Path) -> Result<(), String> {
+        let unwritable = |err: &dyn std::fmt::Display| {
+            format!(
+                "the window's settings cannot be written to {} ({err})",
+                path.display()
+            )
+        };
+        let text = serde_json::to_string_pretty(self).map_err(|err| unwritable(&err))?;
+        if let Some(folder) = path.parent() {
+            std::fs::create_dir_all(folder).map_err(|err| unwritable(&err))?;
+        }
+        let beside = path.with_extension("json.new");
+        std::fs::write(&beside, text + "\n").map_err(|err| unwritable(&err))?;
+        std::fs::rename(&beside, path).map_err(|err| unwritable(&err))
+    }
+}
+
+fn unreadable(path: &Path, reason: &str) -> String {
+    format!(
+        "the window's settings in {} cannot be read ({reason}); it looks as it is made, and the file is left alone until it is mended or deleted",
+        path.display()
+    )
+}
+
+/// The settings and where they are kept, if anywhere.
+#[derive(Debug, Default)]
+pub struct Kept {
+    /// As they are now.
+    pub now: Settings,
+    /// As the file has them.
+    stored: Settings,
+    path: Option<PathBuf>,
+}
+
+impl Kept {
+    /// Reads them; what is wrong with the file is told once, and then nothing is written there.
+    pub fn open(path: Option<PathBuf>) -> (Self, Option<String>) {
+        let Some(path) = path else {
+            return (Self::default(), None);
+        };
+        match Settings::read(&path) {
+            Ok(read) => {
+                let kept = Self {
+                    now: read.clone(),
+                    stored: read,
+                    path: Some(path),
+                };
+                (kept, None)
+            }
+            Err(reason) => (Self::default(), Some(reason)),
+        }
+    }
+
+    /// Whether this is kept anywhere.
+    #[must_use]
+    pub fn is_kept(&self) -> bool {
+        self.path.is_some()
+    }
+
+    /// Writes what has changed.
+    pub fn store(&mut self) -> Result<(), String> {
+        match &self.path {
+            Some(path) if self.now != self.stored => {
+                self.now.write(path)?;
+                self.stored = self.now.clone();
+                Ok(())
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("sub").join(SETTINGS_FILE);
+        let (mut kept, told) = Kept::open(Some(path.clone()));
+        assert_eq!((&kept.now, told), (&Settings::default(), None));
+        kept.now.zoom = 1.5;
+        kept.now.operator = "Ada \"L\"".into();
+        kept.store().unwrap();
+        let (again, _) = Kept::open(Some(path.clone()));
+        assert_eq!(again.now, kept.now);
+        for broken in ["{", "[1]", "{\"zoom\": \"large\"}"] {
+            std::fs::write(&path, broken).unwrap();
+            let (mut kept, told) = Kept::open(Some(path.clone()));
+            assert!(told.unwrap().contains("cannot be read"), "{broken}");
+            kept.now.zoom = 2.0;
+            kept.store().unwrap();
+            assert_eq!(std::fs::read_to_string(&path).unwrap(), broken);
+        }
+        // A newer palpate may keep more; a size that nobody can read is not taken.
+        std::fs::write(&path, "{\"zoom\": 99.0, \"from_the_future\": 1}").unwrap();
+        assert_eq!(Kept::open(Some(path)).0.now.zoom, *ZOOM.end());
+    }
+}

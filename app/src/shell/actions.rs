@@ -1,0 +1,104 @@
+//! Everything that the window can be asked for, for its palette.
+
+use super::activity::run_in_progress;
+use super::palette::Action;
+use super::rail::Screen;
+use super::run_strip::Wish;
+use crate::app::WorkbenchApp;
+use crate::command::{Aside, Command, TextSize};
+use crate::screens::run_middle::{Middle, is_offered};
+use crate::workers::path_dialog::Ask;
+use palpate_protocols::file::BUILT_IN;
+
+impl WorkbenchApp {
+    /// What can be asked for now, and of the rest why not.
+    pub(crate) fn actions(&self) -> Vec<Action> {
+        let run = run_in_progress(&self.snapshot);
+        let no_run = || Err("no run is in progress".to_owned());
+        let mut actions = vec![
+            Action::new("Stop motion", "F12, Escape", Command::Stop),
+            Action::new("Halt: cut the motion without braking", "F11", Command::Halt),
+            Action::new("Start the protocol", "F5", Command::Start).if_ok(self.start_verdict()),
+        ];
+        for (name, keys, wish) in [
+            ("Pause", "F7", Wish::Pause),
+            ("Pause at the next checkpoint", "F4", Wish::PauseAfter),
+            ("Resume", "F9", Wish::Resume),
+            ("Finish early", "F10", Wish::Finish),
+            ("Abort the run", "", Wish::Abort),
+            ("Answer the prompt: done", "F2", Wish::Confirm),
+            ("Answer the prompt: not done", "", Wish::Decline),
+            ("Read the last weight again", "", Wish::Redo),
+        ] {
+            let verdict = run.map_or_else(no_run, |run| wish.operator(run).map(|_| ()));
+            actions.push(Action::new(name, keys, Command::Wish(wish)).if_ok(verdict));
+        }
+        let has_run = run.map_or_else(no_run, |_| Ok(()));
+        let can_retract = run.map_or_else(no_run, |run| run.can_retract.clone());
+        let is_held = match run.map(|run| run.holding.is_some()) {
+            Some(true) => Ok(()),
+            Some(false) => Err("the run has not stopped".to_owned()),
+            None => no_run(),
+        };
+        let is_lost = match self.snapshot.rig.link_error {
+            Some(_) => Ok(()),
+            None => Err("the link is there".to_owned()),
+        };
+        actions.extend([
+            Action::new("Retract after a stop", "F8", Command::Retract).if_ok(can_retract),
+            Action::new("Close the session after a stop", "", Command::CloseSession).if_ok(is_held),
+            Action::new("Write a note or a mark", "F3", Command::NoteTyped).if_ok(has_run),
+            Action::new("Find home", "", Command::Aside(Aside::home())).if_ok(self.aside_verdict()),
+            Action::new("Connect the rig again", "", Command::Reconnect).if_ok(is_lost),
+            Action::new("List the serial ports again", "", Command::ListPorts),
+            Action::new("Begin the work of this screen", "F6", Command::Work),
+            Action::new("Cancel the work of this screen", "", Command::CancelWork),
+        ]);
+        for screen in Screen::ALL {
+            let keys = format!("Ctrl+{}", screen.key().symbol_or_name());
+            let name = format!("Screen {}: {}", screen.name(), screen.purpose());
+            actions.push(Action::new(name, &keys, Command::Show(screen)));
+        }
+        for (view, name) in [
+            (Middle::Choose, "View: protocols"),
+            (Middle::Course, "View: expected course"),
+            (Middle::Measured, "View: measured"),
+            (Middle::Weighing, "View: weights"),
+            (Middle::Approach, "View: search for the surface"),
+        ] {
+            let verdict = match is_offered(view, self.snapshot.run.as_ref()) {
+                true => Ok(()),
+                false => Err("the run has no such thing".to_owned()),
+            };
+            actions.push(Action::new(name, "", Command::View(view)).if_ok(verdict));
+        }
+        let is_free = match self.is_busy() {
+            true => Err("a run is in progress".to_owned()),
+            false => Ok(()),
+        };
+        for (name, _) in BUILT_IN {
+            let words = format!("Protocol {name}");
+            actions
+                .push(Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone()));
+        }
+        actions.extend([
+            Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)),
+            Action::new("Measure a calibration", "", Command::MeasureCalibration).if_ok(is_free),
+            Action::new("Light or dark screen", "", Command::SwitchTheme),
+            Action::new("Larger text", "Ctrl++", Command::TextSize(TextSize::Larger)),
+            Action::new(
+                "Smaller text",
+                "Ctrl+-",
+                Command::TextSize(TextSize::Smaller),
+            ),
+            Action::new(
+                "Text as it is made",
+                "Ctrl+0",
+                Command::TextSize(TextSize::Usual),
+            ),
+            Action::new("Take the tour", "", Command::TourStart),
+            Action::new("This list", "Ctrl+K, F1", Command::Palette),
+        ]);
+        actions
+    }
+}

@@ -1,0 +1,193 @@
+//! Everything that can be asked for, by name: the command palette, which is the list of keys too.
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use eframe::egui::{
+    Align, Align2, Area, Button, Frame, Id, Key, Label, Layout, Margin, Modifiers, Order, RichText,
+    ScrollArea, Stroke, TextEdit, Ui, vec2,
+};
+
+/// One thing that can be asked for.
+#[derive(Clone, Debug)]
+pub struct Action {
+    /// What it does, as a person would say it.
+    pub name: String,
+    /// Its keys; empty if it has none.
+    pub keys: String,
+    /// What is sent.
+    pub command: Command,
+    /// Whether it can be asked for now, or why not.
+    pub verdict: Result<(), String>,
+}
+
+impl Action {
+    /// One that is always possible.
+    #[must_use]
+    pub fn new(name: impl Into<String>, keys: &str, command: Command) -> Self {
+        Self {
+            name: name.into(),
+            keys: keys.into(),
+            command,
+            verdict: Ok(()),
+        }
+    }
+
+    /// The same, if this allows it.
+    #[must_use]
+    pub fn if_ok(self, verdict: Result<(), String>) -> Self {
+        Self { verdict, ..self }
+    }
+}
+
+/// The palette, which may be open.
+#[derive(Debug, Default)]
+pub struct Palette {
+    is_open: bool,
+    is_fresh: bool,
+    typed: String,
+    chosen: usize,
+}
+
+impl Palette {
+    /// Opens it empty, or closes it.
+    pub fn toggle(&mut self) {
+        let is_open = !self.is_open;
+        *self = Self {
+            is_open,
+            is_fresh: is_open,
+            ..Self::default()
+        };
+    }
+
+    /// Closes it.
+    pub fn close(&mut self) {
+        *self = Self::default();
+    }
+
+    /// Whether it is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.is_open
+    }
+
+    /// Draws it over everything but in nobody's way: what is beneath can still be pressed.
+    pub fn ui(&mut self, ui: &Ui, actions: &[Action], commands: &mut Commands) {
+        if !self.is_open {
+            return;
+        }
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        // Beside the stop control, never over it.
+        Area::new(Id::unique("palette"))
+            .order(Order::Foreground)
+            .anchor(Align2::CENTER_TOP, vec2(0.0, 74.0))
+            .show(ui.ctx(), |ui| {
+                Frame::new()
+                    .fill(tokens.panel)
+                    .stroke(Stroke::new(2.0, tokens.text_quiet))
+                    .inner_margin(Margin::same(10))
+                    .show(ui, |ui| {
+                        ui.set_width(620.0);
+                        self.content_ui(ui, actions, commands);
+                    });
+            });
+    }
+
+    fn content_ui(&mut self, ui: &mut Ui, actions: &[Action], commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let (mut moved, mut is_taken) = (0_isize, false);
+        ui.input_mut(|input| {
+            for (key, by) in [(Key::ArrowDown, 1), (Key::ArrowUp, -1)] {
+                if input.consume_key(Modifiers::NONE, key) {
+                    moved = by;
+                }
+            }
+            is_taken = input.consume_key(Modifiers::NONE, Key::Enter);
+        });
+        ui.horizontal(|ui| {
+            let label = ui.label("what to do");
+            let input = TextEdit::singleline(&mut self.typed)
+                .desired_width(ui.available_width() - 90.0)
+                .char_limit(100)
+                .hint_text("a few letters of it");
+            let response = ui.add(input).labelled_by(label.id);
+            if std::mem::take(&mut self.is_fresh) {
+                response.request_focus();
+            }
+            if response.changed() {
+                self.chosen = 0;
+            }
+            if ui.button("Close").clicked() {
+                self.is_open = false;
+            }
+        });
+        let found: Vec<&Action> = actions
+            .iter()
+            .filter(|one| is_found(&one.name, &self.typed))
+            .collect();
+        let last = found.len().saturating_sub(1);
+        self.chosen = self.chosen.saturating_add_signed(moved).min(last);
+        ui.add_space(4.0);
+        if found.is_empty() {
+            ui.label(RichText::new("nothing is called so").color(tokens.text_quiet));
+        }
+        ScrollArea::vertical()
+            .id_salt("actions")
+            .max_height(420.0)
+            .auto_shrink([false, true])
+            .show(ui, |ui| {
+                for (index, action) in found.iter().enumerate() {
+                    let is_chosen = index == self.chosen;
+                    if action_ui(ui, action, is_chosen, moved != 0) || (is_taken && is_chosen) {
+                        self.take(action, commands);
+                    }
+                }
+            });
+    }
+
+    fn take(&mut self, action: &Action, commands: &mut Commands) {
+        if action.verdict.is_ok() {
+            commands.push(action.command.clone());
+            self.is_open = false;
+        }
+    }
+}
+
+/// One line; true when it is pressed.
+fn action_ui(ui: &mut Ui, action: &Action, is_chosen: bool, is_followed: bool) -> bool {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.horizontal(|ui| {
+        let button = Button::selectable(is_chosen, &action.name);
+        let response = ui.add_enabled(action.verdict.is_ok(), button);
+        if is_chosen && is_followed {
+            response.scroll_to_me(None);
+        }
+        ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
+            ui.label(RichText::new(&action.keys).monospace());
+            if let Err(reason) = &action.verdict {
+                let reason = RichText::new(reason).color(tokens.text_quiet).small();
+                ui.add(Label::new(reason).truncate());
+            }
+        });
+        response.clicked()
+    })
+    .inner
+}
+
+/// Whether every word typed stands somewhere in the name.
+fn is_found(name: &str, typed: &str) -> bool {
+    let name = name.to_lowercase();
+    let typed = typed.to_lowercase();
+    typed.split_whitespace().all(|word| name.contains(word))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_found_in_any_order_and_case() {
+        assert!(is_found("Show the screen Library", "LIB screen"));
+        assert!(is_found("Stop motion", ""));
+        assert!(!is_found("Stop motion", "stop it"));
+    }
+}

@@ -1,0 +1,114 @@
+//! The first-run tour: a strip of a few sentences, each about what is on the screen, in nobody's way.
+
+use super::rail::Screen;
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
+
+/// Where it stands; none when it is over.
+#[derive(Debug, Default)]
+pub struct Tour(Option<usize>);
+
+/// Screen and what is said of it.
+const STOPS: [(Screen, &str); 7] = [
+    (
+        Screen::Run,
+        "This is the built-in simulated rig: nothing here can be damaged. Press Start F5 and watch the probe find the tissue, press into it and hold. F12 or Escape stops the motion from any screen.",
+    ),
+    (
+        Screen::Run,
+        "The left panel has the protocol and what it asks for; Expected course draws it before anything moves. While Start is closed, the reason stands beside it.",
+    ),
+    (
+        Screen::Rig,
+        "What the rig reports, large, and moving it by hand. A rig on wires is opened with 'palpate window --rig FILE.toml'.",
+    ),
+    (
+        Screen::Calibration,
+        "Volts to newtons. Measure... asks for one weight after the other, shows when the signal is steady, and lets you read any of them again.",
+    ),
+    (
+        Screen::Library,
+        "Every session, found by words, names and values. What is chosen here opens in Review with Enter.",
+    ),
+    (
+        Screen::Review,
+        "One session closely or several beside each other: cursors, phases, fits, other calibrations, a report.",
+    ),
+    (
+        Screen::Run,
+        "Ctrl+K opens everything by name, with its keys. Press Start F5 when you like.",
+    ),
+];
+
+impl Tour {
+    /// Begins it.
+    pub fn start(&mut self) {
+        self.0 = Some(0);
+    }
+
+    /// Ends it.
+    pub fn end(&mut self) {
+        self.0 = None;
+    }
+
+    /// Whether it is under way.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        self.0.is_some()
+    }
+
+    /// Goes on to the next stop, or ends; gives the screen to show.
+    pub fn go_on(&mut self) -> Option<Screen> {
+        let next = self.0? + 1;
+        self.0 = (next < STOPS.len()).then_some(next);
+        self.0.map(|at| STOPS[at].0)
+    }
+
+    /// Draws the strip.
+    pub fn ui(&self, ui: &mut Ui, commands: &mut Commands) {
+        let Some((at, (_, words))) = self.0.and_then(|at| Some((at, STOPS.get(at)?))) else {
+            return;
+        };
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        Frame::new()
+            .fill(tokens.canvas)
+            .stroke(Stroke::new(2.0, tokens.focus))
+            .inner_margin(Margin::symmetric(10, 6))
+            .show(ui, |ui| {
+                ui.horizontal(|ui| {
+                    let place = format!("Tour {} of {}", at + 1, STOPS.len());
+                    ui.label(RichText::new(place).strong());
+                    let name = if at + 1 == STOPS.len() {
+                        "Done with the tour"
+                    } else {
+                        "Next"
+                    };
+                    if ui.button(name).clicked() {
+                        commands.push(Command::TourNext);
+                    }
+                    if at + 1 < STOPS.len() && ui.button("End the tour").clicked() {
+                        commands.push(Command::TourEnd);
+                    }
+                    ui.add(Label::new(*words).wrap());
+                });
+            });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn it_visits_every_stop_and_ends() {
+        let mut tour = Tour::default();
+        assert_eq!((tour.go_on(), tour.is_on()), (None, false));
+        tour.start();
+        let mut visited = 1;
+        while tour.go_on().is_some() {
+            visited += 1;
+        }
+        assert_eq!((visited, tour.is_on()), (STOPS.len(), false));
+    }
+}

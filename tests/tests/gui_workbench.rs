@@ -1,0 +1,265 @@
+//! What stands on every screen, the rig's screen, weighing and the search for the surface, by accessible name.
+
+use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::{NodeT, Queryable};
+use palpate_app::shell::rail::Screen;
+use palpate_app::window::WindowOptions;
+use palpate_drivers::sim::SimSettings;
+use palpate_model::rig::Phase;
+use palpate_protocols::engine::EndingKind;
+use palpate_protocols::programme::calibration_of;
+use palpate_protocols::replay::replay;
+use palpate_protocols::runner::TimeScale;
+use palpate_sessions::log::Session;
+use palpate_tests::flow::Flow;
+
+/// Opens the palette, types and takes the first that is found.
+fn by_name(flow: &mut Flow, words: &str) {
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::K);
+    flow.window.run_steps(3);
+    flow.type_into("what to do", words);
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(3);
+}
+
+#[test]
+fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
+    let mut flow = Flow::open(TimeScale::Max);
+    flow.window.key_press(Key::F1);
+    flow.window.run_steps(3);
+    flow.window.check_accessibility();
+    for words in [
+        "Stop motion",
+        "Retract after a stop",
+        "Protocol sine",
+        "no run is in progress",
+    ] {
+        assert!(flow.says(words), "{words}");
+    }
+    for screen in Screen::ALL {
+        assert!(flow.says(&format!("Screen {}", screen.name())));
+    }
+    flow.type_into("what to do", "nothing is called like this");
+    assert!(flow.says("nothing is called so"));
+    // Its keys choose, and Enter takes.
+    flow.type_into("what to do", "screen");
+    for _ in 0..3 {
+        flow.window.key_press(Key::ArrowDown);
+        flow.window.run_steps(2);
+    }
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(3);
+    assert!(
+        !flow.says("a few letters of it") && flow.window.query_by_label("what to do").is_none()
+    );
+    let button = flow.window.get_by_label(Screen::ALL[3].name());
+    assert!(button.accesskit_node().toggled().is_some());
+    // What cannot be asked for now stays where it is.
+    by_name(&mut flow, "retract after");
+    assert!(flow.window.query_by_label("what to do").is_some());
+    // Escape stops and closes it.
+    flow.window.key_press(Key::Escape);
+    flow.window.run_steps(3);
+    assert!(flow.window.query_by_label("what to do").is_none());
+}
+
+#[test]
+fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
+    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    by_name(&mut flow, "start the protocol");
+    flow.wait_for_phase(Phase::Contact);
+    flow.type_into("note", "somebody leaned on the table");
+    flow.click("Note  F3");
+    flow.window.key_press(Key::F3);
+    flow.window.run_steps(3);
+    flow.wait("both notes", |window| {
+        let mut found = window.query_all_by_label_contains("note: ");
+        found.next().is_some() && found.next().is_some()
+    });
+    by_name(&mut flow, "stop motion");
+    flow.wait("the stop", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.holding.is_some())
+    });
+    by_name(&mut flow, "close the session");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Stop);
+    let session = Session::open(&flow.sessions()[0]).unwrap();
+    let bodies: Vec<String> = session
+        .entries
+        .iter()
+        .map(|one| one.body.to_string())
+        .collect();
+    let noted = |words: &str| {
+        bodies
+            .iter()
+            .any(|body| body.contains("noted") && body.contains(words))
+    };
+    assert!(
+        noted("somebody leaned on the table") && noted("mark"),
+        "{bodies:?}"
+    );
+}
+
+#[test]
+fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
+    let mut flow = Flow::open(TimeScale::Max);
+    flow.window
+        .key_press_modifiers(Modifiers::COMMAND, Screen::Rig.key());
+    flow.window.run_steps(3);
+    flow.window.check_accessibility();
+    assert!(flow.says("counter, home not known") && flow.says("to 9.0 N"));
+    flow.click("Find home");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    flow.window.run_steps(3);
+    assert!(flow.says("position from home"));
+    let before = flow.window.state().snapshot().rig.reading.unwrap().pulses;
+    flow.click("+5 mm");
+    flow.wait("the jog", |window| {
+        let run = window.state().snapshot().run.as_ref();
+        run.is_some_and(|run| run.plan_name == "free-jog" && run.outcome.is_some())
+    });
+    let snapshot = flow.window.state().snapshot().clone();
+    let moved = (snapshot.rig.reading.unwrap().pulses - before) as f64;
+    // Whole pulses.
+    let mm = moved * snapshot.rig.description.mm_per_pulse;
+    assert!(
+        (mm - 5.0).abs() <= snapshot.rig.description.mm_per_pulse,
+        "{mm}"
+    );
+    assert_eq!(flow.sessions().len(), 2);
+    // What makes no sense is told, and nothing moves.
+    flow.type_into("distance", "far");
+    assert!(flow.says("not a finite number") && !flow.is_enabled("Jog"));
+    flow.type_into("distance", "500");
+    assert!(flow.says("at most 150 mm"));
+}
+
+#[test]
+fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
+    let mut flow = Flow::open(TimeScale::Factor(20.0));
+    by_name(&mut flow, "protocol load-cell-calibration");
+    flow.type_into("operator", "Ada");
+    flow.type_into("masses", "140 g, 540 g");
+    flow.type_into("repeats", "1");
+    flow.window.key_press(Key::F5);
+    let weighed = |flow: &Flow| flow.run().map_or(0, |run| run.weighed.len());
+    let mut redone = false;
+    for _ in 0..20 {
+        flow.wait("a prompt or the end", |window| {
+            let run = window.state().snapshot().run.as_ref();
+            run.is_some_and(|run| run.prompt.is_some() || run.outcome.is_some())
+        });
+        if flow.run().unwrap().outcome.is_some() {
+            break;
+        }
+        if weighed(&flow) == 2 && !redone {
+            assert!(flow.says("Reading 3 of 7: 540 g in all"), "no place");
+            flow.window.check_accessibility();
+            flow.click("Last weight again");
+            flow.wait("the prompt before", |window| {
+                let run = window.state().snapshot().run.as_ref();
+                run.is_some_and(|run| {
+                    run.prompt
+                        .as_ref()
+                        .is_some_and(|one| one.message.contains("140 g"))
+                })
+            });
+            assert_eq!(weighed(&flow), 1);
+            redone = true;
+        }
+        flow.window.key_press(Key::F2);
+        flow.window.run_steps(2);
+        flow.wait("the answer", |window| {
+            let run = window.state().snapshot().run.as_ref();
+            run.is_some_and(|run| run.prompt.is_none() || run.outcome.is_some())
+        });
+    }
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+    assert_eq!((weighed(&flow), redone), (7, true));
+    let folder = &flow.sessions()[0];
+    let session = Session::open(folder).unwrap();
+    let readings = session
+        .entries
+        .iter()
+        .filter(|one| one.body.to_string().contains("\"weighed\""));
+    assert_eq!(
+        readings.count(),
+        8,
+        "what was read first stays in the session"
+    );
+    let calibration = calibration_of(&session, "again").unwrap();
+    assert_eq!(calibration.series_steps().count(), 7);
+    // The same decisions from the record alone.
+    let replayed = replay(&session, &[]).unwrap();
+    assert!(replayed.first_difference.is_none(), "{replayed:?}");
+}
+
+#[test]
+fn zeroing_shows_what_the_probe_feels() {
+    let mut flow = Flow::open(TimeScale::Max);
+    by_name(&mut flow, "protocol zeroing");
+    flow.window.key_press(Key::F5);
+    flow.wait_for_end();
+    flow.window.run_steps(3);
+    let run = flow.run().unwrap();
+    assert_eq!(
+        run.touches.iter().map(|one| one.pass).collect::<Vec<_>>(),
+        [1, 2]
+    );
+    let contact = run.contact.unwrap();
+    assert!(flow.says(&format!("the surface is at {:.3}", contact.position.0)));
+    // The search felt the tissue where it says that it did.
+    let points = run.approach.points();
+    let deepest = points.iter().map(|point| point.depth).fold(0.0, f64::max);
+    assert!(
+        run.touches
+            .iter()
+            .all(|one| one.position.0 <= deepest + 0.1),
+        "{deepest}"
+    );
+    flow.window.check_accessibility();
+}
+
+#[test]
+fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
+    let folder = tempfile::tempdir().unwrap();
+    let file = folder.path().join("window.json");
+    let open = || {
+        let mut options =
+            WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
+        options.settings = Some(file.clone());
+        Flow::open_on(options, tempfile::tempdir().unwrap())
+    };
+    let mut flow = open();
+    assert!(flow.says("Tour 1 of 7"));
+    let mut stops = 0;
+    while flow.window.query_by_label("Next").is_some() {
+        flow.window.check_accessibility();
+        flow.click("Next");
+        stops += 1;
+    }
+    assert_eq!(stops, 6);
+    flow.click("Done with the tour");
+    flow.type_into("operator", "Grace");
+    by_name(&mut flow, "light or dark");
+    by_name(&mut flow, "larger text");
+    by_name(&mut flow, "screen library");
+    eframe::App::on_exit(flow.window.state_mut());
+    let mut flow = open();
+    flow.window.run_steps(3);
+    assert!(!flow.says("Tour 1 of 7"));
+    let ctx = flow.window.ctx.clone();
+    assert!((ctx.zoom_factor() - 1.1).abs() < 1e-6);
+    assert!(ctx.global_style().visuals.dark_mode);
+    by_name(&mut flow, "screen run");
+    assert!(
+        flow.window
+            .get_by_label("operator")
+            .accesskit_node()
+            .value()
+            .is_some_and(|text| text == "Grace")
+    );
+}
