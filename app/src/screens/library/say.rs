@@ -161,7 +161,7 @@ impl SayPanel {
             _ => may.clone(),
         };
         let mut wanted = None;
-        text_ui(ui, "tags", "+pilot -doubtful", &mut self.tags);
+        text_ui(ui, "new tags", "+pilot -doubtful", &mut self.tags);
         if button(ui, "Change tags", &needs(&self.tags, "tags")) {
             let (add, remove) = tags(&self.tags);
             wanted = Some(Saying::Tags { add, remove });
