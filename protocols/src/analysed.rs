@@ -14,7 +14,7 @@ use palpate_sessions::analyses::{
 };
 use palpate_sessions::log::{Outline, ReadError, Session};
 use palpate_sessions::record::Row;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 use std::path::Path;
 
 /// A session with its edits made, read as an analysis has it.
@@ -29,7 +29,7 @@ pub struct Opened {
 }
 
 /// What another calibration does to the forces of a session.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ForceChange {
     /// Samples with a force.
     pub samples: u64,

@@ -4,6 +4,7 @@ use super::Failure;
 use super::calibration::source::Source;
 use super::output::Output;
 use super::verdict::author;
+use crate::report::kept;
 use clap::Args;
 use palpate_protocols::analysed::{self, ForceChange, record};
 use palpate_protocols::analysis::SourceError;
@@ -142,17 +143,8 @@ pub(super) fn recalibrate(args: &RecalibrateArgs, output: &Output) -> Result<(),
         "calibration_id": source.id, "by": by, "sessions": done,
     });
     output.result(&object, || {
-        let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
         let line = |one: &Recalibrated| {
-            format!(
-                "{}: {} forces, changed by {:.4} N rms and at most {:.4} N; peak {} instead of {}",
-                one.session.display(),
-                one.change.samples,
-                one.change.rms_n,
-                one.change.max_n,
-                newtons(one.change.peak_after_n),
-                newtons(one.change.peak_before_n),
-            )
+            format!("{}: {}", one.session.display(), kept::change(&one.change))
         };
         let mut lines: Vec<String> = done.iter().map(line).collect();
         lines.push(format!(

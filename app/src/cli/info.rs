@@ -3,12 +3,13 @@
 use super::Failure;
 use super::output::Output;
 use crate::report::catalog::one_line;
+use crate::report::said;
 use clap::Args;
 use palpate_model::rig::SignalFacts;
 use palpate_protocols::analysed;
 use palpate_protocols::base::FoundBase;
 use palpate_sessions::analyses::{Analysis, inputs_of};
-use palpate_sessions::edits::{Change, Edit, Review, Verdict};
+use palpate_sessions::edits::{Edit, Review, Verdict};
 use palpate_sessions::log::Session;
 use palpate_sessions::{About, EDITS_FILE, HealthSummary, Imported};
 use serde::Serialize;
@@ -151,7 +152,8 @@ fn text(info: &Info<'_>) -> String {
             .flatten()
             .map(|(key, value)| format!("           {key} {value}")),
     );
-    lines.extend(info.signal.map(signal_text));
+    let signal = info.signal.map(said::signal);
+    lines.extend(signal.map(|lines| format!("signal     {}", lines.join("\n           "))));
     lines.push(format!(
         "written by palpate {}, engine {}",
         info.software_version, info.engine_version
@@ -188,46 +190,26 @@ fn text(info: &Info<'_>) -> String {
             "raw        {count} bytes as exchanged with devices"
         ));
     }
-    lines.extend(info.health.map(health_text));
+    let health = info.health.map(said::health).unwrap_or_default();
+    lines.extend(
+        health
+            .iter()
+            .map(|(name, text)| format!("{name:<10} {text}")),
+    );
     let facts = info.base.facts();
     lines.extend(facts.map(|(name, mm, error)| format!("{name:<10} {mm:.3} ± {error:.3} mm")));
     lines.extend(info.edits.iter().map(edit_text));
     if !info.tags.is_empty() {
         lines.push(format!("tags       {}", info.tags.join(", ")));
     }
-    lines.extend(info.review.as_ref().map(review_text));
+    let review = info.review.as_ref().map(said::review);
+    lines.extend(review.map(|review| format!("review     {review}")));
     lines.extend(info.analyses.iter().map(analysis_text));
     lines.extend(
         info.notes
             .iter()
             .map(|note| format!("note       {}", one_line(note))),
     );
-    lines.join("\n")
-}
-
-/// The worst that is told of the computer.
-fn health_text(health: &HealthSummary) -> String {
-    let mut lines = Vec::new();
-    if let Some(worst) = &health.worst {
-        let mut parts = vec![
-            format!("at most {:.1} ms late", worst.lateness_s * 1e3),
-            format!("queue at most {:.1} % full", worst.queue_share * 100.0),
-        ];
-        let sync = worst.sync_s.map(|secs| secs * 1e3);
-        parts.extend(sync.map(|millis| format!("synchronised in at most {millis:.1} ms")));
-        let free = worst.free_bytes.map(|bytes| bytes as f64 / 1e9);
-        parts.extend(free.map(|gigabytes| format!("{gigabytes:.1} GB of disk free at least")));
-        parts.push(format!("{} readings missing", worst.missed_readings));
-        lines.push(format!("computer   {}", parts.join(", ")));
-    }
-    if health.clock_jumps > 0 {
-        lines.push(format!(
-            "clock      the wall clock was set {} times during the run, by up to {:+.1} s; sample times do not depend on it",
-            health.clock_jumps, health.clock_jump_s
-        ));
-    }
-    let events = health.events.iter();
-    lines.extend(events.map(|(at_s, text)| format!("event      at {at_s:.1} s: {text}")));
     lines.join("\n")
 }
 
@@ -240,60 +222,21 @@ fn imported_text(imported: &Imported) -> String {
     lines.join("\n")
 }
 
-fn signal_text(signal: &SignalFacts) -> String {
-    let range = signal.range_v.map_or(String::new(), |[low, high]| {
-        format!(", range {low:.3} to {high:.3} V")
-    });
-    let count = signal.resolution_v.map_or(String::new(), |volts| {
-        format!(", one count {:.3} mV", volts * 1e3)
-    });
-    format!(
-        "signal     {:.2} Hz{range}{count}\n           filter {}\n           {}",
-        signal.sample_rate_hz, signal.filter, signal.aliasing
-    )
-}
-
 fn edit_text(edit: &Edit) -> String {
-    let at = edit.at.format("%Y-%m-%d %H:%M:%SZ");
-    let what = match &edit.change {
-        Change::Verdict { verdict } => verdict.to_string(),
-        Change::Note => "note".to_owned(),
-        Change::Tags { add, remove } => {
-            let added = add.iter().map(|tag| format!("+{tag}"));
-            let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
-            format!("tags {}", signs.collect::<Vec<_>>().join(" "))
-        }
-        Change::Review { decision, .. } => format!("review, {}", decision.word()),
-        Change::Contact {
-            number,
-            position_mm,
-            was_mm,
-        } => format!(
-            "contact {number} at {:.3} mm instead of {:.3} mm",
-            position_mm.0, was_mm.0
-        ),
-    };
     let why = match edit.reason.as_str() {
         "" => String::new(),
         reason => format!(": {}", one_line(reason)),
     };
-    format!("edit       {at} {}: {what}{why}", one_line(&edit.by))
-}
-
-fn review_text(review: &Review) -> String {
-    let stands = match review.changed.as_slice() {
-        [] => "everything is as it was seen".to_owned(),
-        changed => format!(
-            "but {} changed since; it is to be reviewed again",
-            changed.join(", ")
-        ),
-    };
-    let decision = review.decision.word();
-    format!("review     {decision} by {}, {stands}", review.by)
+    format!(
+        "edit       {} {}: {}{why}",
+        said::at(&edit.at),
+        one_line(&edit.by),
+        said::change(&edit.change)
+    )
 }
 
 fn analysis_text(one: &Analysis) -> String {
-    let at = one.at.format("%Y-%m-%d %H:%M:%SZ");
+    let at = said::at(&one.at);
     let why = match one.reason.as_str() {
         "" => String::new(),
         reason => format!(": {reason}"),

@@ -30,10 +30,12 @@ pub(super) fn write(
     to: Option<&Path>,
     content: impl FnOnce() -> String,
 ) -> Result<(), Failure> {
-    let Some(to) = to else {
-        return Ok(());
-    };
-    std::fs::write(to, content()).map_err(|err| {
+    to.map_or(Ok(()), |to| write_bytes(what, to, content().as_bytes()))
+}
+
+/// Writes a file that is no text.
+pub(super) fn write_bytes(what: &str, to: &Path, bytes: &[u8]) -> Result<(), Failure> {
+    std::fs::write(to, bytes).map_err(|err| {
         Failure::failed(format!(
             "cannot write the {what} {} ({err}); choose a folder that may be written",
             to.display()

@@ -3,7 +3,7 @@
 
 use super::calibration::Told;
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, sentence_lines, title};
-use super::svg::{Ink, Panel, Svg};
+use super::svg::{Drawing, Ink, Panel, Svg};
 use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
 use palpate_model::calibration::{Calibration, CalibrationError, Direction, Term};
@@ -100,12 +100,18 @@ fn shade(svg: &mut Svg, panel: &Panel, flat: &[[f64; 2]]) {
 /// The picture of a calibration that has been told of.
 #[must_use]
 pub fn picture(calibration: &Calibration, told: &Told) -> String {
+    drawing(calibration, told).svg()
+}
+
+/// The same, not yet in any format.
+#[must_use]
+pub fn drawing(calibration: &Calibration, told: &Told) -> Drawing {
     let mut svg = Svg::new(WIDTH);
     let line = format!("{}; {}", calibration.curve, calibration.source);
     title(&mut svg, &calibration.name, &line);
     let Ok(curves) = Curves::of(calibration, told) else {
         // Only what has a curve and points was told of.
-        return svg.finish(70.0, LIGHT.canvas, &calibration.name);
+        return svg.drawing(70.0, LIGHT.canvas, &calibration.name);
     };
     let Curves {
         x,
@@ -159,7 +165,7 @@ pub fn picture(calibration: &Calibration, told: &Told) -> String {
     for finding in &told.quality.findings {
         y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), finding);
     }
-    svg.finish(
+    svg.drawing(
         y,
         LIGHT.canvas,
         &format!("Calibration {}", calibration.name),

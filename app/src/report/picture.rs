@@ -2,7 +2,7 @@
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
 use super::band::{self, Band};
-use super::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
+use super::svg::{Anchor, Drawing, FONT, Ink, Look, Panel, Svg};
 use super::text::{ParameterText, quality};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
@@ -28,6 +28,36 @@ pub fn of_report(
     report: &FitReport,
     uncertainty: Option<&ForceUncertainty>,
 ) -> String {
+    let mut svg = Svg::new(WIDTH);
+    curves(&mut svg, source, samples, report, uncertainty);
+    let mut y = table(&mut svg, report, 580.0);
+    for sentence in report.sentences() {
+        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
+    }
+    svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
+}
+
+/// The same without parameters and sentences, for pages that tell them in words.
+#[must_use]
+pub fn of_fit(
+    source: &str,
+    samples: &[FitSample],
+    report: &FitReport,
+    uncertainty: Option<&ForceUncertainty>,
+) -> Drawing {
+    let mut svg = Svg::new(WIDTH);
+    curves(&mut svg, source, samples, report, uncertainty);
+    svg.drawing(556.0, LIGHT.canvas, &format!("Fit of {source}"))
+}
+
+/// Measured and fitted force over time, and what is left over beneath.
+fn curves(
+    svg: &mut Svg,
+    source: &str,
+    samples: &[FitSample],
+    report: &FitReport,
+    uncertainty: Option<&ForceUncertainty>,
+) {
     let modelled = report.predict(samples);
     let span = span(samples);
     let start = samples.first().map_or(0.0, |sample| sample.t.0);
@@ -44,9 +74,8 @@ pub fn of_report(
         known().map(|(one, fit)| [one.t.0 - start, (one.force.0 - fit.0) * 1e3]),
         columns,
     );
-    let mut svg = Svg::new(WIDTH);
     title(
-        &mut svg,
+        svg,
         source,
         &format!("{}; {}", report.model, quality(report)),
     );
@@ -54,21 +83,16 @@ pub fn of_report(
     let [above, below] = band.edges();
     let inside = [&measured, &fitted, above, below];
     let upper = Panel::around([LEFT, 66.0, RIGHT, 360.0], span, &inside);
-    upper.axes(&mut svg, ["", "force (N)"], look());
-    band.draw(&mut svg, &upper, LIGHT.series);
+    upper.axes(svg, ["", "force (N)"], look());
+    band.draw(svg, &upper, LIGHT.series);
     // Wide under narrow, so that both are seen where they agree.
-    upper.line(&mut svg, &measured, LIGHT.series, 2.6);
-    upper.line(&mut svg, &fitted, LIGHT.limit, 1.4);
-    legend(&mut svg);
-    band::legend(&mut svg, uncertainty);
+    upper.line(svg, &measured, LIGHT.series, 2.6);
+    upper.line(svg, &fitted, LIGHT.limit, 1.4);
+    legend(svg);
+    band::legend(svg, uncertainty);
     let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], span, &[&residual]);
-    lower.axes(&mut svg, ["time (s)", "residual (mN)"], look());
-    lower.line(&mut svg, &residual, LIGHT.series, 1.0);
-    let mut y = table(&mut svg, report, 580.0);
-    for sentence in report.sentences() {
-        y = sentence_lines(&mut svg, y, Ink::plain(LIGHT.text), sentence);
-    }
-    svg.finish(y, LIGHT.canvas, &format!("Fit of {source}"))
+    lower.axes(svg, ["time (s)", "residual (mN)"], look());
+    lower.line(svg, &residual, LIGHT.series, 1.0);
 }
 
 /// The picture of a fit that was refused, with the sentence that says why.

@@ -2,6 +2,7 @@
 
 use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
+use super::page::{Body, document};
 use super::picture;
 use super::text::{in_columns, parameter_lines};
 use crate::workers::fit::Fitted;
@@ -318,40 +319,27 @@ impl Page {
     /// The page in HTML, whole in itself.
     #[must_use]
     pub fn html(&self) -> String {
-        let loss = self.loss().map(|loss| {
-            let loss = super::text::capital(&loss);
-            format!("<p><strong>{}.</strong></p>\n", escape(&loss))
-        });
-        let mut body = format!(
-            "<h1>{}</h1>\n<p>{}</p>\n{}<h2>Sessions</h2>\n<pre>{}</pre>\n",
-            escape(&self.title),
-            escape(&self.purpose),
-            loss.unwrap_or_default(),
-            escape(&self.table())
-        );
+        let mut body = Body::default();
+        body.heading(1, &self.title);
+        body.paragraph(&self.purpose);
+        if let Some(loss) = self.loss() {
+            body.strong(&format!("{}.", super::text::capital(&loss)));
+        }
+        body.heading(2, "Sessions");
+        body.pre(&self.table());
         if !self.specimens.is_empty() {
             let specimens: Vec<String> = self.specimens.iter().map(SpecimenPart::text).collect();
-            body += &format!(
-                "<h2>Specimens</h2>\n<pre>{}</pre>\n",
-                escape(&specimens.join("\n"))
-            );
+            body.heading(2, "Specimens");
+            body.pre(&specimens.join("\n"));
         }
         for part in &self.tasks {
-            body += &format!(
-                "<h2>{}: {}</h2>\n<pre>{}</pre>\n{}\n",
-                escape(&part.task),
-                escape(&part.title),
-                escape(part.text.trim_end()),
-                part.figures.join("\n")
-            );
+            body.heading(2, &format!("{}: {}", part.task, part.title));
+            body.pre(part.text.trim_end());
+            for figure in &part.figures {
+                body.figure(figure, &part.title);
+            }
         }
-        format!(
-            "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{}</title>\n\
-             <style>body {{ font-family: sans-serif; max-width: 62rem; margin: 2rem auto; }} \
-             pre {{ overflow-x: auto; }} svg {{ max-width: 100%; height: auto; }}</style>\n</head>\n\
-             <body>\n{body}</body>\n</html>\n",
-            escape(&self.title)
-        )
+        document(&self.title, body)
     }
 }
 
@@ -505,12 +493,6 @@ impl Bodies {
             }
         })
     }
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
 }
 
 #[cfg(test)]

@@ -2,6 +2,7 @@
 //! the log, never over anything.
 
 use super::task::Progress;
+use crate::workers::analyses::login;
 use chrono::{DateTime, Utc};
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
@@ -15,11 +16,7 @@ use std::path::{Path, PathBuf};
 /// The name given, or that of the login.
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
-    let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    given.map_or_else(
-        || login().unwrap_or_else(|_| "somebody".into()),
-        str::to_owned,
-    )
+    given.map_or_else(login, str::to_owned)
 }
 
 /// Nothing was said of a session.

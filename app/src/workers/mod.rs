@@ -1,5 +1,6 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
+pub mod analyses;
 pub mod calibrations;
 pub mod edits;
 pub mod exports;

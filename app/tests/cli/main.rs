@@ -16,6 +16,7 @@ mod programme;
 mod protocol;
 mod rate;
 mod records;
+mod report;
 mod select;
 mod trade;
 mod wired;

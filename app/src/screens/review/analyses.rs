@@ -1,28 +1,299 @@
 //! What can be made of a session: fits, other calibrations, stretches left out, each a named analysis beside the others.
 
+mod form;
+mod list;
+mod papers;
+mod said;
+
 use super::Looked;
 use crate::command::Commands;
-use eframe::egui::{Context, Ui};
-use std::path::PathBuf;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::quantity_input::form_label;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::Job;
+use crate::workers::analyses::{Deed, Done, Known, Who, login, own, read};
+use crate::workers::task::Task;
+use eframe::egui::{Context, Label, RichText, TextEdit, Ui};
+use form::Form;
+use palpate_model::fit::Parameter;
+use papers::Papers;
+use said::Said;
+use std::path::{Path, PathBuf};
+
+/// The session's own fit: whose it is, its parameters and its sentences.
+struct Own {
+    session: PathBuf,
+    parameters: Vec<Parameter>,
+    sentences: Vec<String>,
+}
 
 /// The panel of analyses.
-#[derive(Debug)]
 pub struct AnalysesPanel {
     library: Result<PathBuf, String>,
+    /// What is known, or why not, of the session asked for.
+    known: Option<Result<Known, String>>,
+    asked: Option<PathBuf>,
+    reading: Job<(PathBuf, Result<Known, String>)>,
+    work: Task<Done>,
+    is_working: bool,
+    own: Task<Own>,
+    form: Form,
+    said: Said,
+    papers: Papers,
+    by: String,
+    reason: String,
+    /// An analysis just made: the session is read by it once it is known.
+    made: Option<String>,
+    /// A session that is not as it was.
+    changed: Option<PathBuf>,
+    shown: Vec<Looked>,
+}
+
+impl std::fmt::Debug for AnalysesPanel {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("AnalysesPanel")
+            .field("asked", &self.asked)
+            .finish_non_exhaustive()
+    }
 }
 
 impl AnalysesPanel {
     /// A panel for sessions and calibrations of the library in this folder.
     #[must_use]
     pub fn new(library: Result<PathBuf, String>) -> Self {
-        Self { library }
+        Self {
+            library,
+            known: None,
+            asked: None,
+            reading: Job::default(),
+            work: Task::default(),
+            is_working: false,
+            own: Task::default(),
+            form: Form::default(),
+            said: Said::default(),
+            papers: Papers::default(),
+            by: login(),
+            reason: String::new(),
+            made: None,
+            changed: None,
+            shown: Vec::new(),
+        }
     }
 
     /// Fetches what threads have answered.
-    pub fn poll(&mut self, _ctx: &Context) {}
+    pub fn poll(&mut self, ctx: &Context) {
+        self.own.poll();
+        self.papers.poll();
+        self.work.poll();
+        if self.is_working && self.work.standing().is_none() {
+            self.is_working = false;
+            if let Some(Ok(done)) = self.work.answer() {
+                self.made.clone_from(&done.made);
+                if done.changed.is_some() {
+                    self.changed.clone_from(&done.changed);
+                    self.form.forget();
+                    self.reason.clear();
+                    self.read_again(ctx);
+                }
+            }
+        }
+        if let Some((session, known)) = self.reading.poll() {
+            // An answer about a session that is no longer in front is of no use.
+            if self.asked.as_ref() == Some(&session) {
+                self.known = Some(known);
+            } else {
+                self.read_again(ctx);
+            }
+        }
+    }
+
+    /// A session whose edits or analyses have changed since this was last asked.
+    pub fn take_changed(&mut self) -> Option<PathBuf> {
+        self.changed.take()
+    }
+
+    /// Which sessions are shown: what a report may be about.
+    pub fn set_shown(&mut self, shown: &[Looked]) {
+        self.shown.clear();
+        self.shown.extend_from_slice(shown);
+    }
+
+    /// Puts a stretch of time, in s since the first sample, into the form that leaves stretches out.
+    pub fn propose_span(&mut self, from: f64, until: f64) {
+        self.form.propose_span(from, until);
+        self.papers.propose_span(from, until);
+    }
+
+    fn read_again(&mut self, ctx: &Context) {
+        let Some(session) = self.asked.clone() else {
+            return;
+        };
+        let library = self.library.clone().ok();
+        let wake = ctx.clone();
+        let started = self.reading.start(
+            "analyses",
+            move || {
+                let known = read(&session, library.as_deref());
+                (session, known)
+            },
+            move || wake.request_repaint(),
+        );
+        if let Err(err) = started {
+            self.known = Some(Err(format!("the session cannot be read: {err}")));
+        }
+    }
 
     /// Draws the analyses of a session; which of them it is read by can be chosen.
     pub fn ui(&mut self, ui: &mut Ui, looked: &mut Looked, _commands: &mut Commands) {
-        ui.label(format!("{} {:?}", looked.session.display(), self.library));
+        if self.asked.as_ref() != Some(&looked.session) {
+            self.asked = Some(looked.session.clone());
+            self.known = None;
+            self.made = None;
+            self.read_again(ui.ctx());
+        }
+        section_ui(ui, "Analyses");
+        let Some(known) = self.known.take() else {
+            quiet_ui(ui, "reading what is kept beside the session");
+            return;
+        };
+        match &known {
+            Err(reason) => wrong_ui(ui, reason),
+            Ok(known) => self.known_ui(ui, known, looked),
+        }
+        self.known = Some(known);
     }
+
+    fn known_ui(&mut self, ui: &mut Ui, known: &Known, looked: &mut Looked) {
+        if let Some(made) = self.made.take() {
+            looked.analysis = known.analyses.get(&made).is_ok().then_some(made);
+        }
+        let is_gone = |name: &String| known.analyses.get(name).is_err();
+        if looked.analysis.as_ref().is_some_and(is_gone) {
+            looked.analysis = None;
+        }
+        let own = self.own.answer().and_then(|own| own.as_ref().ok());
+        let own = own.filter(|own| own.session == known.session);
+        if list::list_ui(ui, known, looked, own) {
+            self.fit_own(ui.ctx(), &known.session);
+        }
+        self.own_ui(ui, own_of(&self.own, &known.session));
+        section_ui(ui, "Make another");
+        let name = self.form.ui(ui, known, looked.analysis.as_deref());
+        self.who_ui(ui);
+        let verdict = self.free().and(name.clone().map(|_| ()));
+        match task_ui(ui, "Make analysis", &self.work, &verdict) {
+            Some(Pressed::Start) => {
+                if let Ok(deed) = name {
+                    self.start(ui.ctx(), &known.session, deed);
+                }
+            }
+            Some(Pressed::Cancel) => self.work.cancel(),
+            None => {}
+        }
+        self.answer_ui(ui);
+        let taken = list::withdraw_ui(ui, known, looked, &self.reason_verdict());
+        let said = self.said.ui(ui, known, &self.reason_verdict());
+        if let Some(deed) = taken.or(said) {
+            self.start(ui.ctx(), &known.session, deed);
+        }
+        self.papers.ui(ui, looked, &self.shown);
+    }
+
+    /// By whom and why: one pair of fields for all that is done to a session.
+    fn who_ui(&mut self, ui: &mut Ui) {
+        text_ui(ui, "reason", "why, in a few words", &mut self.reason);
+        text_ui(ui, "by", "your name", &mut self.by);
+    }
+
+    fn free(&self) -> Result<(), String> {
+        if self.work.standing().is_some() {
+            return Err("other work is under way".to_owned());
+        }
+        match self.by.trim() {
+            "" => Err("say by whom it is made".to_owned()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether something can be done that needs a reason.
+    fn reason_verdict(&self) -> Result<(), String> {
+        self.free()?;
+        match self.reason.trim() {
+            "" => Err("this needs a reason: write one above".to_owned()),
+            _ => Ok(()),
+        }
+    }
+
+    fn start(&mut self, ctx: &Context, session: &Path, deed: Deed) {
+        let who = Who {
+            by: self.by.trim().to_owned(),
+            reason: self.reason.trim().to_owned(),
+        };
+        let session = session.to_path_buf();
+        self.is_working = true;
+        self.work.start("analysis", ctx, move |progress| {
+            deed.run(&session, &who, progress)
+        });
+    }
+
+    fn fit_own(&mut self, ctx: &Context, session: &Path) {
+        let session = session.to_path_buf();
+        self.own.start("own-fit", ctx, move |progress| {
+            let (parameters, sentences) = own(&session, progress)?;
+            Ok(Own {
+                session,
+                parameters,
+                sentences,
+            })
+        });
+    }
+
+    /// How far the session's own fit is, or why there is none.
+    fn own_ui(&self, ui: &mut Ui, refused: Option<&str>) {
+        if let Some(standing) = self.own.standing() {
+            quiet_ui(ui, &format!("the session's own fit: {}", standing.what));
+        } else if let Some(reason) = refused {
+            quiet_ui(ui, &format!("the session has no fit of its own: {reason}"));
+        }
+    }
+
+    /// The last answer, in one sentence.
+    fn answer_ui(&self, ui: &mut Ui) {
+        match self.work.answer() {
+            _ if self.work.standing().is_some() => {}
+            None => {}
+            Some(Ok(done)) => quiet_ui(ui, &done.sentence),
+            Some(Err(reason)) => wrong_ui(ui, reason),
+        }
+    }
+}
+
+/// Why the last try of a session's own fit failed.
+fn own_of<'a>(own: &'a Task<Own>, _session: &Path) -> Option<&'a str> {
+    own.answer()?.as_ref().err().map(String::as_str)
+}
+
+fn quiet_ui(ui: &mut Ui, text: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let text = RichText::new(text).color(tokens.text_quiet).small();
+    ui.add(Label::new(text).wrap());
+}
+
+fn wrong_ui(ui: &mut Ui, text: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
+}
+
+/// A labelled line of text.
+fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
+    ui.horizontal(|ui| {
+        let label = form_label(ui, name);
+        let width = ui.available_width() - 8.0;
+        let input = TextEdit::singleline(text)
+            .desired_width(width)
+            .char_limit(4096)
+            .hint_text(hint);
+        ui.add(input).labelled_by(label.id);
+    });
 }

@@ -1,6 +1,6 @@
 //! The review screen: one session closely, several beside each other.
 
-mod analyses;
+pub mod analyses;
 mod cycles;
 mod keys;
 mod left;
@@ -262,6 +262,12 @@ impl ReviewScreen {
     /// Draws what is known of the session in front, and what can be made of it.
     pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         self.draw_right(ui);
+        let shown: Vec<Looked> = self
+            .subjects
+            .iter()
+            .map(|subject| subject.looked.clone())
+            .collect();
+        self.analyses.set_shown(&shown);
         if let Some(front) = self.subjects.first_mut() {
             self.analyses.ui(ui, &mut front.looked, commands);
         }

@@ -1,0 +1,53 @@
+//! `palpate report SESSION --figure FILE`: one figure as a file.
+
+use super::super::output::Output;
+use super::super::{Failure, new_file};
+use super::{FigureArg, ReportArgs};
+use crate::report::dossier::{self, Wanted};
+use crate::report::figures::Window;
+use std::path::Path;
+
+pub(super) fn run(
+    args: &ReportArgs,
+    session: &Path,
+    to: &Path,
+    output: &Output,
+) -> Result<(), Failure> {
+    new_file::check("figure", Some(to))?;
+    let ending = dossier::Ending::of(to).map_err(Failure::usage)?;
+    let window = window(args)?;
+    let wanted = Wanted {
+        session: session.to_path_buf(),
+        analysis: args.analysis.clone(),
+    };
+    let drawing = dossier::figure(&wanted, args.of.into(), window);
+    let drawing = drawing.map_err(super::super::source_failure)?;
+    let drawing = drawing.map_err(Failure::failed)?;
+    let bytes = ending.bytes(&drawing).map_err(Failure::failed)?;
+    new_file::write_bytes("figure", to, &bytes)?;
+    let object = serde_json::json!({
+        "command": "report", "figure": to, "of": dossier::Figure::from(args.of).word(),
+        "session": session,
+    });
+    output.result(&object, || format!("{}: drawn", to.display()));
+    Ok(())
+}
+
+fn window(args: &ReportArgs) -> Result<Window, Failure> {
+    let window = Window {
+        from: args.from.unwrap_or(Window::WHOLE.from),
+        until: args.until.unwrap_or(Window::WHOLE.until),
+    };
+    if window.from >= window.until {
+        return Err(Failure::usage(
+            "--from is not before --until, so there is nothing to draw; give two times in s, the earlier with --from",
+        ));
+    }
+    let is_over_samples = matches!(args.of, FigureArg::ForceTime | FigureArg::ForceDepth);
+    if window != Window::WHOLE && !is_over_samples {
+        return Err(Failure::usage(
+            "--from and --until are for force-time and force-depth; leave them out",
+        ));
+    }
+    Ok(window)
+}

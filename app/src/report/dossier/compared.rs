@@ -1,0 +1,95 @@
+//! Several sessions beside each other.
+
+use super::super::figures::{Align, Traces, overlays};
+use super::super::page::Body;
+use super::super::said;
+use super::Subject;
+use super::html::cells;
+
+/// Table of the sessions, figures over each other, and a table of parameters.
+pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
+    body.heading(2, "Beside each other");
+    let row = |one: &Subject| {
+        let verdict = one.edits.verdict();
+        vec![
+            one.name.clone(),
+            one.analysis.clone().unwrap_or_default(),
+            one.manifest.specimen.clone(),
+            one.manifest.operator.clone(),
+            said::at(&one.manifest.started_at),
+            one.manifest.plan["name"]
+                .as_str()
+                .unwrap_or("imported")
+                .to_owned(),
+            verdict.map_or("none".to_owned(), |(verdict, _)| verdict.to_string()),
+        ]
+    };
+    let rows: Vec<Vec<String>> = subjects.iter().map(row).collect();
+    let heads = [
+        "session",
+        "read by",
+        "specimen",
+        "operator",
+        "started (UTC)",
+        "protocol",
+        "verdict",
+    ];
+    body.table("Sessions compared", &heads, &rows);
+    let traces: Vec<&Traces> = subjects.iter().map(|one| &one.traces).collect();
+    let ([time, depth], lost) = overlays(&traces, align);
+    let left_out = match lost.as_slice() {
+        [] => String::new(),
+        lost => format!(
+            " Left out, for want of that beginning: {}.",
+            lost.join(", ")
+        ),
+    };
+    body.figure(
+        &time.svg(),
+        &format!(
+            "Force over time since {}. Drawn are the lowest and the highest of each column of pixels.{left_out}",
+            align.word()
+        ),
+    );
+    let caption = "Force over depth. Every step of half a pixel is drawn once.";
+    body.figure(&depth.svg(), caption);
+    parameters(body, subjects);
+}
+
+/// Every parameter, session by session.
+fn parameters(body: &mut Body, subjects: &[Subject]) {
+    let fitted: Vec<_> = subjects
+        .iter()
+        .filter_map(|one| Some((one, &one.fit.as_ref().ok()?.report)))
+        .collect();
+    let mut rows = Vec::new();
+    if let Some((_, first)) = fitted.first() {
+        for parameter in &first.parameters {
+            for (subject, report) in &fitted {
+                let own = report.parameter(&parameter.name);
+                rows.extend(own.map(|own| {
+                    let mut row = cells(own);
+                    row.insert(1, subject.name.clone());
+                    row
+                }));
+            }
+        }
+    }
+    if !rows.is_empty() {
+        let heads = [
+            "parameter",
+            "session",
+            "value ± standard error",
+            "unit",
+            "95 % interval",
+            "systematic",
+        ];
+        body.table("Parameters of every session", &heads, &rows);
+    }
+    let refused = subjects.iter().filter_map(|one| {
+        let reason = one.fit.as_ref().err()?;
+        Some(format!("{} is not fitted: {reason}", one.name))
+    });
+    let refused: Vec<String> = refused.collect();
+    body.list(refused.iter().map(String::as_str));
+}

@@ -1,0 +1,163 @@
+//! Which files a page describes: written into it by their hashes, and read back to be compared.
+
+use super::super::svg::escape;
+use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of};
+use palpate_sessions::text::{sha256, sha256_of_file};
+use std::path::Path;
+
+/// How the row of a file begins.
+const ROW: &str = "<tr data-session=\"";
+/// How the line of the date begins: all else is the same whenever the page is made.
+pub(super) const MADE: &str = "<p class=\"made\">";
+/// How the line of the page's own hash begins and ends.
+const SEAL: &str = "<!-- SHA-256 of this page without this line and the line of its date: ";
+const SEAL_END: &str = " -->\n";
+
+/// A file that a page says it describes.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Claim {
+    /// The session.
+    pub session_id: String,
+    /// Name of its folder.
+    pub folder: String,
+    /// The file in it.
+    pub file: String,
+    /// SHA-256 of its bytes.
+    pub sha256: String,
+}
+
+/// The attributes of a file's row.
+pub(super) fn attributes(session_id: &str, folder: &str, file: &Input) -> String {
+    format!(
+        "{}{}\" data-folder=\"{}\" data-file=\"{}\" data-sha256=\"{}\"",
+        ROW.trim_start_matches("<tr"),
+        escape(session_id),
+        escape(folder),
+        escape(&file.what),
+        escape(&file.sha256)
+    )
+}
+
+/// The page with its own hash.
+pub(super) fn sealed(page: &str) -> String {
+    format!("{page}{SEAL}{}{SEAL_END}", own_hash(page))
+}
+
+fn own_hash(page: &str) -> String {
+    let lines = page.split_inclusive('\n');
+    let kept = lines.filter(|line| !line.starts_with(MADE) && !line.starts_with(SEAL));
+    sha256(kept.collect::<String>().as_bytes())
+}
+
+/// What a page says it describes, and whether the page itself is as it was made.
+pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
+    let no_page = "this is not a page that 'palpate report --html' made; name that file";
+    let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
+    let told = seal.strip_suffix(SEAL_END).unwrap_or_default();
+    let rows = page.split(ROW).skip(1).map(|row| {
+        let (row, _) = row.split_once('>')?;
+        let parts: Vec<&str> = row.split('"').collect();
+        let [session, f, folder, w, file, h, hash, _] = parts.as_slice() else {
+            return None;
+        };
+        let names = [*f, *w, *h].map(str::trim);
+        (names == ["data-folder=", "data-file=", "data-sha256="]).then(|| Claim {
+            session_id: unescape(session),
+            folder: unescape(folder),
+            file: unescape(file),
+            sha256: unescape(hash),
+        })
+    });
+    let claims: Option<Vec<Claim>> = rows.collect();
+    let claims = claims.filter(|claims| !claims.is_empty()).ok_or(no_page)?;
+    Ok((claims, own_hash(page) == told))
+}
+
+fn unescape(text: &str) -> String {
+    let plain = [
+        ("&lt;", "<"),
+        ("&gt;", ">"),
+        ("&quot;", "\""),
+        ("&apos;", "'"),
+    ];
+    let text = plain.iter().fold(text.to_owned(), |text, (code, plain)| {
+        text.replace(code, plain)
+    });
+    text.replace("&amp;", "&")
+}
+
+/// What became of the files of a session since a page was made.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Compared {
+    /// Files that are as they were.
+    pub same: usize,
+    /// One sentence for each that is not.
+    pub differences: Vec<String>,
+}
+
+/// Compares what is claimed of one session with a folder.
+pub fn compare(claims: &[&Claim], session: &Path) -> Result<Compared, AnalysisError> {
+    let mut now = inputs_of(session)?;
+    let analyses = session.join(ANALYSES_FILE);
+    if analyses.is_file() {
+        let hash = sha256_of_file(&analyses);
+        now.push(Input {
+            what: ANALYSES_FILE.to_owned(),
+            sha256: hash.map_err(|source| AnalysisError::Input {
+                path: analyses,
+                source,
+            })?,
+        });
+    }
+    let mut compared = Compared::default();
+    for claim in claims {
+        match now.iter().find(|one| one.what == claim.file) {
+            Some(one) if one.sha256 == claim.sha256 => compared.same += 1,
+            Some(_) => compared
+                .differences
+                .push(format!("{} is not as the page describes it", claim.file)),
+            None => compared.differences.push(format!("{} is gone", claim.file)),
+        }
+    }
+    for one in &now {
+        if claims.iter().all(|claim| claim.file != one.what) {
+            let sentence = format!("{} has come since", one.what);
+            compared.differences.push(sentence);
+        }
+    }
+    Ok(compared)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn input(what: &str, sha256: &str) -> Input {
+        Input {
+            what: what.into(),
+            sha256: sha256.into(),
+        }
+    }
+
+    #[test]
+    fn what_is_written_is_read_back_whatever_a_folder_is_called() {
+        let folder = "a \"b\" <c> & 'd' &lt;";
+        let row = attributes("id", folder, &input("000.mcap", "beef"));
+        let page = sealed(&format!(
+            "<p class=\"made\">now</p>\n<tr{row}><td></td></tr>\n"
+        ));
+        let (found, is_whole) = claims(&page).unwrap();
+        let expected = Claim {
+            session_id: "id".into(),
+            folder: folder.into(),
+            file: "000.mcap".into(),
+            sha256: "beef".into(),
+        };
+        assert_eq!((found, is_whole), (vec![expected], true));
+        assert!(claims(&page.replace(">now<", ">then<")).unwrap().1);
+        assert!(!claims(&page.replace("beef", "feed")).unwrap().1);
+        for other in ["", "<html></html>", SEAL, &sealed("no rows\n")] {
+            assert!(claims(other).unwrap_err().contains("report --html"));
+        }
+    }
+}

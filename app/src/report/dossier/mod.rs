@@ -1,0 +1,296 @@
+//! The report on one session or several: everything that is known of them, on one page that says by hashes which files
+//! it describes.
+
+mod compared;
+mod files;
+mod html;
+
+pub use files::{Claim, Compared, claims, compare};
+
+use super::calibration::Told;
+use super::calibration_plot;
+use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
+use super::figures::{Align, Traces, Window};
+use super::picture;
+use super::svg::Drawing;
+use crate::workers::fit::Fitted;
+use palpate_model::calibration::{Calibration, ForceUncertainty};
+use palpate_model::fit::{FitOptions, FitReport};
+use palpate_protocols::analysed::{self, Opened};
+use palpate_protocols::analysis::{self, SourceError, Stretch};
+use palpate_protocols::base::FoundBase;
+use palpate_protocols::cycles::of_session as cycles_of;
+use palpate_protocols::fidelity::{self, Fidelity};
+use palpate_sessions::analyses::{Analyses, Input, inputs_of};
+use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
+use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// A session, and which of its analyses it is read by.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Wanted {
+    /// Its folder.
+    pub session: PathBuf,
+    /// The analysis; none for the session as its edits leave it.
+    pub analysis: Option<String>,
+}
+
+/// One session with all that a page tells of it. Its samples are not in memory any more.
+pub struct Subject {
+    /// The name of its folder: where that is, is nobody else's business.
+    pub name: String,
+    pub(super) analysis: Option<String>,
+    pub(super) manifest: Manifest,
+    pub(super) samples: usize,
+    pub(super) duration_s: f64,
+    pub(super) notes: Vec<String>,
+    pub(super) entries: Vec<Entry>,
+    pub(super) end: Option<EndRecord>,
+    pub(super) beside: Beside,
+    pub(super) edits: Edits,
+    pub(super) analyses: Analyses,
+    pub(super) review: Option<Review>,
+    pub(super) base: FoundBase,
+    pub(super) fidelity: Result<Fidelity, String>,
+    pub(super) calibration: Option<(Calibration, Result<Told, String>)>,
+    pub(super) traces: Traces,
+    pub(super) cycles: Option<CyclePart>,
+    pub(super) fit: Result<FitPart, String>,
+    /// Every file it is made of, with its SHA-256.
+    pub(super) files: Vec<Input>,
+}
+
+/// What the cycles of a session show.
+pub(super) struct CyclePart {
+    pub text: String,
+    pub figure: String,
+}
+
+/// What the fit of a session found.
+pub(super) struct FitPart {
+    pub report: FitReport,
+    pub figure: Drawing,
+    /// Sentences beside those of the report.
+    pub remarks: Vec<String>,
+}
+
+impl Subject {
+    /// Reads a session and works out what is told of it.
+    pub fn of(wanted: &Wanted) -> Result<Self, SourceError> {
+        let path = &wanted.session;
+        let files = inputs_of(path)?;
+        let opened = analysed::open(path, wanted.analysis.as_deref())?;
+        let Opened {
+            edited,
+            analyses,
+            left_out_s,
+        } = opened;
+        let (session, edits) = (edited.session, edited.edits);
+        // The review itself is among the edits; what came after it is told by their order.
+        let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
+        let seen: Vec<Input> = seen.chain(analyses.input()).collect();
+        let name = name_of(path);
+        let calibration = analysis::calibration_of(&session).ok().map(|calibration| {
+            let told = Told::of(&calibration).map_err(|err| err.to_string());
+            (calibration, told)
+        });
+        let traces = Traces::of(&name, &session, Window::WHOLE).leaving_out(&left_out_s);
+        Ok(Self {
+            manifest: session.manifest.clone(),
+            samples: session.rows.len(),
+            duration_s: session.rows.last().map_or(0.0, |row| row.host.seconds().0),
+            notes: session.notes.clone(),
+            entries: session.entries.clone(),
+            end: session.end.clone(),
+            beside: session.beside.clone(),
+            review: edits.review(&seen),
+            base: FoundBase::of_session(&session),
+            fidelity: fidelity::of_session(&session).map_err(|err| err.to_string()),
+            cycles: cycles(&name, &session),
+            files: files.into_iter().chain(analyses.input()).collect(),
+            analysis: wanted.analysis.clone(),
+            calibration,
+            traces,
+            edits,
+            analyses,
+            fit: fit(&name, session, &left_out_s),
+            name,
+        })
+    }
+}
+
+/// The name of a session's folder, or of its file.
+#[must_use]
+pub fn name_of(path: &Path) -> String {
+    let whole = path.canonicalize();
+    let named = whole.as_deref().unwrap_or(path);
+    let name = named.file_name().unwrap_or(named.as_os_str());
+    name.to_string_lossy().into_owned()
+}
+
+/// The cycles of a session that has several, or sines.
+fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
+    let source = cycles_of(session).ok()?;
+    let report = CycleReport::of(name.to_owned(), source, &Question::default());
+    (report.cycles.len() > 1 || !report.sines.is_empty()).then(|| CyclePart {
+        text: cycles_text(&report),
+        figure: cycles_picture(&report),
+    })
+}
+
+/// The fit of a session, whatever the session is worth, with what its calibration adds.
+fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart, String> {
+    let source = analysis::of_session(session, Stretch::RampHold, left_out_s);
+    let mut source = source.map_err(|err| err.to_string())?;
+    // What the reader remarked is told beside the session.
+    source.notes.clear();
+    let options = FitOptions::default();
+    let fitted = Fitted::of(source, &options).with_systematic(&options);
+    let report = fitted.result.map_err(|err| err.to_string())?;
+    let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
+    let uncertainty = uncertainty.and_then(Result::ok);
+    Ok(FitPart {
+        figure: picture::of_fit(name, &fitted.samples, &report, uncertainty.as_ref()),
+        remarks: fitted.notes,
+        report,
+    })
+}
+
+/// The figures of a session, each by itself.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Figure {
+    /// Force over time.
+    #[default]
+    ForceTime,
+    /// Force over depth.
+    ForceDepth,
+    /// The fit and what it leaves over.
+    Residual,
+    /// The calibration with its uncertainty.
+    Calibration,
+}
+
+impl Figure {
+    /// Every one.
+    pub const ALL: [Self; 4] = [
+        Self::ForceTime,
+        Self::ForceDepth,
+        Self::Residual,
+        Self::Calibration,
+    ];
+
+    /// Its name, as typed.
+    #[must_use]
+    pub const fn word(self) -> &'static str {
+        match self {
+            Self::ForceTime => "force-time",
+            Self::ForceDepth => "force-depth",
+            Self::Residual => "residual",
+            Self::Calibration => "calibration",
+        }
+    }
+}
+
+/// One figure of a session, of a stretch of it where it is over time or depth; or why it cannot be drawn, though the
+/// session could be read.
+pub fn figure(
+    wanted: &Wanted,
+    figure: Figure,
+    window: Window,
+) -> Result<Result<Drawing, String>, SourceError> {
+    let opened = analysed::open(&wanted.session, wanted.analysis.as_deref())?;
+    let (session, left_out_s) = (opened.edited.session, opened.left_out_s);
+    let name = name_of(&wanted.session);
+    let traces = || Traces::of(&name, &session, window).leaving_out(&left_out_s);
+    Ok(match figure {
+        Figure::ForceTime => Ok(super::figures::force_time(&traces())),
+        Figure::ForceDepth => Ok(super::figures::force_depth(&traces())),
+        Figure::Residual => fit(&name, session, &left_out_s).map(|part| part.figure),
+        Figure::Calibration => {
+            let calibration = analysis::calibration_of(&session)?;
+            match Told::of(&calibration) {
+                Ok(told) => Ok(calibration_plot::drawing(&calibration, &told)),
+                Err(err) => Err(err.to_string()),
+            }
+        }
+    })
+}
+
+/// What a figure is written as.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ending {
+    /// Lines and text, at any size.
+    Svg,
+    /// Pixels.
+    Png,
+}
+
+impl Ending {
+    /// By the name of the file.
+    pub fn of(file: &Path) -> Result<Self, String> {
+        let ending = file.extension().map(|ending| ending.to_ascii_lowercase());
+        match ending.as_deref().and_then(|ending| ending.to_str()) {
+            Some("svg") => Ok(Self::Svg),
+            Some("png") => Ok(Self::Png),
+            _ => Err(format!(
+                "{} is no name of a figure; let it end in .svg or .png",
+                file.display()
+            )),
+        }
+    }
+
+    /// The bytes of the file.
+    pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
+        match self {
+            Self::Svg => Ok(drawing.svg().into_bytes()),
+            Self::Png => super::raster::png(drawing).map_err(|err| err.to_string()),
+        }
+    }
+}
+
+/// When and with which version a page is made, in words.
+#[must_use]
+pub fn made(now: chrono::DateTime<chrono::Utc>) -> String {
+    let version = env!("CARGO_PKG_VERSION");
+    format!("Made {} by palpate {version}", super::said::at(&now))
+}
+
+/// Nobody wants the report any more, or a session cannot be read.
+#[derive(Debug)]
+pub enum ReportError {
+    /// It was cancelled.
+    Cancelled,
+    /// This session cannot be read.
+    Source(PathBuf, Box<SourceError>),
+}
+
+impl std::fmt::Display for ReportError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Cancelled => f.write_str("the report was cancelled"),
+            Self::Source(path, reason) => write!(f, "{}: {reason}", path.display()),
+        }
+    }
+}
+
+/// Reads every session and makes the page. `made` is when and with which version, in words; `tell` hears how many
+/// sessions are read, and what comes next.
+pub fn write(
+    wanted: &[Wanted],
+    align: Align,
+    made: &str,
+    tell: &mut dyn FnMut(usize, &str) -> ControlFlow<()>,
+) -> Result<String, ReportError> {
+    let mut subjects = Vec::new();
+    for (index, one) in wanted.iter().enumerate() {
+        if tell(index, &name_of(&one.session)).is_break() {
+            return Err(ReportError::Cancelled);
+        }
+        let subject = Subject::of(one);
+        let subject =
+            subject.map_err(|err| ReportError::Source(one.session.clone(), Box::new(err)));
+        subjects.push(subject?);
+    }
+    Ok(html::page(&subjects, align, made))
+}

@@ -1,0 +1,162 @@
+//! What stands in an analysis that is kept beside a session, in words.
+
+use super::text::parameter_lines;
+use palpate_model::fit::Parameter;
+use palpate_protocols::analysed::ForceChange;
+use palpate_sessions::analyses::{Analysed, Analyses, Analysis};
+use serde::Deserialize;
+use serde_json::Value;
+
+/// A parameter as any fit keeps it: those of other families have no interval.
+#[derive(Deserialize)]
+struct Kept {
+    name: String,
+    value: f64,
+    unit: String,
+    std_error: Option<f64>,
+    #[serde(default)]
+    ci95: Option<[f64; 2]>,
+    #[serde(default)]
+    is_fixed: bool,
+    #[serde(default)]
+    systematic_error: Option<f64>,
+}
+
+/// The parameters that a kept fit found; those that cannot be understood are left out.
+#[must_use]
+pub fn parameters(results: &Value) -> Vec<Parameter> {
+    let all = results["parameters"].as_array().into_iter().flatten();
+    let known = all.filter_map(|one| Kept::deserialize(one).ok());
+    let parameter = |one: Kept| Parameter {
+        name: one.name,
+        value: one.value,
+        unit: one.unit,
+        std_error: one.std_error,
+        ci95: one.ci95,
+        is_fixed: one.is_fixed,
+        systematic_error: one.systematic_error,
+    };
+    known.map(parameter).collect()
+}
+
+/// What a kept fit said, one sentence each.
+#[must_use]
+pub fn sentences(results: &Value) -> Vec<String> {
+    let lists = ["warnings", "findings"].map(|name| results[name].as_array());
+    let all = lists.into_iter().flatten().flatten();
+    all.filter_map(Value::as_str).map(str::to_owned).collect()
+}
+
+/// What another calibration did to the forces.
+#[must_use]
+pub fn change(change: &ForceChange) -> String {
+    let newtons = |force: Option<f64>| force.map_or("-".to_owned(), |it| format!("{it:.3} N"));
+    format!(
+        "{} forces, changed by {:.4} N rms and at most {:.4} N; peak {} instead of {}",
+        change.samples,
+        change.rms_n,
+        change.max_n,
+        newtons(change.peak_after_n),
+        newtons(change.peak_before_n),
+    )
+}
+
+/// What an analysis did, in one sentence.
+#[must_use]
+pub fn deed(what: &Analysed) -> String {
+    match what {
+        Analysed::Fit {
+            based_on, results, ..
+        } => {
+            let family = results["name"].as_str().or(results["model"].as_str());
+            let family = family.unwrap_or("a model").to_owned();
+            match based_on {
+                Some(name) => format!("{family}, read as '{name}'"),
+                None => family,
+            }
+        }
+        Analysed::Recalibration {
+            calibration,
+            results,
+        } => {
+            let name = calibration["name"].as_str().unwrap_or("another");
+            match ForceChange::deserialize(results) {
+                Ok(found) => format!("calibration {name}: {}", change(&found)),
+                Err(_) => format!("calibration {name}"),
+            }
+        }
+        Analysed::Mask { left_out_s } => {
+            let spans = left_out_s.iter();
+            let spans: Vec<String> = spans.map(|[a, b]| format!("{a} to {b} s")).collect();
+            format!("left out: {}", spans.join(", "))
+        }
+        Analysed::Withdrawal => "does not count any more".to_owned(),
+    }
+}
+
+/// The lines of a kept fit: parameters, then sentences; empty for what is no fit.
+#[must_use]
+pub fn fit_lines(one: &Analysis) -> Vec<String> {
+    let Analysed::Fit { results, .. } = &one.what else {
+        return Vec::new();
+    };
+    let mut lines = parameter_lines(&parameters(results));
+    lines.extend(sentences(results).iter().map(|one| format!("- {one}")));
+    lines
+}
+
+/// Who withdrew an analysis, and why; none while it counts.
+#[must_use]
+pub fn withdrawn(analyses: &Analyses, name: &str) -> Option<String> {
+    let by = analyses.withdrawal(name)?;
+    Some(format!(
+        "withdrawn by {} at {}: {}",
+        by.by,
+        super::said::at(&by.at),
+        by.reason
+    ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    #[test]
+    fn fits_of_every_family_are_read_back() {
+        let results = json!({
+            "parameters": [
+                {"name": "tau", "value": 1.5, "unit": "s", "std_error": 0.1, "ci95": [1.3, 1.7], "is_fixed": false},
+                {"name": "k", "value": 2.0, "unit": "N/mm", "std_error": 0.2},
+                {"name": "unreadable"},
+            ],
+            "warnings": ["beware"],
+        });
+        let found = parameters(&results);
+        assert_eq!(found.len(), 2);
+        assert_eq!(found[0].ci95, Some([1.3, 1.7]));
+        assert_eq!((found[1].ci95, found[1].is_fixed), (None, false));
+        assert_eq!(sentences(&results), ["beware"]);
+        assert!(parameters(&Value::Null).is_empty() && sentences(&Value::Null).is_empty());
+    }
+
+    #[test]
+    fn deeds_are_told() {
+        let mask = Analysed::Mask {
+            left_out_s: vec![[1.0, 2.5], [3.0, 4.0]],
+        };
+        assert_eq!(deed(&mask), "left out: 1 to 2.5 s, 3 to 4 s");
+        let change = ForceChange {
+            samples: 7,
+            peak_after_n: Some(2.0),
+            ..ForceChange::default()
+        };
+        let other = Analysed::Recalibration {
+            calibration: json!({"name": "June"}),
+            results: serde_json::to_value(change).unwrap(),
+        };
+        let told = deed(&other);
+        assert!(told.starts_with("calibration June: 7 forces"), "{told}");
+        assert!(told.ends_with("peak 2.000 N instead of -"), "{told}");
+    }
+}

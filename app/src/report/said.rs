@@ -1,0 +1,94 @@
+//! What is said of a session beside its samples, in the words that command line, window and page share.
+
+use palpate_model::rig::SignalFacts;
+use palpate_sessions::HealthSummary;
+use palpate_sessions::edits::{Change, Review};
+
+/// A time to the second, UTC.
+#[must_use]
+pub fn at(time: &chrono::DateTime<chrono::Utc>) -> String {
+    time.format("%Y-%m-%d %H:%M:%SZ").to_string()
+}
+
+/// What an edit says.
+#[must_use]
+pub fn change(change: &Change) -> String {
+    match change {
+        Change::Verdict { verdict } => verdict.to_string(),
+        Change::Tags { add, remove } => {
+            let added = add.iter().map(|tag| format!("+{tag}"));
+            let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
+            format!("tags {}", signs.collect::<Vec<_>>().join(" "))
+        }
+        Change::Note => "note".to_owned(),
+        Change::Review { decision, .. } => format!("review, {}", decision.word()),
+        Change::Contact {
+            number,
+            position_mm,
+            was_mm,
+        } => format!(
+            "contact {number} at {:.3} mm instead of {:.3} mm",
+            position_mm.0, was_mm.0
+        ),
+    }
+}
+
+/// Whether a review still stands.
+#[must_use]
+pub fn review(review: &Review) -> String {
+    let stands = match review.changed.as_slice() {
+        [] => "everything is as it was seen".to_owned(),
+        changed => format!(
+            "but {} changed since; it is to be reviewed again",
+            changed.join(", ")
+        ),
+    };
+    let decision = review.decision.word();
+    format!("{decision} by {}, {stands}", review.by)
+}
+
+/// The worst that is told of the computer, each with its name.
+#[must_use]
+pub fn health(health: &HealthSummary) -> Vec<(&'static str, String)> {
+    let mut lines = Vec::new();
+    if let Some(worst) = &health.worst {
+        let mut parts = vec![
+            format!("at most {:.1} ms late", worst.lateness_s * 1e3),
+            format!("queue at most {:.1} % full", worst.queue_share * 100.0),
+        ];
+        let sync = worst.sync_s.map(|secs| secs * 1e3);
+        parts.extend(sync.map(|millis| format!("synchronised in at most {millis:.1} ms")));
+        let free = worst.free_bytes.map(|bytes| bytes as f64 / 1e9);
+        parts.extend(free.map(|gigabytes| format!("{gigabytes:.1} GB of disk free at least")));
+        parts.push(format!("{} readings missing", worst.missed_readings));
+        lines.push(("computer", parts.join(", ")));
+    }
+    if health.clock_jumps > 0 {
+        lines.push((
+            "clock",
+            format!(
+                "the wall clock was set {} times during the run, by up to {:+.1} s; sample times do not depend on it",
+                health.clock_jumps, health.clock_jump_s
+            ),
+        ));
+    }
+    let events = health.events.iter();
+    lines.extend(events.map(|(at_s, text)| ("event", format!("at {at_s:.1} s: {text}"))));
+    lines
+}
+
+/// How the signal was taken, line by line.
+#[must_use]
+pub fn signal(signal: &SignalFacts) -> [String; 3] {
+    let range = signal.range_v.map_or(String::new(), |[low, high]| {
+        format!(", range {low:.3} to {high:.3} V")
+    });
+    let count = signal.resolution_v.map_or(String::new(), |volts| {
+        format!(", one count {:.3} mV", volts * 1e3)
+    });
+    [
+        format!("{:.2} Hz{range}{count}", signal.sample_rate_hz),
+        format!("filter {}", signal.filter),
+        signal.aliasing.clone(),
+    ]
+}

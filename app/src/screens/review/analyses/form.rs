@@ -1,0 +1,201 @@
+//! The analysis to be made, as typed.
+
+use super::text_ui;
+use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
+use eframe::egui::{ComboBox, Ui};
+use palpate_model::families;
+use std::path::PathBuf;
+
+/// What can be made.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Fit,
+    Recalibration,
+    Mask,
+}
+
+impl Kind {
+    const ALL: [(Self, &'static str); 3] = [
+        (Self::Fit, "Fit"),
+        (Self::Recalibration, "Other calibration"),
+        (Self::Mask, "Leave out"),
+    ];
+}
+
+/// The form.
+pub(super) struct Form {
+    kind: Kind,
+    name: String,
+    /// Keys of families, after the own model.
+    families: Vec<String>,
+    family: Option<String>,
+    with_unload: bool,
+    with_profile: bool,
+    /// Id of one of the library.
+    calibration: Option<String>,
+    file: String,
+    span: [QuantityField; 2],
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        Self {
+            kind: Kind::default(),
+            name: String::new(),
+            families: families::all().iter().map(|one| one.key()).collect(),
+            family: None,
+            with_unload: false,
+            with_profile: false,
+            calibration: None,
+            file: String::new(),
+            span: [0.0, 0.0].map(QuantityField::new),
+        }
+    }
+}
+
+impl Form {
+    /// What was made needs another name next time.
+    pub fn forget(&mut self) {
+        self.name.clear();
+    }
+
+    /// A stretch to be left out.
+    pub fn propose_span(&mut self, from: f64, until: f64) {
+        self.kind = Kind::Mask;
+        // A millisecond is what rigs sample.
+        let field = |at: f64| QuantityField::new((at * 1e3).round() / 1e3);
+        self.span = [from.min(until), from.max(until)].map(field);
+    }
+
+    /// Draws the form; what it asks for, or why it asks for nothing.
+    pub fn ui(
+        &mut self,
+        ui: &mut Ui,
+        known: &Known,
+        read_by: Option<&str>,
+    ) -> Result<Deed, String> {
+        ui.horizontal(|ui| {
+            for (kind, words) in Kind::ALL {
+                ui.selectable_value(&mut self.kind, kind, words);
+            }
+        });
+        text_ui(ui, "name", "of the new analysis", &mut self.name);
+        match self.kind {
+            Kind::Fit => self.fit_ui(ui),
+            Kind::Recalibration => self.calibration_ui(ui, known),
+            Kind::Mask => {
+                for (name, field) in ["from", "to"].into_iter().zip(&mut self.span) {
+                    if quantity_ui(ui, name, "s since the first sample", field) {
+                        field.check(|_| Ok(()));
+                    }
+                }
+            }
+        }
+        self.deed(known, read_by)
+    }
+
+    fn fit_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "model");
+            let chosen = self.family.as_deref().unwrap_or(OWN_MODEL);
+            ComboBox::from_id_salt("analysis_model")
+                .selected_text(chosen)
+                .width(ui.available_width() - 16.0)
+                .show_ui(ui, |ui| {
+                    ui.selectable_value(&mut self.family, None, OWN_MODEL);
+                    for key in &self.families {
+                        ui.selectable_value(&mut self.family, Some(key.clone()), key);
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        match self.family {
+            Some(_) => ui.checkbox(&mut self.with_unload, "the way back too, where recorded"),
+            None => ui.checkbox(&mut self.with_profile, "profile intervals too"),
+        };
+    }
+
+    fn calibration_ui(&mut self, ui: &mut Ui, known: &Known) {
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "from library");
+            let chosen = self.calibration.as_deref();
+            let words = match (chosen, known.calibrations.is_empty()) {
+                (Some(id), _) => id,
+                (None, true) => "it has none",
+                (None, false) => "none chosen",
+            };
+            ComboBox::from_id_salt("analysis_calibration")
+                .selected_text(words)
+                .width(ui.available_width() - 16.0)
+                .show_ui(ui, |ui| {
+                    ui.selectable_value(&mut self.calibration, None, "none");
+                    for (id, _) in &known.calibrations {
+                        ui.selectable_value(&mut self.calibration, Some(id.clone()), id);
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        text_ui(ui, "or file", "a calibration's document", &mut self.file);
+    }
+
+    fn deed(&self, known: &Known, read_by: Option<&str>) -> Result<Deed, String> {
+        let name = self.name.trim().to_owned();
+        if name.is_empty() {
+            return Err("give the new analysis a name".to_owned());
+        }
+        if known.analyses.all.iter().any(|one| one.name == name) {
+            return Err(format!(
+                "there is an analysis '{name}' already, and a name is never used twice; choose another"
+            ));
+        }
+        match self.kind {
+            Kind::Fit => Ok(Deed::Fit {
+                name,
+                how: FitWanted {
+                    family: self.family.clone(),
+                    with_unload: self.with_unload && self.family.is_some(),
+                    with_profile: self.with_profile && self.family.is_none(),
+                    based_on: read_by.map(str::to_owned),
+                },
+            }),
+            Kind::Recalibration => self.recalibration(known, name),
+            Kind::Mask => {
+                let [from, until] = self.span.each_ref().map(|field| field.value.clone());
+                let (from, until) = (from?, until?);
+                match from < until {
+                    true => Ok(Deed::Mask {
+                        name,
+                        left_out_s: vec![[from, until]],
+                    }),
+                    false => Err("give two times, the earlier first".to_owned()),
+                }
+            }
+        }
+    }
+
+    fn recalibration(&self, known: &Known, name: String) -> Result<Deed, String> {
+        let file = self.file.trim();
+        let chosen = self.calibration.as_ref().and_then(|id| {
+            let found = known.calibrations.iter().find(|(own, _)| own == id);
+            found.map(|(_, calibration)| calibration.clone())
+        });
+        match (chosen, file) {
+            (Some(_), file) if !file.is_empty() => {
+                Err("choose one of the library or name a file, not both".to_owned())
+            }
+            (Some(calibration), _) => Ok(Deed::Recalibrate {
+                name,
+                calibration: Box::new(calibration),
+            }),
+            (None, "") => Err("choose a calibration, or name its file".to_owned()),
+            (None, file) => Ok(Deed::RecalibrateFrom {
+                name,
+                file: PathBuf::from(file),
+            }),
+        }
+    }
+}

@@ -1,0 +1,171 @@
+//! Report and figure of what is in front, as new files.
+
+use super::super::Looked;
+use super::{quiet_ui, text_ui, wrong_ui};
+use crate::report::dossier::{Figure, Wanted, name_of};
+use crate::report::figures::Window;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::quantity_input::form_label;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::analyses::{Done, Paper, paper};
+use crate::workers::path_dialog::{SaveAs, SaveDialog};
+use crate::workers::task::Task;
+use eframe::egui::{ComboBox, Ui};
+use std::path::PathBuf;
+
+/// Which field a dialog fills.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Field {
+    Report,
+    Figure,
+}
+
+/// The form and its work.
+#[derive(Default)]
+pub(super) struct Papers {
+    report: String,
+    is_of_all: bool,
+    figure: String,
+    of: Figure,
+    /// A stretch of time in s, and whether the figure shows it alone.
+    span: Option<[f64; 2]>,
+    is_of_span: bool,
+    dialog: SaveDialog,
+    asked: Option<Field>,
+    pages: Task<Done>,
+    figures: Task<Done>,
+}
+
+impl Papers {
+    /// Fetches what threads have answered.
+    pub fn poll(&mut self) {
+        self.pages.poll();
+        self.figures.poll();
+        if let Some(path) = self.dialog.poll() {
+            let path = path.display().to_string();
+            match self.asked.take() {
+                Some(Field::Report) => self.report = path,
+                Some(Field::Figure) => self.figure = path,
+                None => {}
+            }
+        }
+    }
+
+    /// A stretch that a figure may show alone.
+    pub fn propose_span(&mut self, from: f64, until: f64) {
+        self.span = Some([from.min(until), from.max(until)]);
+    }
+
+    /// Draws the form.
+    pub fn ui(&mut self, ui: &mut Ui, looked: &Looked, shown: &[Looked]) {
+        let wanted = |one: &Looked| Wanted {
+            session: one.session.clone(),
+            analysis: one.analysis.clone(),
+        };
+        section_ui(ui, "Report");
+        text_ui(ui, "report file", "a new .html file", &mut self.report);
+        self.choose_ui(ui, Field::Report, looked);
+        if shown.len() > 1 {
+            ui.checkbox(&mut self.is_of_all, format!("of all {} shown", shown.len()));
+        }
+        let verdict = path_verdict(&self.report, &["html", "htm"]);
+        match task_ui(ui, "Write report", &self.pages, &verdict) {
+            Some(Pressed::Start) => {
+                let sessions: Vec<Wanted> = match self.is_of_all && shown.len() > 1 {
+                    true => shown.iter().map(wanted).collect(),
+                    false => vec![wanted(looked)],
+                };
+                let to = PathBuf::from(self.report.trim());
+                self.pages.start("report", ui.ctx(), move |progress| {
+                    paper(&Paper::Page(sessions), &to, progress)
+                });
+            }
+            Some(Pressed::Cancel) => self.pages.cancel(),
+            None => {}
+        }
+        answer_ui(ui, &self.pages);
+
+        section_ui(ui, "Figure");
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "of");
+            ComboBox::from_id_salt("figure_of")
+                .selected_text(self.of.word())
+                .show_ui(ui, |ui| {
+                    for one in Figure::ALL {
+                        ui.selectable_value(&mut self.of, one, one.word());
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        text_ui(
+            ui,
+            "figure file",
+            "a new .svg or .png file",
+            &mut self.figure,
+        );
+        self.choose_ui(ui, Field::Figure, looked);
+        let is_over_samples = matches!(self.of, Figure::ForceTime | Figure::ForceDepth);
+        if let Some([from, until]) = self.span.filter(|_| is_over_samples) {
+            let words = format!("only {from:.3} to {until:.3} s");
+            ui.checkbox(&mut self.is_of_span, words);
+        }
+        let verdict = path_verdict(&self.figure, &["svg", "png"]);
+        match task_ui(ui, "Write figure", &self.figures, &verdict) {
+            Some(Pressed::Start) => {
+                let span = self.span.filter(|_| self.is_of_span && is_over_samples);
+                let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
+                let one = Paper::Figure(wanted(looked), self.of, window);
+                let to = PathBuf::from(self.figure.trim());
+                self.figures.start("figure", ui.ctx(), move |progress| {
+                    paper(&one, &to, progress)
+                });
+            }
+            Some(Pressed::Cancel) => self.figures.cancel(),
+            None => {}
+        }
+        answer_ui(ui, &self.figures);
+    }
+
+    fn choose_ui(&mut self, ui: &mut Ui, field: Field, looked: &Looked) {
+        let (words, title, ending) = match field {
+            Field::Report => ("Report...", "Report", "html"),
+            Field::Figure => ("Figure...", "Figure", "svg"),
+        };
+        if ui.button(words).clicked() && !self.dialog.is_open() {
+            self.asked = Some(field);
+            let wanted = SaveAs {
+                title,
+                name: format!("{}.{ending}", name_of(&looked.session)),
+                ending,
+            };
+            // Without a dialog the path is typed.
+            if self.dialog.open(wanted, ui.ctx()).is_err() {
+                self.asked = None;
+            }
+        }
+    }
+}
+
+/// Whether a path can be that of a new file; whether it is there already is found out when it is written.
+fn path_verdict(path: &str, endings: &[&str]) -> Result<(), String> {
+    let path = path.trim();
+    let is_known = |ending: &&str| {
+        let ending = format!(".{ending}");
+        path.len() > ending.len() && path.to_ascii_lowercase().ends_with(&ending)
+    };
+    match (path, endings.iter().any(is_known)) {
+        ("", _) => Err("write the name of a new file, or choose one".to_owned()),
+        (_, true) => Ok(()),
+        (_, false) => Err(format!("let the name end in .{}", endings.join(" or ."))),
+    }
+}
+
+fn answer_ui(ui: &mut Ui, task: &Task<Done>) {
+    match task.answer() {
+        _ if task.standing().is_some() => {}
+        None => {}
+        Some(Ok(done)) => quiet_ui(ui, &done.sentence),
+        Some(Err(reason)) => wrong_ui(ui, reason),
+    }
+}

@@ -1,0 +1,94 @@
+//! What a session is worth, and where its contact really was.
+
+use super::quiet_ui;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::widgets::reason_button::reason_button;
+use crate::workers::analyses::{Deed, Known};
+use eframe::egui::{ComboBox, Ui, vec2};
+use palpate_model::units::Position;
+use palpate_sessions::edits::Verdict;
+
+/// The form.
+pub(super) struct Said {
+    verdict: Verdict,
+    contact: usize,
+    position: QuantityField,
+}
+
+impl Default for Said {
+    fn default() -> Self {
+        Self {
+            verdict: Verdict::Valid,
+            contact: 0,
+            position: QuantityField::new(0.0),
+        }
+    }
+}
+
+impl Said {
+    /// Draws the form; `verdict` says whether something can be done that needs a reason.
+    pub fn ui(&mut self, ui: &mut Ui, known: &Known, verdict: &Result<(), String>) -> Option<Deed> {
+        section_ui(ui, "What it is worth");
+        let words = match &known.verdict {
+            Some((verdict, by, reason)) => format!("{verdict}, says {by}: {reason}"),
+            None => "nobody gave a verdict".to_owned(),
+        };
+        quiet_ui(ui, &words);
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "verdict");
+            ComboBox::from_id_salt("analysis_verdict")
+                .selected_text(self.verdict.word())
+                .show_ui(ui, |ui| {
+                    for one in [Verdict::Valid, Verdict::Suspect, Verdict::Rejected] {
+                        ui.selectable_value(&mut self.verdict, one, one.word());
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        let size = vec2(170.0, 26.0);
+        if reason_button(ui, "Give verdict", size, verdict) {
+            return Some(Deed::Judge(self.verdict));
+        }
+        section_ui(ui, "Contact");
+        self.contact_ui(ui, known);
+        let own = match known.contacts.is_empty() {
+            true => Err("the session found no contact".to_owned()),
+            false => self.position.value.clone().and(verdict.clone()),
+        };
+        let is_pressed = reason_button(ui, "Correct contact", size, &own);
+        let position = self.position.value.clone().ok();
+        position.filter(|_| is_pressed).map(|mm| Deed::Correct {
+            number: self.contact as u32 + 1,
+            position: Position(mm),
+        })
+    }
+
+    fn contact_ui(&mut self, ui: &mut Ui, known: &Known) {
+        if known.contacts.is_empty() {
+            return;
+        }
+        self.contact = self.contact.min(known.contacts.len() - 1);
+        if known.contacts.len() > 1 {
+            ui.horizontal(|ui| {
+                let label = form_label(ui, "which");
+                ComboBox::from_id_salt("analysis_contact")
+                    .selected_text(format!("contact {}", self.contact + 1))
+                    .show_ui(ui, |ui| {
+                        for index in 0..known.contacts.len() {
+                            let words = format!("contact {}", index + 1);
+                            ui.selectable_value(&mut self.contact, index, words);
+                        }
+                    })
+                    .response
+                    .labelled_by(label.id);
+            });
+        }
+        let found = known.contacts[self.contact].0;
+        quiet_ui(ui, &format!("it stands at {found:.3} mm from home"));
+        if quantity_ui(ui, "really at", "mm from home", &mut self.position) {
+            self.position.check(|_| Ok(()));
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! What is made of a session afterwards, away from the window's thread: analyses, verdicts, corrections.
+
+mod deeds;
+mod fits;
+mod papers;
+
+pub use deeds::{Deed, Who, login};
+pub use fits::{FitWanted, OWN_MODEL, own};
+pub use papers::{Paper, paper};
+
+use super::task::Progress;
+use palpate_model::calibration::Calibration;
+use palpate_model::units::Position;
+use palpate_protocols::edited;
+use palpate_sessions::analyses::Analyses;
+use palpate_sessions::edits::Verdict;
+use palpate_sessions::{Shelf, contacts};
+use std::path::{Path, PathBuf};
+
+/// What is known of a session for making analyses of it.
+#[derive(Clone, Debug)]
+pub struct Known {
+    /// Its folder.
+    pub session: PathBuf,
+    /// Its id.
+    pub session_id: String,
+    /// Its analyses, withdrawn ones among them.
+    pub analyses: Analyses,
+    /// Its verdict, by whom and why.
+    pub verdict: Option<(Verdict, String, String)>,
+    /// The contacts it found, corrected ones as they are now, from home.
+    pub contacts: Vec<Position>,
+    /// Calibrations of the library by name, and ids of those of one name.
+    pub calibrations: Vec<(String, Calibration)>,
+}
+
+/// Reads what is known of a session, and which calibrations there are.
+pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
+    let passing = edited::outline(session).map_err(|err| err.to_string())?;
+    let id = passing.outline.manifest.session_id;
+    let analyses = Analyses::read(session, &id).map_err(|err| err.to_string())?;
+    let shelf = library.map(Shelf::open);
+    let kept = shelf.iter().flat_map(|shelf| &shelf.kept);
+    let found = contacts::contacts(&passing.outline.entries);
+    let verdict = passing.edits.verdict();
+    Ok(Known {
+        session: session.to_path_buf(),
+        session_id: id,
+        analyses,
+        verdict: verdict.map(|(verdict, edit)| (verdict, edit.by.clone(), edit.reason.clone())),
+        contacts: found.iter().map(|one| one.position).collect(),
+        calibrations: kept
+            .map(|one| (one.id.clone(), one.document.clone()))
+            .collect(),
+    })
+}
+
+/// What came of some work.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Done {
+    /// One sentence.
+    pub sentence: String,
+    /// The session that is not as it was, if one is.
+    pub changed: Option<PathBuf>,
+    /// The analysis that was made.
+    pub made: Option<String>,
+}
+
+impl Done {
+    fn told(sentence: String) -> Self {
+        Self {
+            sentence,
+            changed: None,
+            made: None,
+        }
+    }
+}
+
+/// Tells how far the work is; an error if nobody wants the rest.
+fn step(progress: &Progress, done: usize, of: usize, what: &str) -> Result<(), String> {
+    match progress.tell(done, of, what).is_break() {
+        true => Err("cancelled; nothing was kept".to_owned()),
+        false => Ok(()),
+    }
+}
