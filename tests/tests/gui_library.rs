@@ -157,7 +157,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     click_row(&mut flow, 20, Modifiers::NONE);
     click_row(&mut flow, 18, Modifiers::SHIFT);
     flow.type_into("by", "Grace");
-    flow.type_into("tags", "+pilot -absent");
+    flow.type_into("new tags", "+pilot -absent");
     flow.click("Change tags");
     says(&mut flow, "tags +pilot -absent on 3 sessions");
     for session in &sessions[18..21] {
@@ -227,9 +227,15 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
 #[test]
 fn damage_is_told_and_sessions_are_written_out() {
     let (mut flow, sessions) = opened();
-    fs::write(sessions[7].join("000.mcap"), b"no log").unwrap();
-    let log = fs::read(sessions[6].join("000.mcap")).unwrap();
-    fs::write(sessions[6].join("000.mcap"), &log[..log.len() / 2]).unwrap();
+    let log = |number: usize| sessions[number].join("000.mcap");
+    fs::write(log(5), b"no log").unwrap();
+    let bytes = fs::read(log(6)).unwrap();
+    fs::write(log(6), &bytes[..bytes.len() / 2]).unwrap();
+    // In the middle, where the catalog does not look.
+    let mut bytes = fs::read(log(7)).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 0x10;
+    fs::write(log(7), bytes).unwrap();
     flow.click("Look for new sessions");
     says(&mut flow, "damaged: ");
     says(&mut flow, "unfinished");
@@ -264,4 +270,31 @@ fn damage_is_told_and_sessions_are_written_out() {
     flow.click("Export");
     says(&mut flow, "0 of 3 sessions added to");
     assert!(flow.says("2 were there"));
+}
+
+#[test]
+fn files_of_other_testers_become_sessions() {
+    let (mut flow, _) = opened();
+    let file = flow.folder.path().join("zug.csv");
+    let rows = (0..200).map(|i| {
+        let depth = (0.1 * f64::from(i)).min(5.0);
+        format!("{},{depth},{}\n", 0.1 * f64::from(i), 0.2 * depth)
+    });
+    let text = format!("t_s,depth_mm,force_N\n{}", rows.collect::<String>());
+    fs::write(&file, text).unwrap();
+    assert!(!flow.is_enabled("Import") && flow.says("name a file first"));
+    flow.type_into("files", "/nowhere/at-all.csv");
+    flow.click("Import");
+    says(&mut flow, "cannot read /nowhere/at-all.csv");
+    flow.type_into("files", &file.display().to_string());
+    flow.type_into("of what", "gelatine");
+    flow.click("See how it reads");
+    says(&mut flow, "none made: a dry run");
+    assert!(flow.says("200 over 19.900 s"));
+    assert!(flow.says(&format!("{SESSIONS} sessions, found in")));
+    flow.click("Import");
+    says(&mut flow, &format!("{} sessions, found in", SESSIONS + 1));
+    flow.type_into("find", "gelatine zug");
+    says(&mut flow, "1 session, found in");
+    flow.window.check_accessibility();
 }

@@ -88,6 +88,27 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     assert_eq!(json(&tagged)["sessions"][0]["tags"][0], "good");
     assert_eq!(found(at, &["--tag", "pilot"]), ["sessions/one"]);
 
+    let note = [
+        "note",
+        &one,
+        &two,
+        "--text",
+        "the gel was warm",
+        "--by",
+        "Ada",
+    ];
+    succeeded(&palpate(at, &note));
+    assert_eq!(found(at, &["warm", "gel"]).len(), 2);
+    let info = stdout(&palpate(at, &["info", &two]));
+    assert!(info.contains("Ada: note: the gel was warm"), "{info}");
+    let empty = palpate(at, &["note", &one, "--text", " ", "--json"]);
+    assert_eq!(empty.status.code(), Some(2));
+    assert!(
+        stderr(&empty).contains("a note its words"),
+        "{}",
+        stderr(&empty)
+    );
+
     let why = ["--reason", "curve and video agree", "--by", "Mary"];
     let mut review = vec!["review", one.as_str(), "--accept"];
     review.extend(why);

@@ -37,6 +37,8 @@ pub(super) struct List {
     entries: BTreeMap<String, (Entry, u64)>,
     generation: u64,
     chosen: BTreeSet<String>,
+    /// Counts up whenever others are chosen.
+    choice: u64,
     at: Option<String>,
     anchor: Option<String>,
     scrolled: Scrolled,
@@ -57,6 +59,7 @@ impl List {
     pub fn take(&mut self, found: &mut Found) {
         self.folders = std::mem::take(&mut found.folders);
         self.generation += 1;
+        self.choice += 1;
         self.learn(std::mem::take(&mut found.first));
         let there: BTreeSet<&String> = self.folders.iter().collect();
         self.chosen.retain(|folder| there.contains(folder));
@@ -105,6 +108,11 @@ impl List {
         self.folders.iter().filter(is_chosen).cloned().collect()
     }
 
+    /// Another number whenever those chosen, or their order, may be others.
+    pub fn choice(&self) -> u64 {
+        self.choice
+    }
+
     /// How many are chosen.
     pub fn chosen_count(&self) -> usize {
         self.chosen.len()
@@ -127,6 +135,7 @@ impl List {
         let Some(folder) = self.folders.get(row).cloned() else {
             return;
         };
+        self.choice += 1;
         let place = |one: &Option<String>| {
             let one = one.as_ref()?;
             self.folders.iter().position(|folder| folder == one)
@@ -184,7 +193,10 @@ impl List {
         for act in acts {
             match act {
                 Act::Choose(row, how) => self.choose(row, how),
-                Act::All => self.chosen = self.folders.iter().cloned().collect(),
+                Act::All => {
+                    self.choice += 1;
+                    self.chosen = self.folders.iter().cloned().collect();
+                }
                 Act::Open => wanted.push(Wanted::Open),
                 Act::Sort(column) => wanted.extend(COLUMNS[column].3.map(Wanted::Sort)),
             }

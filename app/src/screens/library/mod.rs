@@ -24,6 +24,7 @@ use list::{List, Wanted};
 use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
 use say::{SayPanel, sentence};
 use std::path::PathBuf;
+use std::rc::Rc;
 
 /// Sessions of which all that is known comes with the search.
 const PAGE: usize = 120;
@@ -67,6 +68,8 @@ pub struct LibraryScreen {
     choices: Choices,
     heading: Option<Result<Heading, String>>,
     list: List,
+    /// Folders of those chosen, and of which choice they are: a list of thousands is not made in every frame.
+    chosen: (u64, Rc<Vec<PathBuf>>),
     say: SayPanel,
     files: FilesPanel,
     import: ImportPanel,
@@ -93,6 +96,7 @@ impl LibraryScreen {
             choices: Choices::default(),
             heading: None,
             list: List::default(),
+            chosen: (0, Rc::default()),
             say: SayPanel::default(),
             files: FilesPanel::default(),
             import: ImportPanel::default(),
@@ -217,12 +221,15 @@ impl LibraryScreen {
     }
 
     /// Folders of the sessions chosen.
-    fn chosen(&self) -> Vec<PathBuf> {
-        let Ok(library) = &self.library else {
-            return Vec::new();
-        };
-        let chosen = self.list.chosen().into_iter();
-        chosen.map(|folder| library.join(folder)).collect()
+    fn chosen(&mut self) -> Rc<Vec<PathBuf>> {
+        if self.chosen.0 != self.list.choice()
+            && let Ok(library) = &self.library
+        {
+            let folders = self.list.chosen().into_iter();
+            let folders = folders.map(|folder| library.join(folder)).collect();
+            self.chosen = (self.list.choice(), Rc::new(folders));
+        }
+        Rc::clone(&self.chosen.1)
     }
 
     /// Whether the sessions chosen can be looked at, or why not.
@@ -236,9 +243,9 @@ impl LibraryScreen {
         }
     }
 
-    fn review(&self, commands: &mut Commands) {
+    fn review(&mut self, commands: &mut Commands) {
         if self.may_review().is_ok() {
-            commands.push(Command::Review(self.chosen()));
+            commands.push(Command::Review(self.chosen().to_vec()));
         }
     }
 

@@ -161,7 +161,7 @@ impl SayPanel {
             _ => may.clone(),
         };
         let mut wanted = None;
-        text_ui(ui, "tags", "+pilot -doubtful", &mut self.tags);
+        text_ui(ui, "new tags", "+pilot -doubtful", &mut self.tags);
         if button(ui, "Change tags", &needs(&self.tags, "tags")) {
             let (add, remove) = tags(&self.tags);
             wanted = Some(Saying::Tags { add, remove });
@@ -234,7 +234,10 @@ impl SayPanel {
             (words("Redo", &self.redo), Doing::Redo),
         ] {
             let Some(text) = text else { continue };
-            if button(ui, &text, &may) {
+            // The words may be many; under the pointer stands all of it.
+            let button = eframe::egui::Button::new(&text).truncate();
+            let button = ui.add_enabled(may.is_ok(), button).on_hover_text(&text);
+            if button.clicked() {
                 self.turn_back(ctx, doing);
                 break;
             }
