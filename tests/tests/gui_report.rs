@@ -36,10 +36,13 @@ impl Panel {
     /// A recorded session in a folder of its own, and the panel on it.
     fn open() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let session = folder.path().join("press");
-        fs::create_dir(&session).expect("a session folder");
-        let log = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
-        fs::copy(log, session.join("000.mcap")).expect("a log");
+        let [session, beside] = ["press", "beside"].map(|name| {
+            let session = folder.path().join(name);
+            fs::create_dir(&session).expect("a session folder");
+            let log = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
+            fs::copy(log, session.join("000.mcap")).expect("a log");
+            session
+        });
         let shown = Shown {
             panel: AnalysesPanel::new(Ok(folder.path().join("library"))),
             looked: Looked {
@@ -50,9 +53,13 @@ impl Panel {
         let window = Harness::builder()
             .with_size((340.0, 1400.0))
             .build_ui_state(
-                |ui, shown: &mut Shown| {
+                move |ui, shown: &mut Shown| {
                     shown.panel.poll(&ui.ctx().clone());
-                    let all = [shown.looked.clone(), shown.looked.clone()];
+                    let second = Looked {
+                        session: beside.clone(),
+                        analysis: None,
+                    };
+                    let all = [shown.looked.clone(), second];
                     shown.panel.set_shown(&all);
                     let mut commands = Default::default();
                     shown.panel.ui(ui, &mut shown.looked, &mut commands);
@@ -220,6 +227,26 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     assert!(panel.analyses().get("anew").is_err());
     let changed = panel.window.state_mut().panel.take_changed();
     assert_eq!(changed.as_deref(), Some(panel.session.as_path()));
+}
+
+#[test]
+fn sessions_shown_together_are_fitted_as_one_body() {
+    let mut panel = Panel::open();
+    panel.click("one body for this and the other shown");
+    panel.type_into("name", "together");
+    panel.click("Make analysis");
+    panel.wait_for("kept as 'together'");
+    let kept = panel.analyses();
+    let Analysed::Fit {
+        settings, results, ..
+    } = &kept.all[0].what
+    else {
+        panic!("{:?}", kept.all[0]);
+    };
+    assert_eq!(settings["together_with"][0]["session"], "beside");
+    assert_eq!(results["shared"].as_array().map(Vec::len), Some(5));
+    let logs = kept.all[0].inputs.iter();
+    assert_eq!(logs.filter(|one| one.what.ends_with("000.mcap")).count(), 2);
 }
 
 #[test]

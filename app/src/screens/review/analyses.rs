@@ -7,6 +7,7 @@ mod said;
 
 use super::Looked;
 use crate::command::Commands;
+use crate::report::dossier::Wanted;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
@@ -150,6 +151,7 @@ impl AnalysesPanel {
             self.asked = Some(looked.session.clone());
             self.known = None;
             self.made = None;
+            self.own = Task::default();
             self.read_again(ui.ctx());
         }
         section_ui(ui, "Analyses");
@@ -177,9 +179,17 @@ impl AnalysesPanel {
         if list::list_ui(ui, known, looked, own) {
             self.fit_own(ui.ctx(), &known.session);
         }
-        self.own_ui(ui, own_of(&self.own, &known.session));
+        self.own_ui(ui);
         section_ui(ui, "Make another");
-        let name = self.form.ui(ui, known, looked.analysis.as_deref());
+        let others = self.shown.iter().filter(|one| one.session != known.session);
+        let others: Vec<Wanted> = others
+            .map(|one| Wanted {
+                session: one.session.clone(),
+                analysis: one.analysis.clone(),
+            })
+            .collect();
+        let read_by = looked.analysis.as_deref();
+        let name = self.form.ui(ui, known, read_by, &others);
         self.who_ui(ui);
         let verdict = self.free().and(name.clone().map(|_| ()));
         match task_ui(ui, "Make analysis", &self.work, &verdict) {
@@ -250,11 +260,11 @@ impl AnalysesPanel {
     }
 
     /// How far the session's own fit is, or why there is none.
-    fn own_ui(&self, ui: &mut Ui, refused: Option<&str>) {
+    fn own_ui(&self, ui: &mut Ui) {
         if let Some(standing) = self.own.standing() {
             quiet_ui(ui, &format!("the session's own fit: {}", standing.what));
-        } else if let Some(reason) = refused {
-            quiet_ui(ui, &format!("the session has no fit of its own: {reason}"));
+        } else if let Some(Err(reason)) = self.own.answer() {
+            quiet_ui(ui, &format!("no fit of its own was made: {reason}"));
         }
     }
 
@@ -267,11 +277,6 @@ impl AnalysesPanel {
             Some(Err(reason)) => wrong_ui(ui, reason),
         }
     }
-}
-
-/// Why the last try of a session's own fit failed.
-fn own_of<'a>(own: &'a Task<Own>, _session: &Path) -> Option<&'a str> {
-    own.answer()?.as_ref().err().map(String::as_str)
 }
 
 fn quiet_ui(ui: &mut Ui, text: &str) {

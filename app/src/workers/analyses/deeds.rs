@@ -8,7 +8,7 @@ use palpate_model::units::Position;
 use palpate_protocols::analysed::{self, record};
 use palpate_protocols::edited;
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::analyses::{Analysed, Analyses, add_analysis};
+use palpate_sessions::analyses::{Analysed, Analyses, Input, add_analysis, inputs_of};
 use palpate_sessions::calibrations::read_calibration;
 use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use palpate_sessions::log::Summary;
@@ -132,7 +132,7 @@ fn keep(
     session: &Path,
     id: &str,
     name: &str,
-    inputs: Vec<palpate_sessions::analyses::Input>,
+    inputs: Vec<Input>,
     what: Analysed,
     who: &Who,
 ) -> Result<(), String> {
@@ -160,7 +160,15 @@ fn fit(
     let based_on = how.based_on.as_deref();
     let opened = analysed::open(session, based_on).map_err(|err| err.to_string())?;
     let inputs = opened.inputs(session, based_on);
-    let inputs = inputs.map_err(|err| err.to_string())?;
+    let mut inputs = inputs.map_err(|err| err.to_string())?;
+    for one in &how.together_with {
+        let id = id_of(&one.session)?;
+        let theirs = inputs_of(&one.session).map_err(|err| err.to_string())?;
+        inputs.extend(theirs.into_iter().map(|file| Input {
+            what: format!("{id}/{}", file.what),
+            sha256: file.sha256,
+        }));
+    }
     let what = Analysed::Fit {
         based_on: how.based_on.clone(),
         settings: how.settings(),
