@@ -3,16 +3,16 @@
 //! A recalibration makes every force anew from the raw signal and the tares that were found; a mask names
 //! stretches whose forces do not count. The log itself stays as it is.
 
-use crate::analysis::{SourceError, calibration_of, decisions};
+use crate::analysis::{SourceError, calibration_of, decisions, decisions_among};
 use crate::edited::{self, Edited};
 use crate::engine::{ENGINE_VERSION, Effect, Record};
 use crate::runner::wall_now;
-use palpate_model::calibration::Calibration;
+use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::units::{Seconds, Volts};
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };
-use palpate_sessions::log::Session;
+use palpate_sessions::log::{Outline, ReadError, Session};
 use palpate_sessions::record::Row;
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -58,34 +58,42 @@ pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
         let one = opened.analyses.get(&name)?.clone();
         let changed = changed_inputs(&one, &inputs_of(path)?);
         let session = &mut opened.edited.session;
-        if !changed.is_empty() {
-            session.notes.push(format!(
-                "analysis '{name}' was made before {} changed",
-                changed.join(", ")
-            ));
-        }
+        session.notes.extend(made_before(&name, &changed));
         match one.what {
             Analysed::Fit { based_on, .. } => next = based_on,
             Analysed::Recalibration { calibration, .. } => {
                 let calibration = serde_json::from_value(calibration).map_err(bad_calibration)?;
                 recalibrate(session, &calibration)?;
-                session.notes.push(format!(
-                    "forces are made from the raw signal with calibration {}, as analysis '{name}' has it",
-                    calibration.name
-                ));
+                session.notes.push(made_with(&name, &calibration));
             }
             Analysed::Mask { left_out_s } => {
-                let stretches = left_out_s.len();
+                session.notes.push(masked(&name, left_out_s.len()));
                 opened.left_out_s = left_out_s;
-                session.notes.push(format!(
-                    "forces in {stretches} stretches do not count, as analysis '{name}' has it"
-                ));
             }
             // It never counts, so it is not found.
             Analysed::Withdrawal => {}
         }
     }
     Ok(opened)
+}
+
+fn made_before(name: &str, changed: &[String]) -> Option<String> {
+    let words = || {
+        let changed = changed.join(", ");
+        format!("analysis '{name}' was made before {changed} changed")
+    };
+    (!changed.is_empty()).then(words)
+}
+
+fn made_with(name: &str, calibration: &Calibration) -> String {
+    let with = &calibration.name;
+    format!(
+        "forces are made from the raw signal with calibration {with}, as analysis '{name}' has it"
+    )
+}
+
+fn masked(name: &str, stretches: usize) -> String {
+    format!("forces in {stretches} stretches do not count, as analysis '{name}' has it")
 }
 
 impl Opened {
@@ -137,6 +145,14 @@ pub(crate) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds
         .time_of(i64::try_from(ticks).unwrap_or(i64::MAX))
 }
 
+/// The tares among decisions, each after so many samples.
+fn tares(decisions: &[(u64, Effect)]) -> impl Iterator<Item = (u64, Volts)> {
+    decisions.iter().filter_map(|(after, effect)| match effect {
+        Effect::Record(Record::Tared { volts, .. }) => Some((*after, *volts)),
+        _ => None,
+    })
+}
+
 /// Makes every force of a session anew from its raw signal with a calibration, which takes the place of its
 /// own. A sample whose force was not known, such as one before the tare, stays so.
 pub fn recalibrate(
@@ -145,11 +161,7 @@ pub fn recalibrate(
 ) -> Result<ForceChange, SourceError> {
     let curve = calibration.curve().map_err(bad_calibration)?;
     let found = decisions(session)?;
-    let tares = found.iter().filter_map(|(after, effect)| match effect {
-        Effect::Record(Record::Tared { volts, .. }) => Some((*after, *volts)),
-        _ => None,
-    });
-    let mut tares = tares.peekable();
+    let mut tares = tares(&found).peekable();
     let (mut tare, mut change, mut squares) = (None, ForceChange::default(), 0.0);
     let higher = |peak: Option<f64>, force: f64| Some(peak.map_or(force, |peak| peak.max(force)));
     for (index, row) in session.rows.iter_mut().enumerate() {
@@ -172,6 +184,98 @@ pub fn recalibrate(
     }
     session.manifest.calibration = serde_json::to_value(calibration).map_err(bad_calibration)?;
     Ok(change)
+}
+
+/// A session as an analysis has it, whose samples pass by and are never all in memory.
+#[derive(Clone, Debug)]
+pub struct Passing {
+    /// The session with its edits made; its manifest has the calibration that the forces are made with.
+    pub edited: edited::Passing,
+    /// Its analyses.
+    pub analyses: Analyses,
+    /// Stretches whose forces do not count: from and to in s since the first sample.
+    pub left_out_s: Vec<[f64; 2]>,
+    /// What forces are made anew with: the curve, and each tare after so many samples.
+    anew: Option<(Curve, Vec<(u64, Volts)>)>,
+}
+
+/// Reads a session through, so that it is known to be whole, and keeps all but its samples.
+pub fn passing(path: &Path, name: Option<&str>) -> Result<Passing, SourceError> {
+    of_outline(path, Session::scan(path, &mut |_block| {})?, name)
+}
+
+/// The same of a session that was read through.
+pub fn of_outline(
+    path: &Path,
+    outline: Outline,
+    name: Option<&str>,
+) -> Result<Passing, SourceError> {
+    let edited = edited::of_outline(path, outline)?;
+    let analyses = Analyses::read(path, &edited.outline.manifest.session_id)?;
+    let mut passing = Passing {
+        edited,
+        analyses,
+        left_out_s: Vec::new(),
+        anew: None,
+    };
+    let mut next = name.map(str::to_owned);
+    while let Some(name) = next.take() {
+        let one = passing.analyses.get(&name)?.clone();
+        let changed = changed_inputs(&one, &inputs_of(path)?);
+        let outline = &mut passing.edited.outline;
+        outline.notes.extend(made_before(&name, &changed));
+        match one.what {
+            Analysed::Fit { based_on, .. } => next = based_on,
+            Analysed::Recalibration { calibration, .. } => {
+                let own: Calibration =
+                    serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;
+                let curve = own.curve().map_err(bad_calibration)?;
+                let found = decisions_among(&outline.entries)?;
+                passing.anew = Some((curve, tares(&found).collect()));
+                outline.manifest.calibration = calibration;
+                outline.notes.push(made_with(&name, &own));
+            }
+            Analysed::Mask { left_out_s } => {
+                outline.notes.push(masked(&name, left_out_s.len()));
+                passing.left_out_s = left_out_s;
+            }
+            Analysed::Withdrawal => {}
+        }
+    }
+    Ok(passing)
+}
+
+impl Passing {
+    /// Whether samples are other than those recorded.
+    #[must_use]
+    pub fn is_changed(&self) -> bool {
+        self.anew.is_some() || self.edited.is_changed()
+    }
+
+    /// Hands out every sample that was there when the session was first read, as the analysis has it, in order,
+    /// some at a time.
+    pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
+        let Some((curve, tares)) = &self.anew else {
+            return self.edited.rows(path, visit);
+        };
+        let (mut index, mut tare) = (0, None);
+        let mut tares = tares.iter().peekable();
+        let mut own = Vec::new();
+        self.edited.rows(path, &mut |rows| {
+            own.clear();
+            own.extend_from_slice(rows);
+            for row in &mut own {
+                while let Some((_, volts)) = tares.next_if(|(after, _)| *after <= index) {
+                    tare = Some(*volts);
+                }
+                index += 1;
+                if let (Some(force), Some(volts)) = (&mut row.force, row.volts) {
+                    *force = curve.newtons_above(Volts(volts), tare).0;
+                }
+            }
+            visit(&own);
+        })
+    }
 }
 
 /// What a new recalibration of a session is: its record, and what it does to the forces.
@@ -242,6 +346,38 @@ mod tests {
                 let apart = row.force.unwrap_or(0.0) - old.force.unwrap_or(0.0);
                 assert!(apart.abs() <= 1e-9, "{name}: {apart}");
             }
+        }
+    }
+
+    #[test]
+    fn samples_that_pass_by_are_those_that_are_opened() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("session");
+        std::fs::create_dir(&path).unwrap();
+        let recorded =
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab");
+        for item in std::fs::read_dir(recorded).unwrap() {
+            let item = item.unwrap();
+            std::fs::copy(item.path(), path.join(item.file_name())).unwrap();
+        }
+        let mut heavier = calibration_of(&Session::open(&path).unwrap()).unwrap();
+        heavier.steps.iter_mut().for_each(|step| step.mass_g *= 1.5);
+        let (opened, inputs, what, _) = recalibration(&path, &heavier).unwrap();
+        let id = opened.edited.session.manifest.session_id.clone();
+        let made = record("heavier", "Ada", "", inputs, what);
+        palpate_sessions::analyses::add_analysis(&path, &id, &made).unwrap();
+        for name in [None, Some("heavier")] {
+            let opened = open(&path, name).unwrap().edited.session;
+            let passing = passing(&path, name).unwrap();
+            assert_eq!(passing.is_changed(), name.is_some());
+            let mut rows = Vec::new();
+            passing
+                .rows(&path, &mut |some| rows.extend_from_slice(some))
+                .unwrap();
+            assert!(rows == opened.rows);
+            let outline = &passing.edited.outline;
+            assert_eq!(outline.notes, opened.notes);
+            assert_eq!(outline.manifest, opened.manifest);
         }
     }
 

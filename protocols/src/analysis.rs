@@ -8,7 +8,7 @@ use palpate_sessions::analyses::AnalysisError;
 use palpate_sessions::edits::EditError;
 use palpate_sessions::import::{ColumnNames, Table, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
-use palpate_sessions::record::{EntryKind, Row};
+use palpate_sessions::record::{Entry, EntryKind, Row};
 use std::path::Path;
 use thiserror::Error;
 
@@ -391,8 +391,12 @@ pub(crate) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
 
 /// What the engine decided, each after so many samples.
 pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
-    session
-        .entries
+    decisions_among(&session.entries)
+}
+
+/// The decisions among a session's entries, each after so many samples.
+pub(crate) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, SourceError> {
+    entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Decision)
         .map(|entry| match serde_json::from_value(entry.body.clone()) {
@@ -462,7 +466,6 @@ fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
 mod tests {
     use super::*;
     use palpate_model::fit::{FitOptions, fit};
-    use palpate_sessions::record::Entry;
 
     fn recorded(name: &str) -> Session {
         let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");

@@ -66,7 +66,12 @@ pub struct Passing {
 
 /// Reads a session through, so that it is known to be whole, and keeps all but its samples.
 pub fn outline(path: &Path) -> Result<Passing, SourceError> {
-    let mut outline = Session::scan(path, &mut |_block| {})?;
+    let outline = Session::scan(path, &mut |_block| {})?;
+    of_outline(path, outline)
+}
+
+/// Makes the edits of a session that was read through.
+pub fn of_outline(path: &Path, mut outline: Outline) -> Result<Passing, SourceError> {
     let edits = Edits::read(path, &outline.manifest.session_id)?;
     let (shifts, notes) = shifts(&mut outline.entries, outline.samples, &edits);
     outline.notes.extend(notes);
@@ -79,6 +84,12 @@ pub fn outline(path: &Path) -> Result<Passing, SourceError> {
 }
 
 impl Passing {
+    /// Whether depths are other than those recorded.
+    #[must_use]
+    pub fn is_changed(&self) -> bool {
+        !self.shifts.is_empty()
+    }
+
     /// Hands out every sample that was there when the session was first read, edits made, in order, some at a time.
     pub fn rows(&self, path: &Path, visit: &mut dyn FnMut(&[Row])) -> Result<(), ReadError> {
         let mut index = 0;

@@ -128,6 +128,8 @@ pub enum Change {
         #[serde(default, skip_serializing_if = "Vec::is_empty")]
         remove: Vec<String>,
     },
+    /// A remark; what it says is the edit's reason.
+    Note,
     /// That somebody looked at it and decided.
     Review {
         /// What.
@@ -172,7 +174,7 @@ pub enum EditError {
         detail: String,
     },
     /// Nobody would know why.
-    #[error("an edit needs a reason; say why in a few words")]
+    #[error("an edit needs a reason, and a note its words; say it in a few words")]
     NoReason,
     /// Not a word that can be searched.
     #[error("'{tag}' cannot be a tag; give one word of at most {TAG_MAX} letters, as in +pilot")]
@@ -251,6 +253,12 @@ impl Edits {
         tags
     }
 
+    /// The remarks, in the order made.
+    pub fn notes(&self) -> impl Iterator<Item = &Edit> {
+        let is_note = |edit: &&Edit| matches!(edit.change, Change::Note);
+        self.all.iter().filter(is_note)
+    }
+
     /// The last review. `now` are the files that were seen as they are now: the analyses and, unless only
     /// those are to be compared, every file of the log.
     #[must_use]
@@ -274,8 +282,9 @@ impl Edits {
         let gone = seen.iter().filter(is_gone);
         let changed = now.iter().filter(is_other).chain(gone);
         let mut changed: Vec<String> = changed.map(|one| one.what.clone()).collect();
-        let is_tags = |edit: &Edit| matches!(edit.change, Change::Tags { .. });
-        if !later.iter().all(is_tags) {
+        // Words by which it is found and remarks change nothing of what was seen.
+        let is_aside = |edit: &Edit| matches!(edit.change, Change::Tags { .. } | Change::Note);
+        if !later.iter().all(is_aside) {
             changed.push(EDITS_FILE.to_owned());
         }
         Some(Review {
@@ -365,6 +374,7 @@ mod tests {
             edit("by eye", contact(1, 41.25)),
             edit("hair on the probe", verdict(Verdict::Rejected)),
             edit("again, with the video", contact(1, 0.1 + 0.2)),
+            edit("the gel was warm", Change::Note),
         ];
         for one in &edits {
             add_edit(at, "id", one).unwrap();
@@ -378,6 +388,8 @@ mod tests {
         );
         assert_eq!(read.contact(1).unwrap().0, Position(0.1 + 0.2));
         assert!(read.contact(2).is_none());
+        let notes: Vec<&str> = read.notes().map(|one| one.reason.as_str()).collect();
+        assert_eq!(notes, ["the gel was warm"]);
         // A segment belongs to the same session; a file of another name to none.
         assert_eq!(Edits::read(&at.join("001.mcap"), "id").unwrap(), read);
         assert_eq!(
@@ -441,6 +453,7 @@ mod tests {
             remove: Vec::new(),
         };
         edits.all.push(edit("", tags));
+        edits.all.push(edit("seen by two", Change::Note));
         assert!(changed(&edits, &seen).is_empty());
         edits.all.push(edit("after", verdict(Verdict::Valid)));
         assert_eq!(changed(&edits, &seen), [EDITS_FILE]);

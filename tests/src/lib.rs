@@ -2,6 +2,7 @@
 
 pub mod flow;
 pub mod lab;
+pub mod many;
 pub mod recorded;
 pub mod searching;
 pub mod simulated;

@@ -2,13 +2,12 @@
 
 use super::output::Output;
 use super::{Failure, compliance, lake, read_failure, source_failure};
+use crate::workers::exports::{self, ExportFailure, Target};
 use clap::{Args, ValueEnum};
 use palpate_model::rig::Phase;
+use palpate_protocols::analysed;
 use palpate_protocols::compliance::columns;
-use palpate_protocols::{analysed, edited};
-use palpate_sessions::export::{
-    Beside, ExportError, Feed, Format, Selection, Table, dictionary_path,
-};
+use palpate_sessions::export::{Beside, ExportError, Format, Selection, Table, dictionary_path};
 use palpate_sessions::log::Session;
 use std::path::PathBuf;
 
@@ -107,6 +106,13 @@ impl ExportArgs {
         }
     }
 
+    fn target(&self) -> Target {
+        match &self.mcap_full {
+            Some(path) => Target::Messages(path.clone()),
+            None => Target::Table(self.format(), self.to.clone()),
+        }
+    }
+
     fn selection(&self) -> Result<Selection, Failure> {
         if let (Some(from), Some(until)) = (self.from, self.until)
             && from > until
@@ -136,50 +142,49 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         ));
     };
     let selection = args.selection()?;
-    let mut told = Told::default();
-    if args.analysis.is_some() || args.compliance.is_some() {
+    let target = args.target();
+    let mut compliance = None;
+    let written = if args.analysis.is_some() || args.compliance.is_some() {
         let opened = analysed::open(session, args.analysis.as_deref());
         let mut opened = opened.map_err(source_failure)?;
         opened.blank();
         let read = opened.edited.session;
         let beside;
-        (told.compliance, beside) = self::beside(args, &read)?;
+        (compliance, beside) = self::beside(args, &read)?;
         let table = Table {
             manifest: &read.manifest,
             notes: &read.notes,
             beside: &beside,
             selection: &selection,
         };
-        let all = read.rows.len() as u64;
-        told.write(args, &table, all, output, &mut |visit| {
+        let mut feed = |visit: &mut dyn FnMut(&[_])| {
             visit(&read.rows);
             Ok(())
-        })?;
+        };
+        let written = target.write(session, &table, &mut feed);
+        written.map_err(failure)?
     } else {
         // What needs no more than a look at each sample does not keep them.
-        let passing = edited::outline(session).map_err(source_failure)?;
-        let table = Table {
-            manifest: &passing.outline.manifest,
-            notes: &passing.outline.notes,
-            beside: &Beside::default(),
-            selection: &selection,
-        };
-        let all = passing.outline.samples;
-        told.write(args, &table, all, output, &mut |visit| {
-            passing.rows(session, visit)
-        })?;
-    }
+        let bar = output.share_bar(0);
+        let written = exports::export(session, &selection, &target, &mut |done, of| {
+            bar.set_length(of);
+            bar.set_position(done);
+        });
+        bar.finish_and_clear();
+        written.map_err(export_failure)?
+    };
+    written.notes.iter().for_each(|note| output.note(note));
     let (format, dictionary) = match args.mcap_full {
         Some(_) => ("mcap", None),
-        None => (args.format().ending(), Some(dictionary_path(&told.path))),
+        None => (args.format().ending(), Some(dictionary_path(&written.path))),
     };
     let object = serde_json::json!({
-        "command": "export", "file": told.path, "rows": told.rows, "format": format,
+        "command": "export", "file": written.path, "rows": written.rows, "format": format,
         "dictionary": dictionary, "is_part": selection.is_part(),
-        "every": selection.every.unwrap_or(1), "compliance": told.compliance,
+        "every": selection.every.unwrap_or(1), "compliance": compliance,
     });
     output.result(&object, || {
-        let corrected = told.compliance.as_ref().map_or(String::new(), |id| {
+        let corrected = compliance.as_ref().map_or(String::new(), |id| {
             format!(", depths corrected with {id} beside the raw ones")
         });
         let every = selection.every.map_or(String::new(), |every| {
@@ -188,71 +193,18 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         let what = args.mcap_full.as_ref().map_or("rows", |_| "messages");
         format!(
             "{} {what} written to {}{every}{corrected}",
-            told.rows,
-            told.path.display()
+            written.rows,
+            written.path.display()
         )
     });
     Ok(())
 }
 
-/// What is told of an export.
-#[derive(Default)]
-struct Told {
-    path: PathBuf,
-    rows: u64,
-    compliance: Option<String>,
-}
-
-impl Told {
-    fn write(
-        &mut self,
-        args: &ExportArgs,
-        table: &Table,
-        samples: u64,
-        output: &Output,
-        feed: Feed,
-    ) -> Result<(), Failure> {
-        table.notes.iter().for_each(|note| output.note(note));
-        let own_name = || {
-            let stem = stem(args, table);
-            let name = table.selection.file_name(&stem, args.format().ending());
-            args.to.join(name)
-        };
-        self.path = args.mcap_full.clone().unwrap_or_else(own_name);
-        let bar = output.share_bar(samples);
-        let mut done = 0u64;
-        let mut feed = |visit: &mut dyn FnMut(&[_])| {
-            feed(&mut |rows| {
-                done += rows.len() as u64;
-                bar.set_position(done);
-                visit(rows);
-            })
-        };
-        let written = match args.mcap_full {
-            Some(_) => table.write_messages(&self.path, &mut feed),
-            None => table.write(args.format(), &self.path, &mut feed),
-        };
-        bar.finish_and_clear();
-        self.rows = written.map_err(failure)?;
-        Ok(())
+pub(super) fn export_failure(err: ExportFailure) -> Failure {
+    match err {
+        ExportFailure::Source(err) => source_failure(err),
+        ExportFailure::Export(err) => failure(err),
     }
-}
-
-/// A file takes the session folder's name.
-fn stem(args: &ExportArgs, table: &Table) -> String {
-    let whole = args
-        .sessions
-        .first()
-        .and_then(|path| path.canonicalize().ok());
-    // A folder's name may have dots in it; the ending of a file's does not count.
-    let stem = whole.as_deref().and_then(|path| match path.is_dir() {
-        true => path.file_name(),
-        false => path.file_stem(),
-    });
-    stem.map_or_else(
-        || table.manifest.session_id.clone(),
-        |name| name.to_string_lossy().into_owned(),
-    )
 }
 
 pub(super) fn failure(err: ExportError) -> Failure {

@@ -4,9 +4,11 @@ use super::Failure;
 use super::catalog::with_updated;
 use super::output::Output;
 use crate::report::catalog as report;
-use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
+use chrono::{DateTime, Utc};
 use clap::{Args, ValueEnum};
-use palpate_sessions::catalog::{Condition, Entry, Order, Query, ReviewIs, VerdictIs};
+use palpate_sessions::catalog::{
+    Condition, Entry, Order, Query, ReviewIs, VerdictIs, beginning, ending,
+};
 use palpate_sessions::library_folder;
 use serde::Serialize;
 use std::num::NonZeroUsize;
@@ -81,6 +83,10 @@ enum Sort {
     Protocol,
     /// Longest first
     Duration,
+    /// By verdict, in alphabetical order
+    Verdict,
+    /// By review, in alphabetical order
+    Review,
 }
 
 impl From<Sort> for Order {
@@ -91,28 +97,10 @@ impl From<Sort> for Order {
             Sort::Operator => Self::Operator,
             Sort::Protocol => Self::Protocol,
             Sort::Duration => Self::Duration,
+            Sort::Verdict => Self::Verdict,
+            Sort::Review => Self::Review,
         }
     }
-}
-
-/// A day, or a time.
-fn moment(text: &str) -> Result<(DateTime<Utc>, bool), String> {
-    let day = text.parse::<NaiveDate>();
-    let day = day.map(|day| (day.and_time(NaiveTime::MIN).and_utc(), true));
-    let time = DateTime::parse_from_rfc3339(text).map(|time| (time.to_utc(), false));
-    day.or(time)
-        .map_err(|_| "write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z".to_owned())
-}
-
-fn beginning(text: &str) -> Result<DateTime<Utc>, String> {
-    moment(text).map(|(at, _)| at)
-}
-
-/// The first moment that does not count any more.
-fn ending(text: &str) -> Result<DateTime<Utc>, String> {
-    let (at, is_day) = moment(text)?;
-    let next = at.checked_add_days(Days::new(u64::from(is_day)));
-    next.ok_or_else(|| "no day can be that late".to_owned())
 }
 
 #[derive(Serialize)]
@@ -167,23 +155,4 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     };
     output.result(&object, || report::list(&found, page, object.pages));
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn the_last_day_counts_whole_and_a_time_to_the_second() {
-        let text = |at: Result<DateTime<Utc>, String>| at.map(|at| at.to_rfc3339());
-        let day = |text: &str| Ok(format!("{text}T00:00:00+00:00"));
-        assert_eq!(text(beginning("2026-03-05")), day("2026-03-05"));
-        assert_eq!(text(ending("2026-02-28")), day("2026-03-01"));
-        let time = "2026-03-05T14:15:00+01:00";
-        assert_eq!(text(ending(time)), Ok("2026-03-05T13:15:00+00:00".into()));
-        for none in ["yesterday", "2026-02-30", "", "5.3.2026"] {
-            assert!(beginning(none).is_err(), "{none}");
-        }
-        assert!(ending("+262142-12-31").is_err());
-    }
 }

@@ -2,17 +2,16 @@
 
 use super::Failure;
 use super::output::Output;
-use crate::report::imported;
+use crate::workers::imports::{FileReport, ImportFailure, Request, import, text};
 use clap::Args;
-use palpate_protocols::runner::wall_now;
+use palpate_sessions::Labels;
 use palpate_sessions::import::{
-    ColumnChoice, Decimal, Delimiter, Fault, Foreign, ForeignError, ForeignPart, Format, KeepError,
-    Kept, TextEncoding, Told, UnitChoice, ZeroChoice, folder_name, keep, open_foreign,
+    ColumnChoice, Decimal, Delimiter, Fault, ForeignError, Format, KeepError, TextEncoding, Told,
+    UnitChoice, ZeroChoice,
 };
-use palpate_sessions::{Imported, Labels, library_folder, new_session_folder, new_session_id};
 use serde::Serialize;
-use std::collections::BTreeSet;
-use std::path::{Path, PathBuf};
+use std::ops::ControlFlow;
+use std::path::PathBuf;
 
 /// Arguments of `palpate import`.
 #[derive(Debug, Args)]
@@ -112,53 +111,28 @@ struct Report {
     files: Vec<FileReport>,
 }
 
-#[derive(Serialize)]
-struct FileReport {
-    file: PathBuf,
-    parts: Vec<PartReport>,
-    left_out: Vec<String>,
-}
-
-#[derive(Serialize)]
-struct PartReport {
-    session: Option<PathBuf>,
-    samples: usize,
-    duration_s: f64,
-    #[serde(flatten)]
-    imported: Imported,
-}
-
 pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
-    let told = args.how.told();
-    let labels = labels(args)?;
-    let read = |path: &PathBuf| open_foreign(path, &told).map_err(foreign_failure);
-    let mut report = Report {
+    let request = Request {
+        files: args.files.clone(),
+        told: args.how.told(),
+        labels: labels(args)?,
+        into: args.into.clone(),
+        library: None,
+        is_dry_run: args.dry_run,
+    };
+    let bar = output.count_bar(0);
+    let files = import(&request, &mut |done, of, path| {
+        bar.set_length(of as u64);
+        bar.set_position(done as u64);
+        bar.set_message(path.display().to_string());
+        ControlFlow::Continue(())
+    });
+    bar.finish_and_clear();
+    let report = Report {
         command: "import",
         is_dry_run: args.dry_run,
-        files: Vec::new(),
+        files: files.map_err(import_failure)?,
     };
-    // Every file is read before the first session is made: a refusal leaves nothing behind.
-    let bar = output.count_bar(args.files.len() as u64 * if args.dry_run { 1 } else { 2 });
-    let mut taken = BTreeSet::new();
-    for path in &args.files {
-        bar.set_message(path.display().to_string());
-        let foreign = read(path)?;
-        check_folders(args.into.as_deref(), &foreign, &mut taken)?;
-        report.files.push(told_of(path, foreign));
-        bar.inc(1);
-    }
-    if !args.dry_run {
-        for (path, file) in args.files.iter().zip(&mut report.files) {
-            bar.set_message(path.display().to_string());
-            let foreign = read(path)?;
-            for (part, told) in foreign.parts.iter().zip(&mut file.parts) {
-                let session = make(part, &foreign.bytes, args.into.as_deref(), &labels)?;
-                told.session = Some(session);
-            }
-            bar.inc(1);
-        }
-    }
-    bar.finish_and_clear();
     output.result(&report, || {
         let files = report.files.iter().map(text);
         files.collect::<Vec<_>>().join("\n\n")
@@ -177,88 +151,11 @@ fn labels(args: &ImportArgs) -> Result<Labels, Failure> {
     Ok(labels)
 }
 
-fn foreign_failure(err: ForeignError) -> Failure {
+fn import_failure(err: ImportFailure) -> Failure {
     match err {
-        ForeignError::Io { .. } => Failure::failed(err),
+        ImportFailure::Foreign(ForeignError::Io { .. }) => Failure::failed(err),
+        ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
+        ImportFailure::Keep(_) => Failure::failed(err),
         _ => Failure::usage(err),
     }
-}
-
-/// Refuses folders that are there already or would be made twice.
-fn check_folders(
-    into: Option<&Path>,
-    foreign: &Foreign,
-    taken: &mut BTreeSet<PathBuf>,
-) -> Result<(), Failure> {
-    let Some(into) = into else { return Ok(()) };
-    for part in &foreign.parts {
-        let folder = into.join(folder_name(&part.imported));
-        if folder.exists() || !taken.insert(folder.clone()) {
-            return Err(Failure::usage(format!(
-                "{} is there already or would be made twice; choose another folder with --into",
-                folder.display()
-            )));
-        }
-    }
-    Ok(())
-}
-
-fn make(
-    part: &ForeignPart,
-    original: &[u8],
-    into: Option<&Path>,
-    labels: &Labels,
-) -> Result<PathBuf, Failure> {
-    let at = wall_now().into();
-    let session_id = new_session_id(at);
-    let folder = match into {
-        Some(into) => into.join(folder_name(&part.imported)),
-        None => new_session_folder(&library_folder().map_err(Failure::usage)?, &session_id),
-    };
-    let kept = Kept {
-        folder: &folder,
-        original,
-        session_id,
-        at,
-        software_version: env!("CARGO_PKG_VERSION"),
-        labels: labels.clone(),
-    };
-    keep(part, kept).map_err(|err| match err {
-        KeepError::Times { .. } => Failure::usage(err),
-        _ => Failure::failed(err),
-    })?;
-    Ok(folder)
-}
-
-fn told_of(path: &Path, foreign: Foreign) -> FileReport {
-    let parts = foreign.parts.into_iter().map(|part| {
-        let ends = [part.samples.first(), part.samples.last()];
-        let [first, last] = ends.map(|one| one.map_or(0.0, |one| one.t));
-        PartReport {
-            session: None,
-            samples: part.samples.len(),
-            duration_s: last - first,
-            imported: part.imported,
-        }
-    });
-    FileReport {
-        file: path.into(),
-        parts: parts.collect(),
-        left_out: foreign.left_out,
-    }
-}
-
-fn text(file: &FileReport) -> String {
-    let mut lines = vec![file.file.display().to_string()];
-    for part in &file.parts {
-        let rows = format!("{} over {:.3} s", part.samples, part.duration_s);
-        lines.extend(imported::lines(&part.imported, &rows));
-        lines.push(match &part.session {
-            Some(session) => format!("  session       {}", session.display()),
-            None => "  session       none made: a dry run".into(),
-        });
-    }
-    let left_out = file.left_out.iter();
-    lines.extend(left_out.map(|reason| format!("  left out      {reason}")));
-    lines.join("\n")
 }

@@ -1,11 +1,10 @@
 //! `palpate export --lake`: sessions into a lake.
 
-use super::export::failure;
+use super::Failure;
+use super::export::export_failure;
 use super::fit::sources;
 use super::output::Output;
-use super::{Failure, source_failure};
-use palpate_protocols::edited;
-use palpate_sessions::lake::{Added, Told, add};
+use crate::workers::exports::into_lake;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(), Failure> {
@@ -13,7 +12,7 @@ pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(),
     let bar = output.count_bar(found.len() as u64);
     let (mut was_there, mut failed) = (0, Vec::new());
     for session in &found {
-        match one(lake, session) {
+        match into_lake(lake, session).map_err(export_failure) {
             Ok(added) => was_there += usize::from(added.was_there),
             Err(failure) => {
                 let sentence = format!("{}: {}", session.display(), failure.sentence());
@@ -42,14 +41,4 @@ pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(),
             found.len()
         ))),
     }
-}
-
-fn one(lake: &Path, session: &Path) -> Result<Added, Failure> {
-    let passing = edited::outline(session).map_err(source_failure)?;
-    let verdict = passing.edits.verdict();
-    let told = Told {
-        verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())),
-    };
-    let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
-    add(lake, &passing.outline, told, &mut feed).map_err(failure)
 }

@@ -108,6 +108,8 @@ enum Command {
     CorrectContact(verdict::CorrectArgs),
     /// Give sessions tags to find them by, or take them away
     Tag(review::TagArgs),
+    /// Remark on sessions, beside their logs
+    Note(review::NoteArgs),
     /// Say that you looked at a session and what you decided, with hashes of what was seen
     Review(review::ReviewArgs),
     /// Make the forces of sessions anew from the raw signal with another calibration, as an analysis beside them
@@ -236,6 +238,7 @@ pub fn main() -> ExitCode {
         Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
         Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
         Some(Command::Tag(args)) => with(args.is_json(), |out| review::tag(&args, out)),
+        Some(Command::Note(args)) => with(args.json, |out| review::note(&args, out)),
         Some(Command::Review(args)) => with(args.json, |out| review::review(&args, out)),
         Some(Command::Recalibrate(args)) => {
             with(args.json, |out| analysis::recalibrate(&args, out))

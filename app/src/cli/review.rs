@@ -1,15 +1,14 @@
-//! `palpate tag` and `palpate review`: words by which a session is found, and that somebody looked at it.
+//! `palpate tag`, `palpate note` and `palpate review`: words by which a session is found, remarks, and that somebody
+//! looked at it.
 
 use super::Failure;
 use super::output::Output;
-use super::verdict::{Why, author};
+use super::verdict::Why;
+use crate::workers::edits::{SayFailure, Subject, author};
 use clap::Args;
-use palpate_protocols::runner::wall_now;
-use palpate_sessions::analyses::{Analyses, inputs_of};
-use palpate_sessions::edits::{Change, Decision, Edit, EditError, Edits, add_edit};
-use palpate_sessions::log::Summary;
+use palpate_sessions::edits::{Change, Decision, EditError, Edits};
 use serde::Serialize;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 /// Arguments of `palpate tag`.
 #[derive(Debug, Args)]
@@ -37,6 +36,23 @@ impl TagArgs {
     pub fn is_json(&self) -> bool {
         self.json || self.words.iter().any(|word| word == JSON)
     }
+}
+
+/// Arguments of `palpate note`.
+#[derive(Debug, Args)]
+pub struct NoteArgs {
+    /// Session folders
+    #[arg(required = true, value_name = "SESSION")]
+    sessions: Vec<PathBuf>,
+    /// What there is to say
+    #[arg(long, value_name = "TEXT")]
+    text: String,
+    /// Who says so; without it the login name
+    #[arg(long, value_name = "NAME")]
+    by: Option<String>,
+    /// Print one JSON object
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// Arguments of `palpate review`.
@@ -85,8 +101,12 @@ pub(super) fn edit_failure(err: EditError) -> Failure {
     }
 }
 
-fn summary(session: &Path) -> Result<Summary, Failure> {
-    Summary::read(session).map_err(super::read_failure)
+fn say_failure(err: SayFailure) -> Failure {
+    match err {
+        SayFailure::Read(err) => super::read_failure(err),
+        SayFailure::Analyses(err) => super::source_failure(err.into()),
+        SayFailure::Edit(err) => edit_failure(err),
+    }
 }
 
 #[derive(Serialize)]
@@ -114,38 +134,25 @@ pub(super) fn tag(args: &TagArgs, output: &Output) -> Result<(), Failure> {
             "name sessions and tags, as in 'palpate tag demo +good -doubtful'",
         ));
     }
-    // All are looked at before any is changed.
-    let found: Vec<Summary> = sessions
-        .iter()
-        .map(|path| summary(path))
-        .collect::<Result<_, Failure>>()?;
     let by = author(args.by.as_deref());
     let mut tagged = Vec::new();
-    for (session, found) in sessions.into_iter().zip(found) {
-        let id = &found.manifest.session_id;
-        let before = Edits::read(&session, id).map_err(edit_failure)?;
-        let tags = before.tags();
+    for subject in subjects(&sessions)? {
+        let tags = subject.edits.tags();
         let (remove, absent): (Vec<_>, Vec<_>) = remove
             .iter()
             .cloned()
             .partition(|tag| add.contains(tag) || tags.contains(tag.as_str()));
+        let session = subject.folder.clone();
         for tag in absent {
             let name = session.display();
             output.note(&format!("{name} has no tag '{tag}' to take away"));
         }
         if !add.is_empty() || !remove.is_empty() {
-            let edit = Edit {
-                at: wall_now().into(),
-                by: by.clone(),
-                reason: String::new(),
-                change: Change::Tags {
-                    add: add.clone(),
-                    remove,
-                },
-            };
-            add_edit(&session, id, &edit).map_err(edit_failure)?;
+            let add = add.clone();
+            let said = subject.say(&by, "", Change::Tags { add, remove });
+            said.map_err(say_failure)?;
         }
-        let edits = Edits::read(&session, id).map_err(edit_failure)?;
+        let edits = Edits::read(&session, &subject.id).map_err(edit_failure)?;
         let tags = edits.tags().into_iter().map(str::to_owned).collect();
         tagged.push(Tagged { session, tags });
     }
@@ -160,21 +167,42 @@ pub(super) fn tag(args: &TagArgs, output: &Output) -> Result<(), Failure> {
     Ok(())
 }
 
+/// All are looked at before any is changed.
+fn subjects(sessions: &[PathBuf]) -> Result<Vec<Subject>, Failure> {
+    let read = |path: &PathBuf| Subject::read(path).map_err(say_failure);
+    sessions.iter().map(read).collect()
+}
+
+pub(super) fn note(args: &NoteArgs, output: &Output) -> Result<(), Failure> {
+    let by = author(args.by.as_deref());
+    for subject in subjects(&args.sessions)? {
+        let said = subject.say(&by, &args.text, Change::Note);
+        said.map_err(say_failure)?;
+    }
+    let text = args.text.trim();
+    let object = serde_json::json!({
+        "command": "note", "by": by, "note": text, "sessions": args.sessions,
+    });
+    output.result(&object, || {
+        let line = |session: &PathBuf| format!("{}: noted by {by}: {text}", session.display());
+        args.sessions
+            .iter()
+            .map(line)
+            .collect::<Vec<_>>()
+            .join("\n")
+    });
+    Ok(())
+}
+
 pub(super) fn review(args: &ReviewArgs, output: &Output) -> Result<(), Failure> {
-    let found = summary(&args.session)?;
-    let id = &found.manifest.session_id;
-    let failed = |err| super::source_failure(palpate_protocols::analysis::SourceError::from(err));
-    let mut seen = inputs_of(&args.session).map_err(failed)?;
-    // What was said before is told by the order of the edits; the review itself is among them.
-    seen.retain(|one| one.what != palpate_sessions::EDITS_FILE);
-    seen.extend(Analyses::read(&args.session, id).map_err(failed)?.input());
+    let subject = Subject::read(&args.session).map_err(say_failure)?;
     let decision = args.decision.decision();
-    let change = Change::Review {
-        decision,
-        seen: seen.clone(),
+    let change = subject.review(decision).map_err(say_failure)?;
+    let (by, reason) = args.why.words();
+    let edit = subject.say(&by, reason, change).map_err(say_failure)?;
+    let Change::Review { seen, .. } = &edit.change else {
+        return Ok(());
     };
-    let edit = args.why.edit(change);
-    add_edit(&args.session, id, &edit).map_err(edit_failure)?;
     let object = serde_json::json!({
         "command": "review", "session": args.session, "decision": decision, "by": edit.by,
         "reason": edit.reason, "seen": seen,

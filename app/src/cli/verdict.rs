@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use crate::report::catalog::one_line;
-use crate::workers::analyses::login;
+pub(super) use crate::workers::edits::author;
 use clap::Args;
 use palpate_model::units::Position;
 use palpate_protocols::edited::{self, Edited};
@@ -55,6 +55,11 @@ pub(super) struct Why {
 }
 
 impl Why {
+    /// Who, and why.
+    pub(super) fn words(&self) -> (String, &str) {
+        (author(self.by.as_deref()), &self.reason)
+    }
+
     pub(super) fn edit(&self, change: Change) -> Edit {
         Edit {
             at: wall_now().into(),
@@ -63,11 +68,6 @@ impl Why {
             change,
         }
     }
-}
-
-/// The name given, or that of the login.
-pub(super) fn author(given: Option<&str>) -> String {
-    given.map_or_else(login, str::to_owned)
 }
 
 fn add(folder: &Path, edited: &Edited, edit: &Edit) -> Result<(), Failure> {

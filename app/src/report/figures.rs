@@ -2,10 +2,11 @@
 
 use super::picture::{LEFT, RIGHT, WIDTH, look, title};
 use super::svg::{Anchor, Drawing, Ink, Panel, Svg};
-use super::thin::{steps, thin};
-use crate::theme::tokens::{LIGHT, PAPER_SERIES};
+use super::thin::thin;
+use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
 use palpate_model::rig::Phase;
+use palpate_model::signal::polyline::Reducer;
 use palpate_model::units::Newtons;
 use palpate_sessions::contacts::contacts;
 use palpate_sessions::log::Session;
@@ -215,11 +216,14 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
     let (x, y) = (ends(0), ends(1));
     let scale = |[low, high]: [f64; 2], px: f64| px / (high - low).max(1e-9);
     let (across, up) = (scale(x, RIGHT - LEFT), scale(y, BOTTOM - TOP));
-    let lines = steps(points().map(|[depth, force]| [depth * across, force * up]));
+    let mut reducer = Reducer::new(RIGHT - LEFT, BOTTOM - TOP);
+    for [depth, force] in points() {
+        reducer.push((depth - x[0]) * across, (force - y[0]) * up);
+    }
+    let (lines, _) = reducer.finish();
     let back = |line: Vec<[f64; 2]>| {
-        line.into_iter()
-            .map(|[x, y]| [x / across, y / up])
-            .collect()
+        let place = |[right, high]: [f64; 2]| [x[0] + right / across, y[0] + high / up];
+        line.into_iter().map(place).collect()
     };
     lines.into_iter().map(back).collect()
 }
@@ -325,9 +329,9 @@ fn depth_panel(all: &[&Traces]) -> Panel {
 
 /// Ink and dashes of one of several.
 fn look_of(index: usize) -> (Color32, f64) {
-    let round = index / PAPER_SERIES.len();
+    let round = index / LIGHT.sessions.len();
     (
-        PAPER_SERIES[index % PAPER_SERIES.len()],
+        LIGHT.sessions[index % LIGHT.sessions.len()],
         DASHES[round % DASHES.len()],
     )
 }
@@ -490,8 +494,8 @@ mod tests {
             own.map(|line| line.split('"').nth(1).unwrap().to_owned())
                 .collect::<Vec<_>>()
         };
-        assert!(!points(PAPER_SERIES[0]).is_empty());
-        assert_eq!(points(PAPER_SERIES[0]), points(PAPER_SERIES[1]));
+        assert!(!points(LIGHT.sessions[0]).is_empty());
+        assert_eq!(points(LIGHT.sessions[0]), points(LIGHT.sessions[1]));
         let (_, lost) = overlays(&[&one, &later], Align::Contact);
         assert_eq!(lost, ["later"]);
     }

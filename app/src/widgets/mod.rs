@@ -1,6 +1,9 @@
 //! Small controls used in more than one place.
 
+pub mod choice_box;
+pub mod choice_table;
 pub mod fact_row;
+pub mod mark;
 pub mod quantity_input;
 pub mod reason_button;
 pub mod state_badge;

@@ -5,9 +5,9 @@ use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, Ui, UiBuilder, Ve
 use eframe::egui::{Rect, Sense};
 
 /// Height of a row in points.
-const ROW: f32 = 22.0;
+pub(super) const ROW: f32 = 22.0;
 /// Space between columns in points.
-const GAP: f32 = 10.0;
+pub(super) const GAP: f32 = 10.0;
 
 /// One column.
 #[derive(Clone, Debug)]
@@ -77,7 +77,8 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
         .show(ui, |ui| {
             ui.set_min_width(width);
             ui.spacing_mut().item_spacing = Vec2::ZERO;
-            row_ui(ui, columns, width, |ui, _, column| {
+            let columns: Vec<&Column> = columns.iter().collect();
+            row_ui(ui, &columns, width, |ui, _, column| {
                 let text = RichText::new(&column.head).color(tokens.text_quiet).small();
                 ui.add(Label::new(text).truncate());
             });
@@ -92,7 +93,7 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
                             RowLook::Quiet => tokens.text_quiet,
                             RowLook::Alarm => tokens.alarm_text,
                         };
-                        let rect = row_ui(ui, columns, width, |ui, index, _| {
+                        let rect = row_ui(ui, &columns, width, |ui, index, _| {
                             let Some(cell) = row.cells.get(index) else {
                                 return;
                             };
@@ -116,9 +117,9 @@ pub fn table_ui(ui: &mut Ui, name: &str, columns: &[Column], rows: &[Row]) {
 }
 
 /// One line of cells; returns where it stands.
-fn row_ui(
+pub(super) fn row_ui(
     ui: &mut Ui,
-    columns: &[Column],
+    columns: &[&Column],
     width: f32,
     mut cell_ui: impl FnMut(&mut Ui, usize, &Column),
 ) -> Rect {

@@ -3,7 +3,7 @@
 use super::reason_button::reason_button;
 use super::uncertain::clock;
 use crate::theme::Tokens;
-use crate::workers::task::Task;
+use crate::workers::task::{Standing, Task};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 
 /// What was pressed.
@@ -26,6 +26,29 @@ pub fn task_ui<T: Send + 'static>(
         let is_pressed = reason_button(ui, start, vec2(170.0, 34.0), verdict);
         return is_pressed.then_some(Pressed::Start);
     };
+    bar_ui(ui, &standing);
+    let mut pressed = None;
+    if task.is_ending() {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.label(RichText::new("ending").color(tokens.text_quiet));
+    } else if cancel_ui(ui, "Cancel") {
+        pressed = Some(Pressed::Cancel);
+    }
+    pressed
+}
+
+/// Draws the progress of work that began by itself, and a button that ends it; true when that is pressed.
+pub fn standing_ui(ui: &mut Ui, standing: &Standing, cancel: &str) -> bool {
+    bar_ui(ui, standing);
+    cancel_ui(ui, cancel)
+}
+
+fn cancel_ui(ui: &mut Ui, text: &str) -> bool {
+    ui.add(Button::new(text).min_size(vec2(84.0, 26.0)))
+        .clicked()
+}
+
+fn bar_ui(ui: &mut Ui, standing: &Standing) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.add(
         ProgressBar::new(standing.fraction as f32)
@@ -38,14 +61,4 @@ pub fn task_ui<T: Send + 'static>(
         |left| format!("{} left", clock(left)),
     );
     ui.add(Label::new(RichText::new(format!("{left}: {}", standing.what)).small()).truncate());
-    let mut pressed = None;
-    if task.is_ending() {
-        ui.label(RichText::new("ending").color(tokens.text_quiet));
-    } else if ui
-        .add(Button::new("Cancel").min_size(vec2(84.0, 26.0)))
-        .clicked()
-    {
-        pressed = Some(Pressed::Cancel);
-    }
-    pressed
 }

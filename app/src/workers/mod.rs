@@ -2,13 +2,19 @@
 
 pub mod analyses;
 pub mod calibrations;
+pub mod edits;
+pub mod exports;
 pub mod extremes;
+pub mod find;
 pub mod fit;
+pub mod imports;
+pub mod latest;
 pub mod path_dialog;
 pub mod player;
 pub mod pool;
 pub mod ports;
 pub mod recovery;
+pub mod review;
 pub mod select;
 pub mod task;
 

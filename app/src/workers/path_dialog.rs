@@ -57,6 +57,56 @@ impl PathDialog {
     }
 }
 
+/// The dialog for a folder, which may be open.
+#[derive(Debug, Default)]
+pub struct FolderDialog(Job<Option<PathBuf>>);
+
+impl FolderDialog {
+    /// Whether the dialog is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.0.is_busy()
+    }
+
+    /// Opens the dialog with this head, unless it is open.
+    pub fn open(&mut self, title: &'static str, ctx: &Context) -> std::io::Result<()> {
+        let ctx = ctx.clone();
+        let pick = move || rfd::FileDialog::new().set_title(title).pick_folder();
+        self.0
+            .start("folder-dialog", pick, move || ctx.request_repaint())
+    }
+
+    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
+    pub fn poll(&mut self) -> Option<PathBuf> {
+        self.0.poll().flatten()
+    }
+}
+
+/// The dialog for files to read, which may be open.
+#[derive(Debug, Default)]
+pub struct FilesDialog(Job<Option<Vec<PathBuf>>>);
+
+impl FilesDialog {
+    /// Whether the dialog is open.
+    #[must_use]
+    pub fn is_open(&self) -> bool {
+        self.0.is_busy()
+    }
+
+    /// Opens the dialog with this head, unless it is open.
+    pub fn open(&mut self, title: &'static str, ctx: &Context) -> std::io::Result<()> {
+        let ctx = ctx.clone();
+        let pick = move || rfd::FileDialog::new().set_title(title).pick_files();
+        self.0
+            .start("files-dialog", pick, move || ctx.request_repaint())
+    }
+
+    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
+    pub fn poll(&mut self) -> Option<Vec<PathBuf>> {
+        self.0.poll().flatten()
+    }
+}
+
 /// What a file is written as.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct SaveAs {

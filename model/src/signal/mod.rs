@@ -1,9 +1,12 @@
-//! Signals: filters, the contact position, work, bounded histories for plots.
+//! Signals: filters, the contact position, work, bounded histories and thinning for plots.
 
 mod contact;
 mod filter;
+pub mod polyline;
+pub mod pyramid;
 mod touch;
 mod trace;
+pub mod track;
 mod work;
 
 pub use contact::{ContactError, ContactEstimate, ContactPoint, fit_contact};

@@ -28,6 +28,11 @@ const SIGNS: [(&str, Relation); 6] = [
     ("=", Relation::Equal),
 ];
 
+/// Whether a letter begins or ends a sign of comparison.
+pub(super) fn is_sign(letter: char) -> bool {
+    matches!(letter, '<' | '>' | '=')
+}
+
 impl Relation {
     fn sign(self) -> &'static str {
         let found = SIGNS.iter().find(|(_, relation)| *relation == self);

@@ -1,6 +1,7 @@
 //! What is known of a specimen, a rig or a load cell over time: its sessions with all that was said of them,
 //! the rig's daily checks and compliances, and the calibrations of rig and cell.
 
+use super::entry::Made;
 use super::search::{Order, Query};
 use super::{Catalog, CatalogError};
 use crate::checks::read_checks;
@@ -28,8 +29,8 @@ pub enum Subject {
 pub struct Event {
     /// When, UTC, RFC 3339 to the millisecond; empty where nobody knows.
     pub at: String,
-    /// `session`, `verdict`, `contact`, `tags`, `review`, `fit`, `recalibration`, `mask`, `calibration`,
-    /// `compliance` or `check`.
+    /// `session`, `verdict`, `contact`, `tags`, `note`, `review`, `fit`, `recalibration`, `mask`,
+    /// `calibration`, `compliance` or `check`.
     pub what: String,
     /// Folder of the session below the library; empty for what is of no session.
     pub folder: String,
@@ -72,16 +73,17 @@ impl Catalog {
                 sentence: format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s),
             });
             match Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
-                Ok(edits) => events.extend(edits.all.iter().map(|one| said(&entry.folder, one))),
+                Ok(edits) => {
+                    events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)))
+                }
                 Err(err) => remarks.push(err.to_string()),
             }
-            events.extend(entry.analyses.iter().map(|one| Event {
-                at: stamp(one.at),
-                what: one.what.clone(),
-                folder: entry.folder.clone(),
-                by: one.by.clone(),
-                sentence: one.name.clone(),
-            }));
+            events.extend(
+                entry
+                    .analyses
+                    .iter()
+                    .map(|one| Event::made(&entry.folder, one)),
+            );
         }
         let calibrations = Shelf::<Calibration>::open(&self.library);
         documents(&calibrations, &mut events, &mut remarks, |one| {
@@ -142,30 +144,49 @@ fn documents<D: Document>(
     }
 }
 
-/// An edit as an event.
-fn said(folder: &str, edit: &Edit) -> Event {
-    let (what, words) = match &edit.change {
-        Change::Verdict { verdict } => ("verdict", verdict.to_string()),
-        Change::Contact { position_mm, .. } => ("contact", format!("at {:.3} mm", position_mm.0)),
-        Change::Tags { add, remove } => {
-            let signs = |sign: &str, tags: &[String]| -> Vec<String> {
-                tags.iter().map(|tag| format!("{sign}{tag}")).collect()
-            };
-            (
-                "tags",
-                [signs("+", add), signs("-", remove)].concat().join(" "),
-            )
+impl Event {
+    /// An edit of the session in this folder as an event.
+    #[must_use]
+    pub fn said(folder: &str, edit: &Edit) -> Self {
+        let (what, words) = match &edit.change {
+            Change::Verdict { verdict } => ("verdict", verdict.to_string()),
+            Change::Contact { position_mm, .. } => {
+                ("contact", format!("at {:.3} mm", position_mm.0))
+            }
+            Change::Tags { add, remove } => {
+                let signs = |sign: &str, tags: &[String]| -> Vec<String> {
+                    tags.iter().map(|tag| format!("{sign}{tag}")).collect()
+                };
+                (
+                    "tags",
+                    [signs("+", add), signs("-", remove)].concat().join(" "),
+                )
+            }
+            Change::Review { decision, .. } => ("review", decision.word().to_owned()),
+            Change::Note => ("note", String::new()),
+        };
+        Self {
+            at: stamp(edit.at),
+            what: what.into(),
+            folder: folder.to_owned(),
+            by: edit.by.clone(),
+            sentence: match (words.as_str(), edit.reason.as_str()) {
+                (_, "") => words,
+                ("", reason) => reason.to_owned(),
+                (_, reason) => format!("{words}: {reason}"),
+            },
         }
-        Change::Review { decision, .. } => ("review", decision.word().to_owned()),
-    };
-    Event {
-        at: stamp(edit.at),
-        what: what.into(),
-        folder: folder.to_owned(),
-        by: edit.by.clone(),
-        sentence: match edit.reason.as_str() {
-            "" => words,
-            reason => format!("{words}: {reason}"),
-        },
+    }
+
+    /// An analysis of the session in this folder as an event.
+    #[must_use]
+    pub fn made(folder: &str, one: &Made) -> Self {
+        Self {
+            at: stamp(one.at),
+            what: one.what.clone(),
+            folder: folder.to_owned(),
+            by: one.by.clone(),
+            sentence: one.name.clone(),
+        }
     }
 }

@@ -12,13 +12,15 @@ mod entry;
 mod history;
 mod schema;
 mod search;
+mod typed;
 mod update;
 mod walk;
 
 pub use condition::{Condition, ConditionError};
 pub use entry::{Entry, Made, Named, Origin, Source};
 pub use history::{Event, Subject};
-pub use search::{Found, Order, Query, ReviewIs, VerdictIs};
+pub use search::{Choices, Found, Order, Query, ReviewIs, VerdictIs};
+pub use typed::{DayError, beginning, ending, words_and_conditions};
 pub use update::{Changes, Doubt};
 
 use rusqlite::{Connection, ErrorCode};
@@ -179,6 +181,12 @@ impl Catalog {
             library: library.to_owned(),
             remarks,
         })
+    }
+
+    /// Whether it is in memory, for want of a library that may be written: then it starts empty whenever it is opened.
+    #[must_use]
+    pub fn is_in_memory(&self) -> bool {
+        self.db.path().is_none_or(str::is_empty)
     }
 
     /// The catalog's file.

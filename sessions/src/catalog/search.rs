@@ -6,8 +6,8 @@ use super::update::entry_of;
 use super::{Catalog, CatalogError};
 use crate::edits::{Decision, Review, Verdict};
 use chrono::{DateTime, Utc};
-use rusqlite::params_from_iter;
 use rusqlite::types::Value as Sql;
+use rusqlite::{OptionalExtension, params_from_iter};
 use std::str::FromStr;
 
 /// Which sessions are looked for: those that meet all of it.
@@ -138,6 +138,10 @@ pub enum Order {
     Protocol,
     /// The duration, longest first.
     Duration,
+    /// The verdict, as a word.
+    Verdict,
+    /// The review, as a word.
+    Review,
 }
 
 impl Order {
@@ -153,6 +157,10 @@ impl Order {
             (Self::Protocol, true) => "protocol DESC, folder DESC",
             (Self::Duration, false) => "duration_s DESC, folder",
             (Self::Duration, true) => "duration_s, folder DESC",
+            (Self::Verdict, false) => "verdict, folder",
+            (Self::Verdict, true) => "verdict DESC, folder DESC",
+            (Self::Review, false) => "review, folder",
+            (Self::Review, true) => "review DESC, folder DESC",
         }
     }
 }
@@ -164,6 +172,19 @@ pub struct Found {
     pub count: usize,
     /// Those of the page that was asked for.
     pub entries: Vec<Entry>,
+}
+
+/// Names that sessions can be chosen by.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Choices {
+    /// What was indented.
+    pub specimens: Vec<String>,
+    /// Who measured.
+    pub operators: Vec<String>,
+    /// Protocols by name.
+    pub protocols: Vec<String>,
+    /// Tags that some session has.
+    pub tags: Vec<String>,
 }
 
 /// The words of a text. Anything but letters and digits parts them, so nothing in it is a sign to SQLite.
@@ -248,6 +269,58 @@ impl Catalog {
             })
         };
         find().map_err(self.failed())
+    }
+
+    /// The folders of all sessions that meet the query, in its order: what a list needs before any of it is in sight.
+    /// Pages do not count.
+    pub fn folders(&self, query: &Query) -> Result<Vec<String>, CatalogError> {
+        let find = || -> rusqlite::Result<Vec<String>> {
+            let (meets, values) = query.sql();
+            let order = query.order.sql(query.is_reversed);
+            let sql = format!("SELECT folder FROM session WHERE {meets} ORDER BY {order}");
+            let mut statement = self.db.prepare_cached(&sql)?;
+            let folders = statement.query_map(params_from_iter(&values), |row| row.get(0))?;
+            folders.collect()
+        };
+        find().map_err(self.failed())
+    }
+
+    /// What is known of the sessions in these folders; of one that the catalog does not know, nothing.
+    pub fn entries(&self, folders: &[String]) -> Result<Vec<Entry>, CatalogError> {
+        let read = || -> rusqlite::Result<Vec<Entry>> {
+            let state = self.db.unchecked_transaction()?;
+            let sql = "SELECT entry, checksum FROM session WHERE folder = ?";
+            let mut statement = state.prepare_cached(sql)?;
+            let mut entries = Vec::with_capacity(folders.len());
+            for folder in folders {
+                entries.extend(statement.query_row([folder], entry_of).optional()?);
+            }
+            Ok(entries)
+        };
+        read().map_err(self.failed())
+    }
+
+    /// The names that sessions can be chosen by, each in alphabetical order.
+    pub fn choices(&self) -> Result<Choices, CatalogError> {
+        let names = |sql: &str| -> rusqlite::Result<Vec<String>> {
+            let mut statement = self.db.prepare_cached(sql)?;
+            let names = statement.query_map([], |row| row.get(0))?;
+            names.collect()
+        };
+        let of = |column: &str| {
+            names(&format!(
+                "SELECT DISTINCT {column} FROM session WHERE {column} <> '' ORDER BY {column}"
+            ))
+        };
+        let all = || -> rusqlite::Result<Choices> {
+            Ok(Choices {
+                specimens: of("specimen")?,
+                operators: of("operator")?,
+                protocols: of("protocol")?,
+                tags: names("SELECT DISTINCT tag FROM tag ORDER BY tag")?,
+            })
+        };
+        all().map_err(self.failed())
     }
 
     /// What cannot be found because it is never so: a sentence for each condition on a value that no session has, or has in

@@ -8,6 +8,7 @@ use crate::text::checksum;
 use rusqlite::{Connection, OptionalExtension, TransactionBehavior, params};
 use serde::Serialize;
 use std::collections::BTreeMap;
+use std::ops::ControlFlow;
 
 /// Sessions that are written at a time: another process waits a fraction of a second at most.
 const BATCH: usize = 100;
@@ -41,6 +42,17 @@ impl Catalog {
     /// Reads the sessions that are new or have changed, and forgets those that are gone. Several processes
     /// may do so at a time.
     pub fn update(&mut self, progress: Progress<'_>) -> Result<Changes, CatalogError> {
+        self.update_while(&mut |done, of| {
+            progress(done, of);
+            ControlFlow::Continue(())
+        })
+    }
+
+    /// The same, which ends before its time when `progress` breaks it. What was read until then is kept.
+    pub fn update_while(
+        &mut self,
+        progress: &mut dyn FnMut(usize, usize) -> ControlFlow<()>,
+    ) -> Result<Changes, CatalogError> {
         let (places, remarks) = walk(&self.library);
         let mut known = self.fingerprints()?;
         let is_new = |place: &&Place| known.get(&place.name) != Some(&place.fingerprint);
@@ -50,18 +62,24 @@ impl Catalog {
         }
         let mut changes = Changes {
             sessions: places.len(),
-            read: new.len(),
+            read: 0,
             removed: 0,
             remarks,
         };
         let mut done = 0;
-        progress(done, new.len());
+        let mut flow = progress(done, new.len());
         for batch in new.chunks(BATCH) {
+            if flow.is_break() {
+                break;
+            }
             let mut entries = Vec::with_capacity(batch.len());
             for place in batch {
+                if flow.is_break() {
+                    break;
+                }
                 entries.push((*place, Entry::read(place)));
                 done += 1;
-                progress(done, new.len());
+                flow = progress(done, new.len());
             }
             self.write(|db| {
                 entries
@@ -69,6 +87,7 @@ impl Catalog {
                     .try_for_each(|(place, entry)| put(db, place, entry))
             })?;
         }
+        changes.read = done;
         let gone: Vec<String> = known.into_keys().collect();
         // Another process may have read a session that came after our walk.
         let is_gone = |name: &&String| !self.library.join(name).exists();

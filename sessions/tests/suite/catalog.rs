@@ -348,6 +348,10 @@ fn pages_and_orders_make_up_the_whole() {
         Order::Operator => entry.operator.clone(),
         Order::Protocol => entry.protocol.clone(),
         Order::Duration => format!("{:020.9}", entry.duration_s),
+        Order::Verdict => entry.verdict.map_or("", Verdict::word).to_owned(),
+        // What cannot be read has no review that anybody knows of.
+        Order::Review if entry.trouble.is_some() => "?".to_owned(),
+        Order::Review => ReviewIs::of(entry.review.as_ref()).word().to_owned(),
     };
     for order in [
         Order::Started,
@@ -355,6 +359,8 @@ fn pages_and_orders_make_up_the_whole() {
         Order::Operator,
         Order::Protocol,
         Order::Duration,
+        Order::Verdict,
+        Order::Review,
     ] {
         let mut pages = Vec::new();
         for page in 0..5 {
@@ -386,6 +392,11 @@ fn pages_and_orders_make_up_the_whole() {
         };
         pages.reverse();
         assert_eq!(catalog.find(&query).unwrap().entries, pages);
+        let folders: Vec<String> = pages.iter().map(|entry| entry.folder.clone()).collect();
+        assert_eq!(catalog.folders(&query).unwrap(), folders);
+        let mut some = folders[3..9].to_vec();
+        some.push("not there".into());
+        assert_eq!(catalog.entries(&some).unwrap(), pages[3..9]);
     }
 }
 

@@ -3,6 +3,7 @@
 use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
+use crate::workers::exports::without_copied;
 use crate::workers::fit::no_systematic;
 use palpate_model::calibration::{Calibration, CalibrationError};
 use palpate_model::fit::{FitError, FitSample, Traced};
@@ -10,8 +11,7 @@ use palpate_protocols::analysis::{self, SourceError, Wanted};
 use palpate_protocols::compliance::{Correction, Corrections};
 use palpate_protocols::origin::Origin;
 use palpate_sessions::import::ColumnNames;
-use palpate_sessions::log::{ReadError, Summary};
-use std::collections::BTreeSet;
+use palpate_sessions::log::ReadError;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -54,29 +54,11 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 /// Every source named, and every one in the folders named: folder by folder, by name. A session whose
 /// recovered copy is among them is left out, so that its samples count once.
 pub(in crate::cli) fn find(paths: &[PathBuf], output: &Output) -> Result<Vec<PathBuf>, Failure> {
-    let found = all(paths)?;
-    let ids: Vec<Option<(String, Option<String>)>> = found
-        .iter()
-        .map(|path| {
-            let is_log = path.is_dir() || has_ending(path, &[LOG]);
-            let manifest = Summary::read(path).ok().filter(|_| is_log)?.manifest;
-            Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
-        })
-        .collect();
-    let copied: BTreeSet<&String> = ids
-        .iter()
-        .flatten()
-        .filter_map(|it| it.1.as_ref())
-        .collect();
-    let is_copied =
-        |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));
-    let (originals, rest): (Vec<_>, Vec<_>) = found
-        .into_iter()
-        .zip(&ids)
-        .partition(|(_, one)| is_copied(one));
-    let names = originals.iter().map(|(path, _)| path.display().to_string());
+    let is_log = |path: &Path| path.is_dir() || has_ending(path, &[LOG]);
+    let (rest, originals) = without_copied(all(paths)?, is_log);
+    let names = originals.iter().map(|path| path.display().to_string());
     tell_copied(names.collect(), output);
-    Ok(rest.into_iter().map(|(path, _)| path).collect())
+    Ok(rest)
 }
 
 /// Tells which sessions are left out for their recovered copies.

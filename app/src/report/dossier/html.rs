@@ -155,7 +155,7 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     );
     body.figure(
         &figures::force_depth(traces).svg(),
-        "Force over depth from contact. Every step of half a pixel is drawn once.",
+        "Force over depth from contact. No sample is further than half a pixel from what is drawn.",
     );
 }
 

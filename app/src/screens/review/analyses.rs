@@ -13,7 +13,8 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::Job;
-use crate::workers::analyses::{Deed, Done, Known, Who, login, own, read};
+use crate::workers::analyses::{Deed, Done, Known, Who, own, read};
+use crate::workers::edits::author;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Label, RichText, TextEdit, Ui};
 use form::Form;
@@ -74,7 +75,7 @@ impl AnalysesPanel {
             form: Form::default(),
             said: Said::default(),
             papers: Papers::default(),
-            by: login(),
+            by: author(None),
             reason: String::new(),
             made: None,
             changed: None,
@@ -92,7 +93,9 @@ impl AnalysesPanel {
             if let Some(Ok(done)) = self.work.answer() {
                 self.made.clone_from(&done.made);
                 if done.changed.is_some() {
-                    self.changed.clone_from(&done.changed);
+                    if done.is_edit {
+                        self.changed.clone_from(&done.changed);
+                    }
                     self.form.forget();
                     self.reason.clear();
                     self.read_again(ctx);
@@ -109,7 +112,7 @@ impl AnalysesPanel {
         }
     }
 
-    /// A session whose edits or analyses have changed since this was last asked.
+    /// A session whose edits have changed since this was last asked.
     pub fn take_changed(&mut self) -> Option<PathBuf> {
         self.changed.take()
     }
@@ -120,10 +123,15 @@ impl AnalysesPanel {
         self.shown.extend_from_slice(shown);
     }
 
+    /// Where the two cursors stand on the session, in s since its first sample, once both are set.
+    pub fn set_cursors(&mut self, cursors: Option<[f64; 2]>) {
+        self.form.cursors = cursors;
+        self.papers.span = cursors.map(|[a, b]| [a.min(b), a.max(b)]);
+    }
+
     /// Puts a stretch of time, in s since the first sample, into the form that leaves stretches out.
     pub fn propose_span(&mut self, from: f64, until: f64) {
         self.form.propose_span(from, until);
-        self.papers.propose_span(from, until);
     }
 
     fn read_again(&mut self, ctx: &Context) {

@@ -1,8 +1,27 @@
 //! The review screen: one session closely, several beside each other.
 
 pub mod analyses;
+mod cycles;
+mod keys;
+mod left;
+mod middle;
+mod parameters;
+mod prediction;
+mod readout;
+mod right;
+mod shown;
+mod subject;
+
+pub use parameters::{ParameterRow, parameter_rows};
+pub use shown::{Shown, ShownSeries, ShownSession};
+pub use subject::Subject;
 
 use crate::command::Commands;
+use crate::plots::navigate::Span;
+use crate::plots::over_depth::DepthLines;
+use crate::workers::review::fit::{FitAnswer, Prediction};
+use crate::workers::review::{Leader, Quantity};
+use crate::workers::task::Task;
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Ui};
 use std::path::PathBuf;
@@ -16,11 +35,73 @@ pub struct Looked {
     pub analysis: Option<String>,
 }
 
+/// What of the sessions is shown.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum View {
+    /// Quantities over time, above each other.
+    #[default]
+    OverTime,
+    /// Force over depth.
+    OverDepth,
+    /// Every cycle and its peak.
+    Cycles,
+    /// The fits' parameters.
+    Parameters,
+    /// What the fit of one session says of another.
+    Prediction,
+}
+
+impl View {
+    /// All, as they stand.
+    pub const ALL: [Self; 5] = [
+        Self::OverTime,
+        Self::OverDepth,
+        Self::Cycles,
+        Self::Parameters,
+        Self::Prediction,
+    ];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OverTime => "Over time",
+            Self::OverDepth => "Over depth",
+            Self::Cycles => "Cycles",
+            Self::Parameters => "Parameters",
+            Self::Prediction => "Prediction",
+        }
+    }
+}
+
+/// Sessions that are read at once: the disk and two cores are busy with them.
+const READING_MAX: usize = 2;
+
 /// The sessions and how they are looked at.
-#[derive(Debug)]
 pub struct ReviewScreen {
-    sessions: Vec<Looked>,
+    /// The one in front comes first.
+    subjects: Vec<Subject>,
     analyses: AnalysesPanel,
+    view: View,
+    leader: Leader,
+    quantities: Vec<Quantity>,
+    has_residuals: bool,
+    time: Span,
+    depth: Span,
+    force: Span,
+    cursors: [Option<f64>; 2],
+    depth_lines: DepthLines,
+    depth_pixels: [f64; 2],
+    fits: Task<Vec<FitAnswer>>,
+    /// Whether the last answer of the fits is handed out.
+    are_fits_taken: bool,
+    prediction: Task<Prediction>,
+    prediction_of: Option<[String; 2]>,
+    prediction_lines: [crate::plots::stretches::Stretches; 2],
+    path: String,
+    next_id: u64,
+    /// Raised where the time axis of a plot is other than it was.
+    thinned: usize,
 }
 
 impl ReviewScreen {
@@ -28,36 +109,176 @@ impl ReviewScreen {
     #[must_use]
     pub fn new(library: Result<PathBuf, String>) -> Self {
         Self {
-            sessions: Vec::new(),
+            subjects: Vec::new(),
             analyses: AnalysesPanel::new(library),
+            view: View::default(),
+            leader: Leader::default(),
+            quantities: vec![Quantity::Force, Quantity::Depth, Quantity::Volts],
+            has_residuals: false,
+            time: Span::default(),
+            depth: Span::default(),
+            force: Span::default(),
+            cursors: [None; 2],
+            depth_lines: DepthLines::default(),
+            depth_pixels: [800.0, 500.0],
+            fits: Task::default(),
+            are_fits_taken: true,
+            prediction: Task::default(),
+            prediction_of: None,
+            prediction_lines: Default::default(),
+            path: String::new(),
+            next_id: 0,
+            thinned: 1,
         }
     }
 
     /// Shows these sessions instead of those there.
-    pub fn open(&mut self, sessions: Vec<PathBuf>, _ctx: &Context) {
-        let looked = |session| Looked {
+    pub fn open(&mut self, sessions: Vec<PathBuf>, ctx: &Context) {
+        self.subjects.clear();
+        self.cursors = [None; 2];
+        self.time.show_all();
+        self.depth.show_all();
+        self.force.show_all();
+        for session in sessions {
+            self.add(session, ctx);
+        }
+    }
+
+    /// Shows a session besides those there; one that is there already is not shown twice.
+    pub fn add(&mut self, session: PathBuf, ctx: &Context) {
+        if self
+            .subjects
+            .iter()
+            .any(|one| one.looked.session == session)
+        {
+            return;
+        }
+        let looked = Looked {
             session,
             analysis: None,
         };
-        self.sessions = sessions.into_iter().map(looked).collect();
+        self.subjects.push(Subject::new(looked, self.next_id));
+        self.next_id += 1;
+        self.poll(ctx);
     }
 
     /// Fetches what threads have answered.
     pub fn poll(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
+        if let Some(changed) = self.analyses.take_changed() {
+            let is_it = |one: &&mut Subject| one.looked.session == changed;
+            if let Some(subject) = self.subjects.iter_mut().find(is_it) {
+                subject.fit = None;
+                subject.read_again();
+            }
+        }
+        self.fits.poll();
+        self.prediction.poll();
+        self.take_fits();
+        let mut reading = 0;
+        for subject in &mut self.subjects {
+            subject.poll();
+            reading += usize::from(subject.recording.is_reading());
+        }
+        for subject in &mut self.subjects {
+            if reading < READING_MAX && subject.begin(ctx) {
+                reading += 1;
+            }
+        }
+        self.set_wholes();
+    }
+
+    /// Hands the fits that were made to their sessions, where these are still read in the same way.
+    fn take_fits(&mut self) {
+        if self.are_fits_taken || self.fits.standing().is_some() {
+            return;
+        }
+        self.are_fits_taken = true;
+        let Some(Ok(answers)) = self.fits.answer() else {
+            return;
+        };
+        for (of, answer) in answers {
+            let is_own = |one: &&mut Subject| {
+                one.looked.session == of.path && one.looked.analysis == of.analysis
+            };
+            if let Some(subject) = self.subjects.iter_mut().find(is_own) {
+                subject.set_fit(answer.clone());
+            }
+        }
+    }
+
+    /// Begins to fit every session shown.
+    fn start_fits(&mut self, ctx: &Context) {
+        let subjects: Vec<_> = self.subjects.iter().map(Subject::for_fit).collect();
+        self.are_fits_taken = false;
+        self.fits.start("review-fit", ctx, move |progress| {
+            crate::workers::review::fit::fit_sessions(&subjects, progress)
+        });
+    }
+
+    /// Whether the sessions shown can be fitted now, or why not.
+    fn fit_verdict(&self) -> Result<(), String> {
+        match self.subjects.iter().find(|one| !one.is_settled()) {
+            _ if self.subjects.is_empty() => Err("show a session first".into()),
+            Some(one) => Err(format!("{} is still being read", one.name)),
+            None => Ok(()),
+        }
+    }
+
+    /// How far each axis reaches.
+    fn set_wholes(&mut self) {
+        let join = |a: [f64; 2], b: [f64; 2]| [a[0].min(b[0]), a[1].max(b[1])];
+        let times = self.subjects.iter().map(|one| {
+            let shift = one.shift(self.leader);
+            one.recording.span().map(|end| end - shift)
+        });
+        if let Some([low, high]) = times.reduce(join) {
+            let room = 0.01 * (high - low);
+            self.time.set_whole([low - room, high + room]);
+        }
+        for (span, quantity) in [
+            (&mut self.depth, Quantity::Depth),
+            (&mut self.force, Quantity::Force),
+        ] {
+            let ends = self
+                .subjects
+                .iter()
+                .filter_map(|one| one.extremes(quantity));
+            if let Some([low, high]) = ends.reduce(join) {
+                let room = 0.04 * (high - low).max(1e-6);
+                span.set_whole([low - room, high + room]);
+            }
+        }
+    }
+
+    /// The session in front.
+    fn front(&self) -> Option<&Subject> {
+        self.subjects.first()
     }
 
     /// Draws the sessions and how they are laid over each other.
-    pub fn left_ui(&mut self, _ui: &mut Ui, _commands: &mut Commands) {}
+    pub fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        self.draw_left(ui, commands);
+    }
 
     /// Draws the plots.
-    pub fn middle_ui(&mut self, _ui: &mut Ui, _commands: &mut Commands) {}
+    pub fn middle_ui(&mut self, ui: &mut Ui, _commands: &mut Commands) {
+        self.draw_middle(ui);
+    }
 
     /// Draws what is known of the session in front, and what can be made of it.
     pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        self.analyses.set_shown(&self.sessions);
-        if let Some(front) = self.sessions.first_mut() {
-            self.analyses.ui(ui, front, commands);
+        self.draw_right(ui);
+        let shown: Vec<Looked> = self.subjects.iter().map(|one| one.looked.clone()).collect();
+        self.analyses.set_shown(&shown);
+        let shift = self.front().map_or(0.0, |one| one.shift(self.leader));
+        let cursors = match self.cursors {
+            [Some(a), Some(b)] => Some([a + shift, b + shift]),
+            _ => None,
+        };
+        self.analyses.set_cursors(cursors);
+        if let Some(front) = self.subjects.first_mut() {
+            self.analyses.ui(ui, &mut front.looked, commands);
         }
     }
 }

@@ -3,8 +3,9 @@
 use super::text_ui;
 use crate::report::dossier::Wanted;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::widgets::reason_button::reason_button;
 use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::{ComboBox, Ui, vec2};
 use palpate_model::families;
 use std::path::PathBuf;
 
@@ -38,6 +39,8 @@ pub(super) struct Form {
     /// Id of one of the library.
     calibration: Option<String>,
     file: String,
+    /// Where the cursors stand in s, once both are set.
+    pub cursors: Option<[f64; 2]>,
     span: [QuantityField; 2],
 }
 
@@ -53,6 +56,7 @@ impl Default for Form {
             is_together: false,
             calibration: None,
             file: String::new(),
+            cursors: None,
             span: [0.0, 0.0].map(QuantityField::new),
         }
     }
@@ -90,6 +94,14 @@ impl Form {
             Kind::Fit => self.fit_ui(ui, others.len()),
             Kind::Recalibration => self.calibration_ui(ui, known),
             Kind::Mask => {
+                let verdict = self.cursors.map(|_| ());
+                let verdict = verdict.ok_or("set cursors A and B on the plot".to_owned());
+                let size = vec2(170.0, 26.0);
+                if reason_button(ui, "Between the cursors", size, &verdict)
+                    && let Some([a, b]) = self.cursors
+                {
+                    self.propose_span(a, b);
+                }
                 for (name, field) in ["from", "to"].into_iter().zip(&mut self.span) {
                     if quantity_ui(ui, name, "s since the first sample", field) {
                         field.check(|_| Ok(()));

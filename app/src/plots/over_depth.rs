@@ -1,0 +1,216 @@
+//! Force over depth of recorded sessions. Which points are drawn is found beside the window, once for a zoom.
+
+use super::navigate::{Gesture, Span, gesture};
+use super::style::quiet;
+use crate::theme::Tokens;
+use crate::workers::Job;
+use eframe::egui::{Color32, Context, Ui, vec2};
+use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points};
+use palpate_model::signal::polyline::Reducer;
+use palpate_model::signal::track::Track;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// What of one session is drawn.
+#[derive(Clone, Debug)]
+pub struct Source {
+    /// Its samples.
+    pub track: Track,
+    /// Columns of depth and force in them.
+    pub columns: [usize; 2],
+    /// Number that changes with the samples.
+    pub version: u64,
+    /// Number that tells it from the others.
+    pub id: u64,
+}
+
+/// What lines were found for.
+#[derive(Clone, Debug, PartialEq)]
+struct Key {
+    depth: [f64; 2],
+    force: [f64; 2],
+    pixels: [f64; 2],
+    versions: Vec<(u64, u64)>,
+}
+
+/// The line of one session.
+#[derive(Clone, Debug, Default)]
+struct Reduced {
+    id: u64,
+    stretches: Vec<Vec<PlotPoint>>,
+    samples: u64,
+    points: usize,
+}
+
+/// The lines last found, and the search for others.
+#[derive(Default)]
+pub struct DepthLines {
+    job: Job<Option<(Key, Vec<Reduced>)>>,
+    is_unwanted: Arc<AtomicBool>,
+    sought: Option<Key>,
+    made: Option<(Key, Vec<Reduced>)>,
+}
+
+impl DepthLines {
+    /// Fetches what was found, and looks again where the view or the samples are others.
+    pub fn update(
+        &mut self,
+        ctx: &Context,
+        sources: &[Source],
+        [depth, force]: [&Span; 2],
+        pixels: [f64; 2],
+    ) {
+        if let Some(Some(made)) = self.job.poll() {
+            self.made = Some(made);
+        }
+        let key = Key {
+            depth: depth.shown(),
+            force: force.shown(),
+            pixels: pixels.map(f64::round),
+            versions: sources.iter().map(|one| (one.id, one.version)).collect(),
+        };
+        if self.made.as_ref().is_some_and(|(made, _)| *made == key) {
+            return;
+        }
+        if self.job.is_busy() {
+            // Other samples are waited for; another view is not.
+            let is_other = self.sought.as_ref().is_some_and(|sought| {
+                (sought.depth, sought.force, sought.pixels) != (key.depth, key.force, key.pixels)
+            });
+            if is_other {
+                self.is_unwanted.store(true, Ordering::Relaxed);
+            }
+            return;
+        }
+        self.is_unwanted = Arc::default();
+        self.sought = Some(key.clone());
+        let (sources, is_unwanted) = (sources.to_vec(), Arc::clone(&self.is_unwanted));
+        let wake = ctx.clone();
+        // Without a thread the lines there stay; it is tried again in the next frame.
+        let _ = self.job.start(
+            "review-loops",
+            move || reduce(key, &sources, &is_unwanted),
+            move || wake.request_repaint(),
+        );
+    }
+
+    /// What a reader must know of the lines: for how many samples how many points are drawn.
+    #[must_use]
+    pub fn remark(&self) -> Option<String> {
+        let (_, lines) = self.made.as_ref()?;
+        let samples: u64 = lines.iter().map(|line| line.samples).sum();
+        let points: usize = lines.iter().map(|line| line.points).sum();
+        (samples > points as u64).then(|| {
+            format!(
+                "over depth {points} points stand for {samples} samples; none is more than half a pixel from the line"
+            )
+        })
+    }
+
+    /// Whether lines for another view or more samples are being found.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.job.is_busy()
+    }
+
+    /// The stretches of a session, as they are drawn.
+    pub fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
+        let lines = self.made.as_ref().map_or(&[][..], |(_, lines)| lines);
+        let own = lines.iter().find(|line| line.id == id);
+        own.map_or(&[], |line| &line.stretches)
+    }
+}
+
+fn reduce(key: Key, sources: &[Source], is_unwanted: &AtomicBool) -> Option<(Key, Vec<Reduced>)> {
+    let [width, height] = key.pixels;
+    let [x, y] = [key.depth, key.force];
+    let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
+    let mut lines = Vec::with_capacity(sources.len());
+    for source in sources {
+        let mut reducer = Reducer::new(width, height);
+        for segment in source.track.segments() {
+            if is_unwanted.load(Ordering::Relaxed) {
+                return None;
+            }
+            let [depths, forces] = source.columns.map(|column| segment.values(column));
+            for (depth, force) in depths.iter().zip(forces) {
+                let place = [f64::from(*depth) - x[0], f64::from(*force) - y[0]];
+                reducer.push(place[0] * scale[0], place[1] * scale[1]);
+            }
+        }
+        let (found, samples) = reducer.finish();
+        let point = |[px, py]: [f64; 2]| PlotPoint::new(x[0] + px / scale[0], y[0] + py / scale[1]);
+        let stretches: Vec<Vec<PlotPoint>> = found
+            .into_iter()
+            .map(|stretch| stretch.into_iter().map(point).collect())
+            .collect();
+        lines.push(Reduced {
+            id: source.id,
+            points: stretches.iter().map(Vec::len).sum(),
+            stretches,
+            samples,
+        });
+    }
+    Some((key, lines))
+}
+
+/// One session's line as it is drawn.
+pub struct Layer<'a> {
+    /// What it is.
+    pub name: &'a str,
+    /// Its colour.
+    pub color: Color32,
+    /// Number that tells it from the others.
+    pub id: u64,
+    /// Where the cursors stand on it: depth and force.
+    pub cursors: [Option<[f64; 2]>; 2],
+}
+
+/// Draws the plot in the space there is; returns what the pointer did and how many pixels it has.
+pub fn over_depth_ui(
+    ui: &mut Ui,
+    lines: &DepthLines,
+    layers: &[Layer<'_>],
+    [depth, force]: [&Span; 2],
+) -> (Gesture, [f64; 2]) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let (x, y) = (depth.shown(), force.shown());
+    let plot = quiet(Plot::new("review_force_depth"), tokens)
+        .x_axis_label("depth from contact (mm)")
+        .y_axis_label("force above tare (N)")
+        .set_margin_fraction(vec2(0.0, 0.0))
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+        .show_x(false)
+        .show_y(false);
+    let response = plot.show(ui, |plot_ui| {
+        plot_ui.set_plot_bounds_x(x[0]..=x[1]);
+        plot_ui.set_plot_bounds_y(y[0]..=y[1]);
+        for layer in layers {
+            for (number, stretch) in lines.stretches(layer.id).iter().enumerate() {
+                let line = Line::new(layer.name, PlotPoints::Borrowed(stretch));
+                plot_ui.line(
+                    line.id((layer.id, number))
+                        .color(layer.color)
+                        .width(1.2)
+                        .allow_hover(false),
+                );
+            }
+        }
+        for layer in layers {
+            for (name, place) in ["A", "B"].into_iter().zip(layer.cursors) {
+                if let Some([depth, force]) = place {
+                    let at = vec![PlotPoint::new(depth, force)];
+                    let mark = Points::new(name, PlotPoints::Owned(at));
+                    plot_ui.points(mark.radius(4.0).color(tokens.text).allow_hover(false));
+                }
+            }
+        }
+    });
+    let scale = f64::from(ui.ctx().pixels_per_point());
+    let size = response.response.rect.size();
+    let pixels = [size.x, size.y].map(|side| f64::from(side) * scale);
+    (gesture(ui, &response.response), pixels)
+}

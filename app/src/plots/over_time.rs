@@ -1,0 +1,161 @@
+//! Quantities of sessions over time, above each other with one time axis.
+
+use super::navigate::{Gesture, Span, gesture};
+use super::stretches::Stretches;
+use super::style::{quiet, round_marks};
+use crate::theme::Tokens;
+use eframe::egui::{Align2, Color32, RichText, Ui, vec2};
+use egui_plot::{HLine, LineStyle, Plot, PlotPoint, Span as Shade, Text, VLine};
+use palpate_model::rig::Phase;
+
+/// One line.
+pub struct Layer<'a> {
+    /// What it is.
+    pub name: &'a str,
+    /// Its colour.
+    pub color: Color32,
+    /// Its points.
+    pub stretches: &'a Stretches,
+}
+
+/// A moment that is marked.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// When, on the axis.
+    pub t: f64,
+    /// Whether it needs attention.
+    pub is_alarm: bool,
+    /// Whether a person wrote it down.
+    pub is_note: bool,
+}
+
+/// What stands behind and before the lines of every plot.
+#[derive(Clone, Debug, Default)]
+pub struct Setting {
+    /// Phases of the session in front: from, to, which.
+    pub phases: Vec<(f64, f64, Phase)>,
+    /// Stretches whose forces do not count.
+    pub left_out: Vec<[f64; 2]>,
+    /// What happened.
+    pub moments: Vec<Moment>,
+    /// Both cursors.
+    pub cursors: [Option<f64>; 2],
+}
+
+/// One of the plots.
+pub struct Panel<'a> {
+    /// Its name.
+    pub id: &'static str,
+    /// What stands at its axis.
+    pub axis: &'static str,
+    /// Its lines, the one in front last.
+    pub layers: Vec<Layer<'a>>,
+    /// Whether the axis' zero is drawn.
+    pub has_zero: bool,
+}
+
+/// Room above and below the lines, as a share of their height.
+const MARGIN: f64 = 0.06;
+/// Room above for the names of phases.
+const NAMES: f64 = 0.1;
+/// Names of phases that are narrower than this share of the axis are left out.
+const NAME_SHARE: f64 = 0.03;
+
+/// Lowest and highest of all lines with room around them.
+fn heights(panel: &Panel<'_>) -> [f64; 2] {
+    let known = panel.layers.iter().filter_map(|layer| layer.stretches.y());
+    let ends = known.reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])]);
+    let [low, high] = ends.unwrap_or([0.0, 1.0]);
+    // A line without height has some all the same.
+    let height = (high - low).max(1e-9 * high.abs().max(low.abs())).max(1e-6);
+    [low - MARGIN * height, high + (MARGIN + NAMES) * height]
+}
+
+/// Draws one plot in the space there is and returns what the pointer did in it. `is_last`: it has the time's name.
+pub fn over_time_ui(
+    ui: &mut Ui,
+    panel: &Panel<'_>,
+    span: &Span,
+    setting: &Setting,
+    time_axis: Option<&str>,
+) -> Gesture {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let (shown, [low, high]) = (span.shown(), heights(panel));
+    let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
+    let plot = quiet(Plot::new(panel.id), tokens)
+        .y_axis_label(panel.axis)
+        .y_grid_spacer(move |input| round_marks(input, marks_up))
+        .x_axis_label(time_axis.unwrap_or_default())
+        .show_axes([time_axis.is_some(), true])
+        .set_margin_fraction(vec2(0.0, 0.0))
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+        .show_x(false)
+        .show_y(false);
+    let response = plot.show(ui, |plot_ui| {
+        plot_ui.set_plot_bounds_x(shown[0]..=shown[1]);
+        plot_ui.set_plot_bounds_y(low..=high);
+        for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
+            if *to < shown[0] || *from > shown[1] {
+                continue;
+            }
+            let fill = match number % 2 {
+                0 => Color32::TRANSPARENT,
+                _ => tokens.phase_band,
+            };
+            let seen = to.min(shown[1]) - from.max(shown[0]);
+            let has_name = seen > NAME_SHARE * (shown[1] - shown[0]);
+            let name = if has_name { phase.name() } else { "" };
+            plot_ui.span(
+                Shade::new(name, *from..=*to)
+                    .fill(fill)
+                    .border_color(tokens.line),
+            );
+        }
+        for [from, to] in &setting.left_out {
+            plot_ui.span(
+                Shade::new("left out", *from..=*to)
+                    .fill(tokens.limit.gamma_multiply(0.16))
+                    .border_color(tokens.limit),
+            );
+        }
+        for moment in &setting.moments {
+            if !(shown[0]..=shown[1]).contains(&moment.t) {
+                continue;
+            }
+            let (color, style) = match (moment.is_alarm, moment.is_note) {
+                (true, _) => (tokens.alarm_fill, LineStyle::Solid),
+                (_, true) => (tokens.text, LineStyle::dashed_loose()),
+                _ => (tokens.text_quiet, LineStyle::dotted_dense()),
+            };
+            let line = VLine::new("event", moment.t).color(color).width(1.0);
+            plot_ui.vline(line.style(style).allow_hover(false));
+        }
+        if panel.has_zero {
+            let zero = HLine::new("zero", 0.0).color(tokens.text_quiet).width(1.0);
+            plot_ui.hline(zero.allow_hover(false));
+        }
+        for (number, layer) in panel.layers.iter().enumerate() {
+            for line in layer.stretches.lines(layer.name, number, layer.color) {
+                plot_ui.line(line);
+            }
+        }
+        for (name, cursor) in ["A", "B"].into_iter().zip(setting.cursors) {
+            let Some(t) = cursor.filter(|t| (shown[0]..=shown[1]).contains(t)) else {
+                continue;
+            };
+            let line = VLine::new(name, t).color(tokens.text).width(1.2);
+            plot_ui.vline(line.allow_hover(false));
+            let words = RichText::new(format!(" {name}")).strong();
+            plot_ui.text(
+                Text::new(name, PlotPoint::new(t, low), words)
+                    .anchor(Align2::LEFT_BOTTOM)
+                    .color(tokens.text)
+                    .allow_hover(false),
+            );
+        }
+    });
+    gesture(ui, &response.response)
+}

@@ -1,0 +1,157 @@
+//! What is drawn of one quantity of one session: found anew when the stretch shown, the width or the samples
+//! changed, and kept otherwise.
+
+use eframe::egui::Color32;
+use egui_plot::{Line, PlotPoint, PlotPoints};
+use palpate_model::signal::track::{Drawn, Track};
+use std::ops::Range;
+
+/// What the points were found for.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Key {
+    window: [f64; 2],
+    pixels: f64,
+    shift: f64,
+    version: u64,
+}
+
+/// What is asked for.
+#[derive(Clone, Copy, Debug)]
+pub struct Wanted {
+    /// The stretch of the axis shown, in s.
+    pub window: [f64; 2],
+    /// Pixels across it.
+    pub pixels: f64,
+    /// Time of the track that stands at zero, in s.
+    pub shift: f64,
+    /// Number that changes with the track.
+    pub version: u64,
+}
+
+/// Points of one line without gaps in between them, and which belong together.
+#[derive(Debug, Default)]
+pub struct Stretches {
+    key: Option<Key>,
+    points: Vec<PlotPoint>,
+    ranges: Vec<Range<usize>>,
+    y: Option<[f64; 2]>,
+    drawn: Drawn,
+    found: u64,
+}
+
+impl Stretches {
+    /// Finds the points again where something changed.
+    pub fn update(&mut self, track: &Track, column: usize, wanted: Wanted) {
+        let key = Key {
+            window: wanted.window,
+            pixels: wanted.pixels,
+            shift: wanted.shift,
+            version: wanted.version,
+        };
+        if self.key == Some(key) {
+            return;
+        }
+        self.key = Some(key);
+        self.found += 1;
+        self.points.clear();
+        self.ranges.clear();
+        let (points, ranges) = (&mut self.points, &mut self.ranges);
+        let mut start = 0;
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        let own = wanted.window.map(|end| end + wanted.shift);
+        self.drawn = track.draw(column, own, wanted.pixels, |point| match point {
+            Some([t, value]) => {
+                (low, high) = (low.min(value), high.max(value));
+                points.push(PlotPoint::new(t - wanted.shift, value));
+            }
+            None => {
+                if points.len() > start {
+                    ranges.push(start..points.len());
+                }
+                start = points.len();
+            }
+        });
+        if points.len() > start {
+            ranges.push(start..points.len());
+        }
+        self.y = (low <= high).then_some([low, high]);
+    }
+
+    /// A line for each stretch, all of one name.
+    pub fn lines<'a>(
+        &'a self,
+        name: &'a str,
+        id: usize,
+        color: Color32,
+    ) -> impl Iterator<Item = Line<'a>> {
+        self.ranges.iter().enumerate().map(move |(number, range)| {
+            Line::new(name, PlotPoints::Borrowed(&self.points[range.clone()]))
+                .id((id, number))
+                .color(color)
+                .width(1.4)
+                .allow_hover(false)
+        })
+    }
+
+    /// The points of each stretch.
+    pub fn pieces(&self) -> impl Iterator<Item = &[PlotPoint]> {
+        self.ranges.iter().map(|range| &self.points[range.clone()])
+    }
+
+    /// Lowest and highest of what is drawn.
+    #[must_use]
+    pub fn y(&self) -> Option<[f64; 2]> {
+        self.y
+    }
+
+    /// How much was drawn, and how far it is thinned.
+    #[must_use]
+    pub fn drawn(&self) -> Drawn {
+        self.drawn
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::signal::track::Segment;
+    use std::sync::Arc;
+
+    #[test]
+    fn points_are_found_once_for_a_view_and_gaps_part_them() {
+        let times: Vec<f64> = (0..5000).map(|i| f64::from(i) * 1e-3).collect();
+        let values = (0..5000).map(|i| match i {
+            2000..2600 => f32::NAN,
+            3000 => 9.0,
+            _ => 1.0,
+        });
+        let mut track = Track::default();
+        track.push(Arc::new(Segment::new(times, &[values.collect()])));
+        let mut stretches = Stretches::default();
+        let mut wanted = Wanted {
+            window: [-1.0, 4.0],
+            pixels: 100.0,
+            shift: 1.0,
+            version: 1,
+        };
+        for _ in 0..3 {
+            stretches.update(&track, 0, wanted);
+        }
+        assert_eq!((stretches.found, stretches.y()), (1, Some([1.0, 9.0])));
+        assert!(stretches.drawn().points <= 202 && stretches.drawn().samples_per_column == 64);
+        let ends: Vec<[f64; 2]> = stretches
+            .pieces()
+            .map(|piece| [piece[0].x, piece[piece.len() - 1].x])
+            .collect();
+        assert_eq!(ends.len(), 2);
+        // The first and the last sample, on the axis that begins where it was told to.
+        assert_eq!((ends[0][0], ends[1][1]), (-1.0, 4999.0 * 1e-3 - 1.0));
+        assert!(ends[0][1] < 1.0 && ends[1][0] >= 1.6);
+        assert_eq!(stretches.lines("force", 0, Color32::TRANSPARENT).count(), 2);
+        wanted.version = 2;
+        stretches.update(&track, 0, wanted);
+        wanted.window = [2.0, 2.5];
+        stretches.update(&track, 0, wanted);
+        assert_eq!(stretches.found, 3);
+    }
+}

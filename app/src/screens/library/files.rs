@@ -1,0 +1,144 @@
+//! Sessions chosen written as tables or into a lake.
+
+use super::form::text_ui;
+use super::say::sentence;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::quantity_input::form_label;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::exports::{Destination, Exported, export_all};
+use crate::workers::path_dialog::FolderDialog;
+use crate::workers::task::Task;
+use eframe::egui::{ComboBox, Context, Ui};
+use palpate_sessions::export::Format;
+use std::path::PathBuf;
+
+/// What sessions are written as.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Kind {
+    #[default]
+    Csv,
+    Parquet,
+    Arrow,
+    Lake,
+}
+
+impl Kind {
+    const ALL: [Self; 4] = [Self::Csv, Self::Parquet, Self::Arrow, Self::Lake];
+
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Csv => "CSV, a file each",
+            Self::Parquet => "Parquet, a file each",
+            Self::Arrow => "Arrow, a file each",
+            Self::Lake => "one data set (lake)",
+        }
+    }
+
+    fn destination(self, to: PathBuf) -> Destination {
+        match self {
+            Self::Csv => Destination::Tables(Format::Csv(b','), to),
+            Self::Parquet => Destination::Tables(Format::Parquet, to),
+            Self::Arrow => Destination::Tables(Format::Arrow, to),
+            Self::Lake => Destination::Lake(to),
+        }
+    }
+}
+
+/// The panel.
+#[derive(Default)]
+pub(super) struct FilesPanel {
+    kind: Kind,
+    to: String,
+    dialog: FolderDialog,
+    refusal: Option<String>,
+    task: Task<Exported>,
+}
+
+impl FilesPanel {
+    /// Fetches answers that have come.
+    pub fn poll(&mut self) {
+        self.task.poll();
+        if let Some(folder) = self.dialog.poll() {
+            self.to = folder.display().to_string();
+        }
+    }
+
+    fn verdict(&self, chosen: usize) -> Result<(), String> {
+        if chosen == 0 {
+            return Err("choose sessions first".into());
+        }
+        match self.to.trim() {
+            "" => Err("write the folder that they go to first".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Draws the form; `sessions` are the folders of those chosen.
+    pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
+        let ctx: Context = ui.ctx().clone();
+        section_ui(ui, "Export the sessions chosen");
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "as");
+            ComboBox::from_id_salt("export_as")
+                .selected_text(self.kind.words())
+                .width(ui.available_width() - 16.0)
+                .show_ui(ui, |ui| {
+                    for kind in Kind::ALL {
+                        ui.selectable_value(&mut self.kind, kind, kind.words());
+                    }
+                })
+                .response
+                .labelled_by(label.id);
+        });
+        text_ui(ui, "to folder", "made if there is none", &mut self.to);
+        let is_open = self.dialog.is_open();
+        let button = eframe::egui::Button::new("Choose folder...");
+        if ui.add_enabled(!is_open, button).clicked()
+            && let Err(err) = self.dialog.open("Folder for exports", &ctx)
+        {
+            self.refusal = Some(format!("the dialog cannot be opened: {err}"));
+        }
+        if is_open {
+            sentence(ui, "the dialog is open", false);
+        }
+        if let Some(refusal) = &self.refusal {
+            sentence(ui, refusal, true);
+        }
+        let verdict = self.verdict(sessions.len());
+        match task_ui(ui, "Export", &self.task, &verdict) {
+            Some(Pressed::Start) => {
+                let to = self.kind.destination(PathBuf::from(self.to.trim()));
+                let sessions = sessions.to_vec();
+                self.task.start("export", &ctx, move |progress| {
+                    Ok(export_all(sessions, &to, progress))
+                });
+            }
+            Some(Pressed::Cancel) => self.task.cancel(),
+            None => {}
+        }
+        if self.task.standing().is_none() {
+            match self.task.answer() {
+                Some(Ok(done)) => {
+                    sentence(ui, &done.sentence, false);
+                    remarks_ui(ui, &done.remarks);
+                }
+                Some(Err(err)) => sentence(ui, err, true),
+                None => {}
+            }
+        }
+    }
+}
+
+/// Remarks that are read here at most; the rest is counted.
+const REMARKS: usize = 20;
+
+fn remarks_ui(ui: &mut Ui, remarks: &[String]) {
+    remarks
+        .iter()
+        .take(REMARKS)
+        .for_each(|remark| sentence(ui, remark, true));
+    if remarks.len() > REMARKS {
+        let text = format!("and {} more remarks", remarks.len() - REMARKS);
+        sentence(ui, &text, true);
+    }
+}

@@ -1,0 +1,184 @@
+//! What is searched for, as typed and chosen.
+
+use crate::theme::Tokens;
+use crate::widgets::choice_box::choice_box_ui;
+use crate::widgets::quantity_input::form_label;
+use chrono::{DateTime, Utc};
+use eframe::egui::{Label, RichText, TextEdit, Ui};
+use palpate_sessions::catalog::{
+    Choices, DayError, Order, Query, beginning, ending, words_and_conditions,
+};
+
+/// What a verdict may be.
+const VERDICTS: [&str; 4] = ["valid", "suspect", "rejected", "none"];
+/// What a review may have come to.
+const REVIEWS: [&str; 5] = ["accepted", "rejected", "repeat", "outdated", "none"];
+
+/// A name that may be chosen.
+#[derive(Clone, Debug, Default)]
+struct Pick {
+    chosen: Option<String>,
+    narrow: String,
+}
+
+impl Pick {
+    fn ui(&mut self, ui: &mut Ui, name: &str, choices: &[String]) {
+        choice_box_ui(ui, name, &mut self.chosen, choices, &mut self.narrow);
+    }
+}
+
+/// The form.
+#[derive(Clone, Debug, Default)]
+pub(super) struct SearchForm {
+    line: String,
+    specimen: Pick,
+    operator: Pick,
+    protocol: Pick,
+    tag: Pick,
+    verdict: Pick,
+    review: Pick,
+    since: String,
+    until: String,
+    pub order: Order,
+    pub is_reversed: bool,
+}
+
+/// A day, where one is typed.
+fn day(
+    text: &str,
+    read: impl Fn(&str) -> Result<DateTime<Utc>, DayError>,
+) -> Result<Option<DateTime<Utc>>, String> {
+    match text.trim() {
+        "" => Ok(None),
+        text => read(text).map(Some).map_err(|err| err.to_string()),
+    }
+}
+
+impl SearchForm {
+    /// What is asked for, or what is wrong with it in one sentence.
+    pub fn query(&self) -> Result<Query, String> {
+        let (words, conditions) =
+            words_and_conditions(&self.line).map_err(|err| err.to_string())?;
+        let read = |pick: &Pick| pick.chosen.as_deref().map(str::to_owned);
+        let verdict = self.verdict.chosen.as_deref().map(str::parse);
+        let review = self.review.chosen.as_deref().map(str::parse);
+        Ok(Query {
+            words,
+            conditions,
+            specimen: read(&self.specimen),
+            operator: read(&self.operator),
+            protocol: read(&self.protocol),
+            tags: self.tag.chosen.iter().cloned().collect(),
+            verdict: verdict.transpose()?,
+            review: review.transpose()?,
+            since: day(&self.since, beginning).map_err(|err| format!("from: {err}"))?,
+            before: day(&self.until, ending).map_err(|err| format!("until: {err}"))?,
+            order: self.order,
+            is_reversed: self.is_reversed,
+            ..Query::default()
+        })
+    }
+
+    /// Sorts by this, or the other way round where it is sorted so already.
+    pub fn sort(&mut self, order: Order) {
+        self.is_reversed = self.order == order && !self.is_reversed;
+        self.order = order;
+    }
+
+    /// Asks for all sessions again; the order stays.
+    pub fn clear(&mut self) {
+        *self = Self {
+            order: self.order,
+            is_reversed: self.is_reversed,
+            ..Self::default()
+        };
+    }
+
+    /// Draws the fields.
+    pub fn ui(&mut self, ui: &mut Ui, choices: &Choices) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
+        text_ui(ui, "find", "words, depth>=20mm", &mut self.line);
+        if let Err(err) = words_and_conditions(&self.line) {
+            let text = RichText::new(err.to_string());
+            ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
+        }
+        self.specimen.ui(ui, "specimen is", &choices.specimens);
+        self.operator.ui(ui, "operator is", &choices.operators);
+        self.protocol.ui(ui, "protocol is", &choices.protocols);
+        self.tag.ui(ui, "tag is", &choices.tags);
+        self.verdict.ui(ui, "verdict is", &words(&VERDICTS));
+        self.review.ui(ui, "review is", &words(&REVIEWS));
+        text_ui(ui, "from", "2026-03-05", &mut self.since);
+        text_ui(ui, "until", "2026-03-31", &mut self.until);
+        for (text, read) in [
+            (&self.since, beginning as fn(&str) -> _),
+            (&self.until, ending),
+        ] {
+            if let Err(err) = day(text, read) {
+                let text = RichText::new(format!("'{text}' is no day: {err}"));
+                ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
+            }
+        }
+    }
+}
+
+/// A field of one line behind its label; true when it was left with Enter.
+pub(super) fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) -> bool {
+    ui.horizontal(|ui| {
+        let label = form_label(ui, name);
+        let input = TextEdit::singleline(text)
+            .desired_width(ui.available_width() - 8.0)
+            .char_limit(4096)
+            .hint_text(hint);
+        let typed = ui.add(input).labelled_by(label.id);
+        typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter))
+    })
+    .inner
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_sessions::catalog::{ReviewIs, VerdictIs};
+    use palpate_sessions::edits::{Decision, Verdict};
+
+    #[test]
+    fn the_form_asks_as_the_command_line_does() {
+        let mut form = SearchForm {
+            line: "pig depth>=2cm".into(),
+            since: "2026-03-05".into(),
+            until: "2026-03-05".into(),
+            ..SearchForm::default()
+        };
+        form.verdict.chosen = Some("suspect".into());
+        form.review.chosen = Some("repeat".into());
+        form.tag.chosen = Some("pilot".into());
+        form.sort(Order::Started);
+        let query = form.query().unwrap();
+        assert_eq!(query.words, "pig");
+        assert_eq!(query.conditions, ["depth>=20mm".parse().unwrap()]);
+        assert_eq!(query.verdict, Some(VerdictIs::Given(Verdict::Suspect)));
+        assert_eq!(query.review, Some(ReviewIs::Given(Decision::Repeat)));
+        assert_eq!(query.tags, ["pilot"]);
+        let day = query.before.unwrap() - query.since.unwrap();
+        assert_eq!(day.num_hours(), 24);
+        assert!(query.is_reversed);
+        form.clear();
+        let all = form.query().unwrap();
+        assert_eq!((all.words.as_str(), all.is_reversed), ("", true));
+        assert_eq!((all.verdict, all.since), (None, None));
+        for word in VERDICTS {
+            form.verdict.chosen = Some(word.into());
+            assert!(form.query().is_ok(), "{word}");
+        }
+        for word in REVIEWS {
+            form.review.chosen = Some(word.into());
+            assert!(form.query().is_ok(), "{word}");
+        }
+        form.since = "yesterday".into();
+        assert!(form.query().unwrap_err().starts_with("from: write a day"));
+        form.line = "depth>=".into();
+        assert!(form.query().unwrap_err().contains("is no condition"));
+    }
+}

@@ -1,0 +1,372 @@
+//! The sessions found: what is known of those in sight, and which are chosen.
+
+use crate::report::catalog::one_line;
+use crate::widgets::choice_table::{Act, Cell, ChoiceTable, Head, How, Line, Scrolled, Tone};
+use crate::widgets::mark::Mark;
+use crate::widgets::table::Column;
+use crate::workers::find::Found;
+use eframe::egui::Ui;
+use palpate_sessions::catalog::{Entry, Order, ReviewIs};
+use palpate_sessions::edits::{Decision, Verdict};
+use std::collections::{BTreeMap, BTreeSet};
+use std::ops::Range;
+
+/// Entries that are kept at most, apart from those just read.
+const KEPT: usize = 5000;
+/// Rows above and below those in sight that are read with them.
+const MARGIN: usize = 60;
+
+/// The columns, and by what their heads sort.
+const COLUMNS: [(&str, f32, bool, Option<Order>); 10] = [
+    ("started (UTC)", 134.0, false, Some(Order::Started)),
+    ("specimen", 92.0, false, Some(Order::Specimen)),
+    ("verdict", 78.0, false, Some(Order::Verdict)),
+    ("review", 88.0, false, Some(Order::Review)),
+    ("health", 86.0, false, None),
+    ("protocol", 110.0, false, Some(Order::Protocol)),
+    ("operator", 84.0, false, Some(Order::Operator)),
+    ("length", 70.0, true, Some(Order::Duration)),
+    ("tags", 110.0, false, None),
+    ("folder", 320.0, false, None),
+];
+
+/// The list.
+#[derive(Debug, Default)]
+pub(super) struct List {
+    folders: Vec<String>,
+    entries: BTreeMap<String, (Entry, u64)>,
+    generation: u64,
+    chosen: BTreeSet<String>,
+    at: Option<String>,
+    anchor: Option<String>,
+    scrolled: Scrolled,
+    in_sight: Range<usize>,
+}
+
+/// What was done with the list that others must do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Wanted {
+    /// Those chosen are to be looked at.
+    Open,
+    /// Another order.
+    Sort(Order),
+}
+
+impl List {
+    /// Takes what a search found. What is found no more is chosen no more.
+    pub fn take(&mut self, found: &mut Found) {
+        self.folders = std::mem::take(&mut found.folders);
+        self.generation += 1;
+        self.learn(std::mem::take(&mut found.first));
+        let there: BTreeSet<&String> = self.folders.iter().collect();
+        self.chosen.retain(|folder| there.contains(folder));
+        for one in [&mut self.at, &mut self.anchor] {
+            one.take_if(|folder| !there.contains(folder));
+        }
+    }
+
+    /// Takes what was read of some sessions.
+    pub fn learn(&mut self, entries: Vec<Entry>) {
+        let now = self.generation;
+        if self.entries.len() > KEPT {
+            self.entries.retain(|_, (_, of)| *of == now);
+        }
+        let entries = entries.into_iter();
+        self.entries
+            .extend(entries.map(|entry| (entry.folder.clone(), (entry, now))));
+    }
+
+    /// Sessions in sight or chosen of which nothing new enough is known.
+    pub fn unknown(&self) -> Vec<String> {
+        let from = self.in_sight.start.saturating_sub(MARGIN);
+        let to = (self.in_sight.end + MARGIN).min(self.folders.len());
+        let in_sight = self.folders.get(from..to).unwrap_or_default();
+        let chosen = self.chosen.iter().take(MARGIN);
+        let is_old = |folder: &&String| {
+            let known = self.entries.get(*folder);
+            known.is_none_or(|(_, of)| *of != self.generation)
+        };
+        in_sight
+            .iter()
+            .chain(chosen)
+            .filter(is_old)
+            .cloned()
+            .collect()
+    }
+
+    /// How many were found.
+    pub fn count(&self) -> usize {
+        self.folders.len()
+    }
+
+    /// The folders of those chosen, in the order of the list.
+    pub fn chosen(&self) -> Vec<String> {
+        let is_chosen = |folder: &&String| self.chosen.contains(*folder);
+        self.folders.iter().filter(is_chosen).cloned().collect()
+    }
+
+    /// How many are chosen.
+    pub fn chosen_count(&self) -> usize {
+        self.chosen.len()
+    }
+
+    /// What is known of those chosen, as far as it was read.
+    pub fn chosen_entries(&self) -> impl Iterator<Item = &Entry> {
+        let known = self.chosen.iter().filter_map(|one| self.entries.get(one));
+        known.map(|(entry, _)| entry)
+    }
+
+    /// The only one chosen, and how new what is known of it is.
+    pub fn only(&self) -> Option<(&Entry, u64)> {
+        let folder = self.chosen.first().filter(|_| self.chosen.len() == 1)?;
+        let (entry, of) = self.entries.get(folder)?;
+        Some((entry, *of))
+    }
+
+    fn choose(&mut self, row: usize, how: How) {
+        let Some(folder) = self.folders.get(row).cloned() else {
+            return;
+        };
+        let place = |one: &Option<String>| {
+            let one = one.as_ref()?;
+            self.folders.iter().position(|folder| folder == one)
+        };
+        match how {
+            How::Only => self.chosen = BTreeSet::from([folder.clone()]),
+            How::Toggle => {
+                if !self.chosen.remove(&folder) {
+                    self.chosen.insert(folder.clone());
+                }
+            }
+            How::Extend => {
+                let from = place(&self.anchor).unwrap_or(row);
+                let rows = from.min(row)..=from.max(row);
+                self.chosen = self.folders[rows].iter().cloned().collect();
+            }
+        }
+        if how != How::Extend || self.anchor.is_none() {
+            self.anchor = Some(folder.clone());
+        }
+        self.at = Some(folder);
+    }
+
+    /// Draws the list; tells what is wanted of others.
+    pub fn ui(&mut self, ui: &mut Ui, sorted: (Order, bool)) -> Vec<Wanted> {
+        let heads = COLUMNS.map(|(head, width, is_number, order)| Head {
+            column: match is_number {
+                true => Column::numbers(head, width),
+                false => Column::words(head, width),
+            },
+            can_sort: order.is_some(),
+        });
+        let by = COLUMNS.iter().position(|column| column.3 == Some(sorted.0));
+        let at = self.at.as_ref();
+        let table = ChoiceTable {
+            name: "Sessions",
+            heads: &heads,
+            sorted: by.map(|by| (by, sorted.1)),
+            count: self.folders.len(),
+            at: at.and_then(|at| self.folders.iter().position(|folder| folder == at)),
+            line: &|index| {
+                let folder = &self.folders[index];
+                match self.entries.get(folder) {
+                    Some((entry, _)) => line(entry),
+                    None => unread(folder),
+                }
+            },
+            is_chosen: &|index| self.chosen.contains(&self.folders[index]),
+        };
+        let mut scrolled = self.scrolled;
+        let (acts, in_sight) = table.ui(ui, &mut scrolled);
+        self.scrolled = scrolled;
+        self.in_sight = in_sight;
+        let mut wanted = Vec::new();
+        for act in acts {
+            match act {
+                Act::Choose(row, how) => self.choose(row, how),
+                Act::All => self.chosen = self.folders.iter().cloned().collect(),
+                Act::Open => wanted.push(Wanted::Open),
+                Act::Sort(column) => wanted.extend(COLUMNS[column].3.map(Wanted::Sort)),
+            }
+        }
+        wanted
+    }
+}
+
+/// A row of which nothing is known yet.
+fn unread(folder: &str) -> Line {
+    let mut cells = vec![Cell::default(); COLUMNS.len()];
+    if let Some(last) = cells.last_mut() {
+        *last = Cell {
+            text: folder.to_owned(),
+            tone: Tone::Quiet,
+            mark: None,
+        };
+    }
+    Line {
+        name: format!("Session {folder}"),
+        cells,
+    }
+}
+
+/// In which state a session's files are, as far as the catalog looks: a shape, a word, and what is wrong.
+pub(super) fn health(entry: &Entry) -> (Mark, &'static str, Option<&str>) {
+    match (&entry.trouble, &entry.ending) {
+        (Some(trouble), _) => (Mark::Diamond, "damaged", Some(trouble)),
+        (None, None) => (Mark::Half, "unfinished", None),
+        (None, Some(_)) => (Mark::Disc, "whole", None),
+    }
+}
+
+/// What a session is worth, as a shape and a word.
+pub(super) fn verdict(entry: &Entry) -> (Mark, &'static str) {
+    match entry.verdict {
+        Some(Verdict::Valid) => (Mark::Tick, "valid"),
+        Some(Verdict::Suspect) => (Mark::Question, "suspect"),
+        Some(Verdict::Rejected) => (Mark::Cross, "rejected"),
+        None if entry.trouble.is_some() => (Mark::Dash, "unknown"),
+        None => (Mark::Dash, "none"),
+    }
+}
+
+/// What its review came to, as a shape and a word.
+pub(super) fn review(entry: &Entry) -> (Mark, &'static str) {
+    let review = ReviewIs::of(entry.review.as_ref());
+    let mark = match review {
+        ReviewIs::Given(Decision::Accepted) => Mark::Tick,
+        ReviewIs::Given(Decision::Rejected) => Mark::Cross,
+        ReviewIs::Given(Decision::Repeat) => Mark::Again,
+        ReviewIs::Outdated => Mark::Question,
+        ReviewIs::None => Mark::Dash,
+    };
+    match review {
+        ReviewIs::None if entry.trouble.is_some() => (mark, "unknown"),
+        review => (mark, review.word()),
+    }
+}
+
+/// To the second: `2026-03-05T14:15:07.000Z`.
+pub(super) fn second(at: &str) -> String {
+    at.get(..19).unwrap_or(at).replace('T', " ")
+}
+
+fn line(entry: &Entry) -> Line {
+    let or_dash = |text: &str| match one_line(text) {
+        text if text.is_empty() => "-".to_owned(),
+        text => text,
+    };
+    let started = second(&entry.started_at);
+    let (health_mark, health, trouble) = health(entry);
+    let ((verdict_mark, verdict), (review_mark, review)) = (verdict(entry), review(entry));
+    let tone = match trouble {
+        Some(_) => Tone::Alarm,
+        None => Tone::Plain,
+    };
+    let quiet = |word: &str| match word {
+        "none" | "unknown" => Tone::Quiet,
+        _ => Tone::Plain,
+    };
+    let why = trouble.map_or(String::new(), |why| format!(": {}", one_line(why)));
+    let name = format!(
+        "Session {}, {}, {}, {started}, verdict {verdict}, review {review}, {health}{why}, {}",
+        or_dash(&entry.specimen),
+        or_dash(&entry.protocol),
+        or_dash(&entry.operator),
+        one_line(&entry.folder)
+    );
+    let cells = vec![
+        Cell::text(started),
+        Cell::text(or_dash(&entry.specimen)),
+        Cell::marked(verdict_mark, verdict, quiet(verdict)),
+        Cell::marked(review_mark, review, quiet(review)),
+        Cell::marked(health_mark, health, tone),
+        Cell::text(or_dash(&entry.protocol)),
+        Cell::text(or_dash(&entry.operator)),
+        Cell::text(format!("{:.1} s", entry.duration_s)),
+        Cell::text(one_line(&entry.tags.join(", "))),
+        Cell {
+            tone: Tone::Quiet,
+            ..Cell::text(one_line(&entry.folder))
+        },
+    ];
+    Line { name, cells }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn found(folders: &[&str]) -> Found {
+        let entry = |folder: &&str| Entry {
+            folder: (*folder).to_owned(),
+            ..Entry::default()
+        };
+        Found {
+            folders: folders.iter().map(ToString::to_string).collect(),
+            first: folders.iter().take(2).map(entry).collect(),
+            ..Found::default()
+        }
+    }
+
+    #[test]
+    fn rows_are_chosen_one_several_and_from_to() {
+        let mut list = List::default();
+        list.take(&mut found(&["a", "b", "c", "d", "e"]));
+        list.choose(1, How::Only);
+        assert_eq!(list.chosen(), ["b"]);
+        list.choose(3, How::Extend);
+        assert_eq!(list.chosen(), ["b", "c", "d"]);
+        list.choose(0, How::Extend);
+        assert_eq!(list.chosen(), ["a", "b"]);
+        list.choose(4, How::Toggle);
+        list.choose(0, How::Toggle);
+        assert_eq!(list.chosen(), ["b", "e"]);
+        // Another search: what is gone is chosen no more, the rest stays, in the new order.
+        list.take(&mut found(&["e", "x", "b"]));
+        assert_eq!(list.chosen(), ["e", "b"]);
+        list.take(&mut found(&["e"]));
+        assert_eq!(list.chosen(), ["e"]);
+        assert_eq!(
+            list.only().map(|(entry, _)| entry.folder.as_str()),
+            Some("e")
+        );
+        list.choose(9, How::Only);
+        assert_eq!(list.chosen(), ["e"]);
+    }
+
+    #[test]
+    fn what_is_in_sight_and_old_is_asked_for() {
+        let mut list = List::default();
+        list.take(&mut found(&["a", "b", "c"]));
+        list.in_sight = 0..3;
+        assert_eq!(list.unknown(), ["c"]);
+        list.learn(found(&["c"]).first);
+        assert!(list.unknown().is_empty());
+        list.take(&mut found(&["a", "b", "c"]));
+        // What was known is shown until it was read again.
+        assert_eq!(list.unknown(), ["c"]);
+        assert!(list.entries.contains_key("c"));
+    }
+
+    #[test]
+    fn a_row_tells_its_state_in_words_and_shapes() {
+        let mut entry = Entry {
+            folder: "s/1".into(),
+            ending: Some("finish".into()),
+            verdict: Some(Verdict::Suspect),
+            ..Entry::default()
+        };
+        assert_eq!(health(&entry).1, "whole");
+        assert_eq!(verdict(&entry), (Mark::Question, "suspect"));
+        assert_eq!(review(&entry), (Mark::Dash, "none"));
+        entry.ending = None;
+        assert_eq!(health(&entry), (Mark::Half, "unfinished", None));
+        entry.trouble = Some("chunk 3 is\ndamaged".into());
+        entry.verdict = None;
+        let name = line(&entry).name;
+        assert!(
+            name.contains("verdict unknown, review unknown, damaged: chunk 3 is damaged"),
+            "{name}"
+        );
+    }
+}

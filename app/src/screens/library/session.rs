@@ -1,0 +1,243 @@
+//! What is known of the sessions chosen.
+
+use super::list::{health, review, second, verdict};
+use super::say::sentence;
+use crate::report::catalog::one_line;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{NAME_WIDTH, fact_ui, section_ui};
+use crate::widgets::mark::{self, Mark, mark_at};
+use crate::workers::find::Told;
+use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_sessions::catalog::{Entry, Origin, Source};
+use std::collections::BTreeSet;
+use std::path::Path;
+
+/// Values told of one kind at most.
+const VALUES: usize = 24;
+/// Names told of several sessions at most.
+const NAMES: usize = 6;
+/// Height of the history in points.
+const HISTORY: f32 = 150.0;
+
+fn name_ui(ui: &mut Ui, name: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.allocate_ui(vec2(NAME_WIDTH, 0.0), |ui| {
+        ui.set_min_width(NAME_WIDTH);
+        ui.label(RichText::new(name).color(tokens.text_quiet));
+    });
+}
+
+/// A fact with its shape before its word.
+fn marked_ui(ui: &mut Ui, name: &str, mark: Mark, word: &str, is_wrong: bool) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let ink = match is_wrong {
+        true => tokens.alarm_text,
+        false => tokens.text,
+    };
+    ui.horizontal_top(|ui| {
+        name_ui(ui, name);
+        let height = ui.text_style_height(&eframe::egui::TextStyle::Body);
+        let (place, _) = ui.allocate_exact_size(vec2(mark::WIDTH * 0.6, height), Sense::hover());
+        mark_at(ui.painter(), mark, place.center(), ink);
+        ui.add(Label::new(RichText::new(word).color(ink)).wrap());
+    });
+}
+
+/// Draws one session. `told` is what was said of it, once that was read.
+pub(super) fn session_ui(ui: &mut Ui, entry: &Entry, told: Option<&Result<Told, String>>) {
+    section_ui(ui, "Session");
+    let mut fact = |name: &str, value: &str| {
+        if !value.is_empty() {
+            fact_ui(ui, name, one_line(value));
+        }
+    };
+    fact("specimen", &entry.specimen);
+    fact("operator", &entry.operator);
+    let version = entry
+        .protocol_version
+        .map_or(String::new(), |it| format!(", version {it}"));
+    fact("protocol", &format!("{}{version}", entry.protocol));
+    fact("started", &format!("{} UTC", second(&entry.started_at)));
+    fact(
+        "length",
+        &format!("{:.1} s, {} samples", entry.duration_s, entry.samples),
+    );
+    fact("probe", &entry.indenter);
+    fact("rig", &entry.rig_identity);
+    fact("calibrated", &entry.calibration);
+    fact("load cell", &entry.cell);
+    fact(
+        "origin",
+        match entry.origin {
+            Origin::Recorded => "recorded here",
+            Origin::Imported => "imported from another program's file",
+            Origin::Recovered => "recovered from a damaged or interrupted one",
+        },
+    );
+    let ending = entry.ending.as_deref().unwrap_or_default();
+    let reason = match entry.reason.as_str() {
+        "" => ending.to_owned(),
+        reason => format!("{ending}: {reason}"),
+    };
+    fact("ending", &reason);
+    fact("folder", &entry.folder);
+    let (mark, word, trouble) = health(entry);
+    let word = trouble.map_or(word.to_owned(), |why| format!("{word}: {}", one_line(why)));
+    marked_ui(ui, "health", mark, &word, trouble.is_some());
+    let (mark, word) = verdict(entry);
+    marked_ui(
+        ui,
+        "verdict",
+        mark,
+        &why(word, &entry.verdict_reason),
+        false,
+    );
+    let (mark, word) = review(entry);
+    let reviewed = entry.review.as_ref().map_or(word.to_owned(), |review| {
+        let by = format!("{word}, by {}", review.by);
+        let changed = match review.changed.as_slice() {
+            [] => String::new(),
+            changed => format!("; changed since: {}", changed.join(", ")),
+        };
+        why(&by, &review.reason) + &changed
+    });
+    marked_ui(ui, "review", mark, &reviewed, false);
+    let tags = match entry.tags.as_slice() {
+        [] => "none".to_owned(),
+        tags => one_line(&tags.join(", ")),
+    };
+    fact_ui(ui, "tagged", tags);
+    let analyses: Vec<String> = entry
+        .analyses
+        .iter()
+        .map(|one| format!("{} '{}'", one.what, one_line(&one.name)))
+        .collect();
+    if !analyses.is_empty() {
+        fact_ui(ui, "analyses", analyses.join(", "));
+    }
+    told_ui(ui, told);
+    values_ui(ui, entry);
+}
+
+fn why(word: &str, reason: &str) -> String {
+    match reason {
+        "" => word.to_owned(),
+        reason => format!("{word}: {}", one_line(reason)),
+    }
+}
+
+fn told_ui(ui: &mut Ui, told: Option<&Result<Told, String>>) {
+    match told {
+        None => sentence(ui, "reading what was said of it", false),
+        Some(Err(err)) => sentence(ui, err, true),
+        Some(Ok(told)) => {
+            for note in &told.notes {
+                fact_ui(
+                    ui,
+                    "noted",
+                    format!("{} ({})", one_line(&note.reason), note.by),
+                );
+            }
+            if told.events.is_empty() {
+                return;
+            }
+            section_ui(ui, "History");
+            ScrollArea::vertical()
+                .id_salt("history")
+                .max_height(HISTORY)
+                .show(ui, |ui| {
+                    for event in &told.events {
+                        let words = format!(
+                            "{} {} {}: {}",
+                            second(&event.at),
+                            event.by,
+                            event.what,
+                            one_line(&event.sentence)
+                        );
+                        ui.add(Label::new(RichText::new(words).small()).wrap());
+                    }
+                });
+        }
+    }
+}
+
+fn values_ui(ui: &mut Ui, entry: &Entry) {
+    for (source, title) in [
+        (Source::About, "Told of it"),
+        (Source::Plan, "Protocol's values"),
+        (Source::Fit, "Saved fits"),
+    ] {
+        let values: Vec<_> = entry
+            .named
+            .iter()
+            .filter(|one| one.source == source)
+            .collect();
+        if values.is_empty() {
+            continue;
+        }
+        section_ui(ui, title);
+        for one in values.iter().take(VALUES) {
+            // A number that was converted has its unit in its text.
+            let text = match (one.number, source) {
+                (Some(_), Source::Fit) => format!("{} {}", one.text, one.unit),
+                _ => one.text.clone(),
+            };
+            ui.add(Label::new(one_line(&format!("{} {text}", one.name))).truncate());
+        }
+        if values.len() > VALUES {
+            sentence(ui, &format!("and {} more", values.len() - VALUES), false);
+        }
+    }
+}
+
+/// Draws several sessions: what they have in common. `count` are chosen.
+pub(super) fn several_ui<'a>(ui: &mut Ui, count: usize, entries: impl Iterator<Item = &'a Entry>) {
+    section_ui(ui, &format!("{count} sessions chosen"));
+    let entries: Vec<&Entry> = entries.collect();
+    if entries.len() < count {
+        return;
+    }
+    let names = |of: fn(&Entry) -> &str| {
+        let names: BTreeSet<&str> = entries.iter().map(|entry| of(entry)).collect();
+        let mut words: Vec<String> = names
+            .iter()
+            .take(NAMES)
+            .map(|name| one_line(name))
+            .collect();
+        if names.len() > NAMES {
+            words.push(format!("and {} more", names.len() - NAMES));
+        }
+        words.join(", ")
+    };
+    fact_ui(ui, "specimens", names(|entry| &entry.specimen));
+    fact_ui(ui, "operators", names(|entry| &entry.operator));
+    fact_ui(ui, "protocols", names(|entry| &entry.protocol));
+    fact_ui(ui, "verdicts", names(|entry| verdict(entry).1));
+    fact_ui(ui, "reviews", names(|entry| review(entry).1));
+    fact_ui(ui, "health", names(|entry| health(entry).1));
+    let of_all = entries.iter().skip(1).fold(
+        entries
+            .first()
+            .map_or(BTreeSet::new(), |one| one.tags.iter().collect()),
+        |common: BTreeSet<&String>, one| {
+            common
+                .into_iter()
+                .filter(|tag| one.tags.contains(tag))
+                .collect()
+        },
+    );
+    let tags: Vec<String> = of_all.into_iter().map(|tag| one_line(tag)).collect();
+    if !tags.is_empty() {
+        fact_ui(ui, "all tagged", tags.join(", "));
+    }
+}
+
+/// How a session is replayed: a matter of the command line.
+pub(super) fn replay_ui(ui: &mut Ui, folder: &Path) {
+    section_ui(ui, "Replay");
+    let line = format!("palpate replay \"{}\" --window", folder.display());
+    ui.add(Label::new(RichText::new(&line).monospace()).wrap());
+    if ui.button("Copy this line").clicked() {
+        ui.ctx().copy_text(line);
+    }
+}

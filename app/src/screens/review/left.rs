@@ -1,0 +1,205 @@
+//! The sessions shown, and how they are laid over each other.
+
+use super::{ReviewScreen, View};
+use crate::command::{Command, Commands};
+use crate::shell::rail::Screen;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::reason_button::reason_button;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::review::{Leader, Quantity, Stage};
+use eframe::egui::{Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
+use std::path::PathBuf;
+
+/// What was pressed at a session.
+enum Asked {
+    Front(usize),
+    Remove(usize),
+    Cancel(usize),
+    Again(usize),
+}
+
+/// The colour of a session.
+pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
+    tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
+}
+
+impl ReviewScreen {
+    pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        section_ui(ui, "Sessions shown");
+        self.sessions_ui(ui);
+        self.add_ui(ui);
+        if ui.button("Find sessions in the library").clicked() {
+            commands.push(Command::Show(Screen::Library));
+        }
+        section_ui(ui, "Time zero at");
+        for leader in Leader::ALL {
+            ui.radio_value(&mut self.leader, leader, leader.name());
+        }
+        self.leaders_missing_ui(ui);
+        section_ui(ui, "Over time");
+        for quantity in Quantity::ALL {
+            let mut is_shown = self.quantities.contains(&quantity);
+            if ui.checkbox(&mut is_shown, quantity.name()).changed() {
+                // In the order in which they always stand.
+                let wanted = |one: &Quantity| match *one == quantity {
+                    true => is_shown,
+                    false => self.quantities.contains(one),
+                };
+                self.quantities = Quantity::ALL.into_iter().filter(wanted).collect();
+            }
+        }
+        let has_fit = self.subjects.iter().any(|one| one.fitted().is_some());
+        ui.add_enabled_ui(has_fit, |ui| {
+            ui.checkbox(&mut self.has_residuals, "Residuals of the fit")
+        });
+        if !has_fit {
+            quiet_ui(ui, "no session shown has been fitted here yet");
+        }
+        section_ui(ui, "Fit");
+        let verdict = self.fit_verdict();
+        match task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
+            Some(Pressed::Start) => self.start_fits(ui.ctx()),
+            Some(Pressed::Cancel) => self.fits.cancel(),
+            None => {}
+        }
+        if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.standing()) {
+            alarm_ui(ui, reason);
+        }
+    }
+
+    fn sessions_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        if self.subjects.is_empty() {
+            quiet_ui(
+                ui,
+                "none yet: choose some in the library, or type the path of one",
+            );
+        }
+        let mut asked = None;
+        for (index, subject) in self.subjects.iter().enumerate() {
+            ui.horizontal(|ui| {
+                let (rect, _) = ui.allocate_exact_size(vec2(12.0, 12.0), Sense::hover());
+                ui.painter()
+                    .rect_filled(rect, 2.0, color_of(tokens, subject.id));
+                let mut name = RichText::new(&subject.name);
+                if index == 0 {
+                    name = name.strong();
+                }
+                ui.add(Label::new(name).truncate());
+            });
+            ui.horizontal(|ui| {
+                if index == 0 {
+                    quiet_ui(ui, "in front");
+                } else if ui
+                    .small_button(format!("front: {}", subject.name))
+                    .clicked()
+                {
+                    asked = Some(Asked::Front(index));
+                }
+            });
+            ui.horizontal(|ui| {
+                if ui
+                    .small_button(format!("remove: {}", subject.name))
+                    .clicked()
+                {
+                    asked = Some(Asked::Remove(index));
+                }
+            });
+            let recording = &subject.recording;
+            match &recording.stage {
+                Stage::Whole => {}
+                Stage::Waiting => quiet_ui(ui, "waits to be read"),
+                Stage::Reading => {
+                    let share = recording.share();
+                    let bar = ProgressBar::new(share as f32).desired_height(8.0);
+                    ui.add(bar.fill(tokens.text_quiet));
+                    ui.horizontal(|ui| {
+                        quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
+                        if ui
+                            .small_button(format!("cancel: {}", subject.name))
+                            .clicked()
+                        {
+                            asked = Some(Asked::Cancel(index));
+                        }
+                    });
+                }
+                Stage::Cancelled | Stage::Failed(_) => {
+                    match &recording.stage {
+                        Stage::Failed(reason) => alarm_ui(ui, reason),
+                        _ => quiet_ui(
+                            ui,
+                            &format!("only {:.0} % of it is read", 100.0 * recording.share()),
+                        ),
+                    }
+                    if ui
+                        .small_button(format!("read again: {}", subject.name))
+                        .clicked()
+                    {
+                        asked = Some(Asked::Again(index));
+                    }
+                }
+            }
+            ui.add_space(4.0);
+        }
+        match asked {
+            Some(Asked::Front(index)) => self.subjects[..=index].rotate_right(1),
+            Some(Asked::Remove(index)) => {
+                self.subjects.remove(index);
+            }
+            Some(Asked::Cancel(index)) => self.subjects[index].recording.cancel(),
+            Some(Asked::Again(index)) => self.subjects[index].read_again(),
+            None => {}
+        }
+    }
+
+    fn add_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal(|ui| {
+            let label = ui.label("session");
+            let input = TextEdit::singleline(&mut self.path).desired_width(200.0);
+            ui.add(input).labelled_by(label.id);
+        });
+        let verdict = match self.path.trim() {
+            "" => Err("type the path of a session's folder".to_owned()),
+            _ => Ok(()),
+        };
+        if reason_button(ui, "Show besides", vec2(0.0, 22.0), &verdict) {
+            let path = PathBuf::from(std::mem::take(&mut self.path).trim());
+            self.add(path, ui.ctx());
+        }
+    }
+
+    /// Which sessions have no such moment.
+    fn leaders_missing_ui(&self, ui: &mut Ui) {
+        for subject in &self.subjects {
+            if subject.is_settled() && subject.moment(self.leader).is_none() {
+                let words = format!(
+                    "{} has no {}; it lies at its start",
+                    subject.name,
+                    self.leader.name()
+                );
+                quiet_ui(ui, &words);
+            }
+        }
+    }
+
+    /// Draws the names of the views.
+    pub(super) fn views_ui(&mut self, ui: &mut Ui) {
+        for view in View::ALL {
+            ui.selectable_value(&mut self.view, view, view.name());
+        }
+    }
+}
+
+/// A remark.
+pub(super) fn quiet_ui(ui: &mut Ui, words: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let words = RichText::new(words).color(tokens.text_quiet).small();
+    ui.add(Label::new(words).wrap());
+}
+
+/// A sentence about what is wrong.
+pub(super) fn alarm_ui(ui: &mut Ui, words: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.add(Label::new(RichText::new(words).color(tokens.alarm_text)).wrap());
+}

@@ -1,0 +1,261 @@
+//! The plots: over time above each other, over depth, and the tables.
+
+use super::keys::Move;
+use super::left::{color_of, quiet_ui};
+use super::subject::{LINE_MODELLED, LINE_RESIDUAL, Subject};
+use super::{ReviewScreen, View};
+use crate::plots::navigate::Gesture;
+use crate::plots::over_depth::{self, Source, over_depth_ui};
+use crate::plots::over_time::{Layer, Moment, Panel, Setting, over_time_ui};
+use crate::theme::Tokens;
+use crate::workers::review::{Quantity, Recording};
+use eframe::egui::{Button, Label, RichText, Ui, vec2};
+
+/// Points that the axes beside and below a plot take of it.
+const AXIS_WIDTH: f32 = 58.0;
+const AXIS_HEIGHT: f32 = 34.0;
+
+impl ReviewScreen {
+    pub(super) fn draw_middle(&mut self, ui: &mut Ui) {
+        self.read_keys(ui.ctx());
+        ui.horizontal_wrapped(|ui| self.views_ui(ui));
+        if self.subjects.is_empty() {
+            quiet_ui(ui, "no session is shown; choose some in the library");
+            return;
+        }
+        match self.view {
+            View::OverTime => {
+                self.moves_ui(ui);
+                self.readout_ui(ui);
+                self.over_time_ui(ui);
+            }
+            View::OverDepth => {
+                self.moves_ui(ui);
+                self.readout_ui(ui);
+                self.over_depth_ui(ui);
+            }
+            View::Cycles => self.cycles_ui(ui),
+            View::Parameters => self.parameters_ui(ui),
+            View::Prediction => self.prediction_ui(ui),
+        }
+    }
+
+    /// Buttons for what the pointer and the keys can do.
+    pub(super) fn moves_ui(&mut self, ui: &mut Ui) {
+        ui.horizontal_wrapped(|ui| {
+            let mut asked = None;
+            for (text, key, to) in [
+                ("Zoom in", "+", Move::ZoomIn),
+                ("Zoom out", "-", Move::ZoomOut),
+                ("Back", "left arrow", Move::Back),
+                ("On", "right arrow", Move::On),
+                ("Everything", "Home", Move::All),
+                ("Cursor A", "A, or a click", Move::Cursor(0)),
+                ("Cursor B", "B, or a click with Shift", Move::Cursor(1)),
+                ("No cursors", "Delete", Move::NoCursors),
+            ] {
+                if ui.add(Button::new(text)).on_hover_text(key).clicked() {
+                    asked = Some(to);
+                }
+            }
+            if let Some(to) = asked {
+                self.go(to);
+            }
+        });
+        self.remarks_ui(ui);
+    }
+
+    /// What a reader of the plots must know.
+    fn remarks_ui(&self, ui: &mut Ui) {
+        for subject in &self.subjects {
+            if subject.recording.is_reading() {
+                let share = 100.0 * subject.recording.share();
+                quiet_ui(ui, &format!("{}: still reading {share:.0} %", subject.name));
+            }
+        }
+        let words = match self.view {
+            View::OverDepth => match (self.depth_lines.is_busy(), self.depth_lines.remark()) {
+                (true, _) => Some("finding the lines for this view".to_owned()),
+                (false, remark) => remark,
+            },
+            _ if self.thinned > 1 => {
+                Some(format!("thinned to min/max of {} samples", self.thinned))
+            }
+            _ => Some("every sample is drawn".to_owned()),
+        };
+        if let Some(words) = words {
+            quiet_ui(ui, &words);
+        }
+    }
+
+    /// The setting of the plots over time, as the session in front has it.
+    fn setting(&self, front: &Subject) -> Setting {
+        let shift = front.shift(self.leader);
+        let recording = &front.recording;
+        let end = recording.track.span().map_or(0.0, |span| span[1]);
+        let phases = Recording::ended(&recording.phases, end);
+        let mut setting = Setting {
+            phases: phases
+                .map(|(from, to, phase)| (from - shift, to - shift, phase))
+                .collect(),
+            cursors: self.cursors,
+            ..Setting::default()
+        };
+        if let Some(facts) = &recording.facts {
+            let left_out = facts.left_out_s.iter();
+            setting.left_out = left_out.map(|ends| ends.map(|end| end - shift)).collect();
+            let moments = facts.events.iter().filter_map(|event| {
+                Some(Moment {
+                    t: recording.track.time_of(event.after_sample)? - shift,
+                    is_alarm: event.is_alarm,
+                    is_note: event.is_note,
+                })
+            });
+            setting.moments = moments.collect();
+        }
+        setting
+    }
+
+    fn over_time_ui(&mut self, ui: &mut Ui) {
+        let has_residuals =
+            self.has_residuals && self.subjects.iter().any(|one| one.fitted().is_some());
+        let count = self.quantities.len() + usize::from(has_residuals);
+        if count == 0 {
+            quiet_ui(ui, "choose on the left what is shown");
+            return;
+        }
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let width = ui.available_width();
+        let scale = f64::from(ui.ctx().pixels_per_point());
+        let pixels = (f64::from((width - AXIS_WIDTH).max(64.0)) * scale).round();
+        let window = self.time.shown();
+        self.thinned = 1;
+        for subject in &mut self.subjects {
+            let wanted = subject.wanted(window, pixels, self.leader);
+            for quantity in &self.quantities {
+                subject.update(*quantity, wanted);
+                let drawn = subject.lines[*quantity as usize].drawn();
+                self.thinned = self.thinned.max(drawn.samples_per_column);
+            }
+            subject.update_fit(wanted);
+        }
+        let Some(front) = self.front() else {
+            return;
+        };
+        let setting = self.setting(front);
+        let time_axis = format!("time from {} (s)", self.leader.name());
+        let height = ((ui.available_height() - AXIS_HEIGHT) / count as f32).max(40.0);
+        let mut gestures = Vec::new();
+        for number in 0..count {
+            let quantity = self.quantities.get(number).copied();
+            let mut layers = Vec::new();
+            // The session in front is drawn last.
+            for subject in self.subjects.iter().rev() {
+                let place = quantity.map_or(LINE_RESIDUAL, |one| one as usize);
+                if quantity.is_none() && subject.fitted().is_none() {
+                    continue;
+                }
+                layers.push(Layer {
+                    name: &subject.name,
+                    color: color_of(tokens, subject.id),
+                    stretches: &subject.lines[place],
+                });
+            }
+            if quantity == Some(Quantity::Force) && front.fitted().is_some() {
+                layers.push(Layer {
+                    name: "fitted",
+                    color: tokens.limit,
+                    stretches: &front.lines[LINE_MODELLED],
+                });
+            }
+            let panel = Panel {
+                id: quantity.map_or("Residual", Quantity::name),
+                axis: quantity.map_or("residual (mN)", Quantity::axis),
+                layers,
+                has_zero: quantity.is_none(),
+            };
+            let is_last = number + 1 == count;
+            let own = height + if is_last { AXIS_HEIGHT } else { 0.0 };
+            ui.allocate_ui(vec2(width, own.min(ui.available_height())), |ui| {
+                let axis = is_last.then_some(time_axis.as_str());
+                gestures.push(over_time_ui(ui, &panel, &self.time, &setting, axis));
+            });
+        }
+        for gesture in gestures {
+            self.follow(&gesture);
+        }
+    }
+
+    /// Moves the time axis and the cursors as the pointer did.
+    fn follow(&mut self, gesture: &Gesture) {
+        if gesture.pan[0] != 0.0 {
+            self.time.pan(gesture.pan[0]);
+        }
+        if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
+            self.time.zoom(gesture.zoom, self.time.at(gesture.at[0]));
+        }
+        if gesture.is_double {
+            self.time.show_all();
+        } else if let Some(is_shift) = gesture.click {
+            self.cursors[usize::from(is_shift)] = Some(self.time.at(gesture.at[0]));
+        }
+    }
+
+    fn over_depth_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let sources: Vec<Source> = self
+            .subjects
+            .iter()
+            .map(|subject| Source {
+                track: subject.recording.track.clone(),
+                columns: [Quantity::Depth as usize, Quantity::Force as usize],
+                // While it is read the lines are found again for every fifth of it, not for every piece.
+                version: match subject.is_settled() {
+                    true => u64::MAX,
+                    false => (subject.recording.share() * 5.0) as u64,
+                },
+                id: subject.id,
+            })
+            .collect();
+        let spans = [&self.depth, &self.force];
+        self.depth_lines
+            .update(ui.ctx(), &sources, spans, self.depth_pixels);
+        let layers: Vec<over_depth::Layer<'_>> = self
+            .subjects
+            .iter()
+            .rev()
+            .map(|subject| over_depth::Layer {
+                name: &subject.name,
+                color: color_of(tokens, subject.id),
+                id: subject.id,
+                cursors: self.cursors.map(|cursor| {
+                    let track = &subject.recording.track;
+                    let place = track.place(cursor? + subject.shift(self.leader))?;
+                    let value = |quantity: Quantity| track.value(quantity as usize, place);
+                    Some([value(Quantity::Depth)?, value(Quantity::Force)?])
+                }),
+            })
+            .collect();
+        let (gesture, pixels) = over_depth_ui(ui, &self.depth_lines, &layers, spans);
+        self.depth_pixels = pixels;
+        for (axis, span) in [&mut self.depth, &mut self.force].into_iter().enumerate() {
+            if gesture.pan[axis] != 0.0 {
+                span.pan(gesture.pan[axis]);
+            }
+            if gesture.zoom != 1.0 && gesture.zoom > 0.0 {
+                span.zoom(gesture.zoom, span.at(gesture.at[axis]));
+            }
+            if gesture.is_double {
+                span.show_all();
+            }
+        }
+    }
+}
+
+/// A heading with a line of words below it.
+pub(super) fn head_ui(ui: &mut Ui, title: &str, words: &str) {
+    ui.label(RichText::new(title).heading().strong());
+    if !words.is_empty() {
+        ui.add(Label::new(words).wrap());
+    }
+}

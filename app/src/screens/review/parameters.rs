@@ -1,0 +1,110 @@
+//! The parameters of every session's fit in one table, with their intervals.
+
+use super::ReviewScreen;
+use super::left::{alarm_ui, quiet_ui};
+use super::middle::head_ui;
+use super::subject::Subject;
+use crate::report::text::{self, typeset};
+use crate::widgets::table::{Column, Row, table_ui};
+use eframe::egui::Ui;
+use palpate_model::fit::Parameter;
+
+/// A parameter of a session's fit, with numbers as they are.
+#[derive(Clone, Debug, PartialEq)]
+pub struct ParameterRow {
+    /// The session.
+    pub session: String,
+    /// The analysis that it was read by.
+    pub analysis: Option<String>,
+    /// What was indented.
+    pub specimen: String,
+    /// The parameter, its unit, error and 95 % interval.
+    pub parameter: Parameter,
+    /// Root mean square of what the fit leaves, in N.
+    pub rmse_n: f64,
+}
+
+/// Every parameter of every session that was fitted, session by session, those of one specimen together.
+#[must_use]
+pub fn parameter_rows(screen: &ReviewScreen) -> Vec<ParameterRow> {
+    let mut rows = Vec::new();
+    for (subject, specimen) in by_specimen(&screen.subjects) {
+        let Some(fit) = subject.fitted() else {
+            continue;
+        };
+        rows.extend(fit.report.parameters.iter().map(|parameter| ParameterRow {
+            session: subject.recording.name(),
+            analysis: subject.looked.analysis.clone(),
+            specimen: specimen.clone(),
+            parameter: parameter.clone(),
+            rmse_n: fit.report.rmse_n,
+        }));
+    }
+    rows
+}
+
+/// The sessions, those of one specimen together, in the order in which they stand.
+fn by_specimen(subjects: &[Subject]) -> Vec<(&Subject, String)> {
+    let specimen = |subject: &Subject| {
+        let head = subject.recording.head.as_ref();
+        head.map_or(String::new(), |head| {
+            head.manifest.specimen.trim().to_owned()
+        })
+    };
+    let mut all: Vec<(&Subject, String)> =
+        subjects.iter().map(|one| (one, specimen(one))).collect();
+    all.sort_by(|a, b| a.1.cmp(&b.1));
+    all
+}
+
+impl ReviewScreen {
+    pub(super) fn parameters_ui(&self, ui: &mut Ui) {
+        let words = "value and 95 % interval of each session's fit; sessions of one specimen stand together";
+        head_ui(ui, "Parameters", words);
+        let sorted = by_specimen(&self.subjects);
+        let first = sorted.iter().find_map(|(subject, _)| subject.fitted());
+        let Some(first) = first else {
+            quiet_ui(
+                ui,
+                "no session shown has been fitted here yet: press 'Fit the sessions shown'",
+            );
+            refusals_ui(ui, &self.subjects);
+            return;
+        };
+        let mut columns = vec![
+            Column::words("specimen", 90.0),
+            Column::words("session", 190.0),
+        ];
+        for parameter in &first.report.parameters {
+            let head = match parameter.unit.as_str() {
+                "" => parameter.name.clone(),
+                unit => format!("{} ({})", parameter.name, typeset(unit)),
+            };
+            columns.push(Column::numbers(&head, 230.0));
+        }
+        columns.push(Column::numbers("rmse (mN)", 80.0));
+        let rows: Vec<Row> = sorted
+            .iter()
+            .filter_map(|(subject, specimen)| {
+                let report = &subject.fitted()?.report;
+                let mut cells = vec![specimen.clone(), subject.name.clone()];
+                cells.extend(report.parameters.iter().map(text::cell));
+                cells.push(format!("{:.3}", report.rmse_n * 1e3));
+                Some(Row {
+                    cells,
+                    ..Row::default()
+                })
+            })
+            .collect();
+        refusals_ui(ui, &self.subjects);
+        table_ui(ui, "review_parameters", &columns, &rows);
+    }
+}
+
+fn refusals_ui(ui: &mut Ui, subjects: &[Subject]) {
+    for subject in subjects {
+        if let Some(Err(reason)) = &subject.fit {
+            alarm_ui(ui, &format!("{}: no fit: {reason}", subject.name));
+        }
+    }
+}

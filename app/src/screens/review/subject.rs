@@ -1,0 +1,177 @@
+//! One session of those shown: what was read of it, its fit, and the points drawn.
+
+use super::Looked;
+use crate::plots::stretches::{Stretches, Wanted};
+use crate::workers::review::fit::{self, SessionFit};
+use crate::workers::review::{Leader, Quantity, Recording, Stage};
+use eframe::egui::Context;
+use palpate_model::rig::Phase;
+use std::sync::Arc;
+
+/// A session that is shown.
+pub struct Subject {
+    /// Which, and how it is read.
+    pub looked: Looked,
+    /// Tells it from the others as long as it is shown; its colour follows from it.
+    pub id: u64,
+    /// What it is called.
+    pub name: String,
+    /// What was read of it.
+    pub recording: Recording,
+    /// Its fit, or why there is none; none before it was asked for.
+    pub fit: Option<Result<Arc<SessionFit>, String>>,
+    /// The points of each quantity, of the modelled force and of what is left.
+    pub lines: [Stretches; 6],
+    /// Lowest and highest of each quantity, found for so many samples.
+    ends: (u64, [Option<[f64; 2]>; 4]),
+}
+
+/// Places of the fit's lines behind those of the quantities.
+pub const LINE_MODELLED: usize = 4;
+/// What is left.
+pub const LINE_RESIDUAL: usize = 5;
+
+impl Subject {
+    /// A session that is still to be read.
+    #[must_use]
+    pub fn new(looked: Looked, id: u64) -> Self {
+        let recording = Recording::new(&looked.session, looked.analysis.as_deref());
+        Self {
+            name: recording.name(),
+            looked,
+            id,
+            recording,
+            fit: None,
+            lines: Default::default(),
+            ends: (0, [None; 4]),
+        }
+    }
+
+    /// Fetches what was read; a session that is to be read by another analysis begins anew.
+    pub fn poll(&mut self) {
+        if self.recording.analysis != self.looked.analysis {
+            let analysis = self.looked.analysis.as_deref();
+            let version = self.recording.version + 1;
+            self.recording = Recording::new(&self.looked.session, analysis);
+            self.recording.version = version;
+            self.fit = None;
+        }
+        let before = self.recording.version;
+        self.recording.poll();
+        if self.recording.version == before {
+            return;
+        }
+        self.name = self.recording.name();
+        if let Some(analysis) = &self.looked.analysis {
+            self.name = format!("{} as {analysis}", self.name);
+        }
+        let track = &self.recording.track;
+        let ends = Quantity::ALL.map(|quantity| {
+            let found = track.extremes(quantity as usize, 0, track.len())?;
+            Some([found[0].1, found[1].1])
+        });
+        self.ends = (self.recording.version, ends);
+    }
+
+    /// Begins to read it, if it waits for that.
+    pub fn begin(&mut self, ctx: &Context) -> bool {
+        let is_waiting = self.recording.stage == Stage::Waiting;
+        if is_waiting {
+            self.recording.start(ctx);
+        }
+        is_waiting && self.recording.is_reading()
+    }
+
+    /// Reads it again.
+    pub fn read_again(&mut self) {
+        let version = self.recording.version + 1;
+        let analysis = self.looked.analysis.as_deref();
+        self.recording = Recording::new(&self.looked.session, analysis);
+        self.recording.version = version;
+    }
+
+    /// Whether nothing more of it will come.
+    #[must_use]
+    pub fn is_settled(&self) -> bool {
+        !matches!(self.recording.stage, Stage::Waiting | Stage::Reading)
+    }
+
+    /// Takes a fit that was made of it.
+    pub fn set_fit(&mut self, fit: Result<Arc<SessionFit>, String>) {
+        self.fit = Some(fit);
+        self.recording.version += 1;
+    }
+
+    /// The fit, if there is one.
+    #[must_use]
+    pub fn fitted(&self) -> Option<&SessionFit> {
+        self.fit.as_ref()?.as_ref().ok().map(Arc::as_ref)
+    }
+
+    /// Lowest and highest value of a quantity.
+    #[must_use]
+    pub fn extremes(&self, quantity: Quantity) -> Option<[f64; 2]> {
+        self.ends.1[quantity as usize]
+    }
+
+    /// Time of the session that stands at zero; none where it has no such moment.
+    #[must_use]
+    pub fn moment(&self, leader: Leader) -> Option<f64> {
+        match leader {
+            Leader::Start => Some(0.0),
+            Leader::Contact => {
+                let facts = self.recording.facts.as_ref()?;
+                facts.contact_time(&self.recording.track)
+            }
+            Leader::Ramp => self.recording.phase_start(Phase::Ramp),
+        }
+    }
+
+    /// By how much it is laid earlier, in s.
+    #[must_use]
+    pub fn shift(&self, leader: Leader) -> f64 {
+        self.moment(leader).unwrap_or(0.0)
+    }
+
+    /// What a fit takes of it.
+    #[must_use]
+    pub fn for_fit(&self) -> fit::Subject {
+        let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
+        let first = begins.into_iter().flatten().reduce(f64::min);
+        fit::Subject {
+            path: self.looked.session.clone(),
+            analysis: self.looked.analysis.clone(),
+            ramp_t: first.unwrap_or(0.0),
+        }
+    }
+
+    /// Finds the points of a quantity again where something changed.
+    pub fn update(&mut self, quantity: Quantity, wanted: Wanted) {
+        let place = quantity as usize;
+        self.lines[place].update(&self.recording.track, place, wanted);
+    }
+
+    /// The same of its fit.
+    pub fn update_fit(&mut self, wanted: Wanted) {
+        let Some(Ok(fit)) = &self.fit else {
+            return;
+        };
+        for (line, column) in [
+            (LINE_MODELLED, fit::MODELLED),
+            (LINE_RESIDUAL, fit::RESIDUAL),
+        ] {
+            self.lines[line].update(&fit.track, column, wanted);
+        }
+    }
+
+    /// What a shown session wants of the plots.
+    #[must_use]
+    pub fn wanted(&self, window: [f64; 2], pixels: f64, leader: Leader) -> Wanted {
+        Wanted {
+            window,
+            pixels,
+            shift: self.shift(leader),
+            version: self.recording.version,
+        }
+    }
+}

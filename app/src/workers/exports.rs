@@ -1,0 +1,263 @@
+//! Sessions as tables and into lakes, as the command line and the window both write them.
+
+use super::task::Progress;
+use palpate_protocols::analysis::SourceError;
+use palpate_protocols::edited;
+use palpate_sessions::export::{Beside, ExportError, Feed, Format, Selection, Table};
+use palpate_sessions::lake::{self, Added, Told};
+use palpate_sessions::log::Summary;
+use palpate_sessions::manifest::Manifest;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::path::{Path, PathBuf};
+
+/// Nothing was written of a session.
+#[derive(Debug)]
+pub enum ExportFailure {
+    /// It cannot be read.
+    Source(SourceError),
+    /// It cannot be written.
+    Export(ExportError),
+}
+
+impl fmt::Display for ExportFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Source(err) => err.fmt(f),
+            Self::Export(err) => err.fmt(f),
+        }
+    }
+}
+
+impl From<SourceError> for ExportFailure {
+    fn from(err: SourceError) -> Self {
+        Self::Source(err)
+    }
+}
+
+impl From<ExportError> for ExportFailure {
+    fn from(err: ExportError) -> Self {
+        Self::Export(err)
+    }
+}
+
+/// What a session is written as.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// A table in this folder that takes the session folder's name.
+    Table(Format, PathBuf),
+    /// One message per sample in this new file.
+    Messages(PathBuf),
+}
+
+/// What was written.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Written {
+    /// The file.
+    pub path: PathBuf,
+    /// Rows or messages in it.
+    pub rows: u64,
+    /// What a user of the data must know.
+    pub notes: Vec<String>,
+}
+
+impl Target {
+    /// Writes a table whose rows `feed` hands out.
+    pub fn write(&self, session: &Path, table: &Table, feed: Feed) -> Result<Written, ExportError> {
+        let (path, rows) = match self {
+            Self::Messages(path) => (path.clone(), table.write_messages(path, feed)?),
+            Self::Table(format, folder) => {
+                let stem = stem(session, table.manifest);
+                let name = table.selection.file_name(&stem, format.ending());
+                let path = folder.join(name);
+                let rows = table.write(*format, &path, feed)?;
+                (path, rows)
+            }
+        };
+        Ok(Written {
+            path,
+            rows,
+            notes: table.notes.to_vec(),
+        })
+    }
+}
+
+/// Writes what is chosen of a session, its edits made; samples pass by and are never all in memory. `tell` hears of
+/// how many samples how many are done.
+pub fn export(
+    session: &Path,
+    selection: &Selection,
+    target: &Target,
+    tell: &mut dyn FnMut(u64, u64),
+) -> Result<Written, ExportFailure> {
+    let passing = edited::outline(session)?;
+    let table = Table {
+        manifest: &passing.outline.manifest,
+        notes: &passing.outline.notes,
+        beside: &Beside::default(),
+        selection,
+    };
+    let (mut done, of) = (0, passing.outline.samples);
+    let mut feed = |visit: &mut dyn FnMut(&[_])| {
+        passing.rows(session, &mut |rows| {
+            done += rows.len() as u64;
+            tell(done, of);
+            visit(rows);
+        })
+    };
+    Ok(target.write(session, &table, &mut feed)?)
+}
+
+/// A file takes the session folder's name.
+fn stem(session: &Path, manifest: &Manifest) -> String {
+    let whole = session.canonicalize().ok();
+    // A folder's name may have dots in it; the ending of a file's does not count.
+    let stem = whole.as_deref().and_then(|path| match path.is_dir() {
+        true => path.file_name(),
+        false => path.file_stem(),
+    });
+    stem.map_or_else(
+        || manifest.session_id.clone(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}
+
+/// Adds a session to a lake.
+pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
+    let passing = edited::outline(session)?;
+    let verdict = passing.edits.verdict();
+    let told = Told {
+        verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())),
+    };
+    let mut feed = |visit: &mut dyn FnMut(&[_])| passing.rows(session, visit);
+    Ok(lake::add(lake, &passing.outline, told, &mut feed)?)
+}
+
+/// The sessions and tables without those sessions whose recovered copy is among them, so that samples count once; then
+/// those left out. `is_session` tells which can be sessions at all.
+#[must_use]
+pub fn without_copied(
+    found: Vec<PathBuf>,
+    is_session: impl Fn(&Path) -> bool,
+) -> (Vec<PathBuf>, Vec<PathBuf>) {
+    let ids: Vec<Option<(String, Option<String>)>> = found
+        .iter()
+        .map(|path| {
+            let manifest = Summary::read(path)
+                .ok()
+                .filter(|_| is_session(path))?
+                .manifest;
+            Some((manifest.session_id, manifest.recovered.map(|it| it.from)))
+        })
+        .collect();
+    let copied: BTreeSet<&String> = ids
+        .iter()
+        .flatten()
+        .filter_map(|it| it.1.as_ref())
+        .collect();
+    let is_copied =
+        |one: &Option<(String, _)>| one.as_ref().is_some_and(|it| copied.contains(&it.0));
+    let (originals, rest): (Vec<_>, Vec<_>) = found
+        .into_iter()
+        .zip(&ids)
+        .partition(|(_, one)| is_copied(one));
+    let paths = |of: Vec<(PathBuf, _)>| of.into_iter().map(|(path, _)| path).collect();
+    (paths(rest), paths(originals))
+}
+
+/// Where sessions chosen in the window go.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Destination {
+    /// A table each.
+    Tables(Format, PathBuf),
+    /// All into this lake.
+    Lake(PathBuf),
+}
+
+/// What became of sessions chosen in the window.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Exported {
+    /// What was written and where, in one sentence.
+    pub sentence: String,
+    /// What was not, and why, a sentence each; and what a user of the data must know.
+    pub remarks: Vec<String>,
+}
+
+/// Writes every session, one after the other. A file that is there is never written over: it is told.
+pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &Progress) -> Exported {
+    let of = sessions.len();
+    let (sessions, copied) = match to {
+        Destination::Tables(..) => (sessions, Vec::new()),
+        Destination::Lake(_) => without_copied(sessions, |_| true),
+    };
+    let mut remarks: Vec<String> = copied
+        .iter()
+        .map(|path| format!("{}: left out, its recovered copy is chosen too", name(path)))
+        .collect();
+    if let Destination::Tables(_, folder) = to
+        && let Err(err) = std::fs::create_dir_all(folder)
+    {
+        let sentence = format!(
+            "{} cannot be made ({err}); nothing was written",
+            folder.display()
+        );
+        return Exported { sentence, remarks };
+    }
+    let (mut written, mut were_there) = (0, 0);
+    for (done, session) in sessions.iter().enumerate() {
+        if progress.tell(done, of, &name(session)).is_break() {
+            remarks.push(format!(
+                "cancelled: {} were not begun",
+                sessions.len() - done
+            ));
+            break;
+        }
+        let one = match to {
+            Destination::Lake(lake) => into_lake(lake, session).map(|added| {
+                were_there += usize::from(added.was_there);
+                Vec::new()
+            }),
+            Destination::Tables(format, folder) => {
+                let target = Target::Table(*format, folder.clone());
+                let mut tell = |rows, all| {
+                    let words = format!("{}: {rows} of {all} samples", name(session));
+                    // One session is written whole once it is begun.
+                    let _ = progress.tell(done, of, &words);
+                };
+                export(session, &Selection::default(), &target, &mut tell)
+                    .map(|written| written.notes)
+            }
+        };
+        match one {
+            Ok(notes) => {
+                written += 1;
+                remarks.extend(
+                    notes
+                        .iter()
+                        .map(|note| format!("{}: {note}", name(session))),
+                );
+            }
+            Err(err) => remarks.push(format!("{}: {err}", name(session))),
+        }
+    }
+    let sentence = match to {
+        Destination::Tables(format, folder) => format!(
+            "{written} of {of} sessions written as {} to {}",
+            format.ending(),
+            folder.display()
+        ),
+        Destination::Lake(lake) => format!(
+            "{} of {of} sessions added to {}, {were_there} were there",
+            written - were_there,
+            lake.display()
+        ),
+    };
+    Exported { sentence, remarks }
+}
+
+fn name(session: &Path) -> String {
+    session.file_name().map_or_else(
+        || session.display().to_string(),
+        |name| name.to_string_lossy().into_owned(),
+    )
+}

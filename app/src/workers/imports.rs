@@ -1,0 +1,199 @@
+//! Files of other programs made into sessions, as the command line and the window both do it.
+
+use super::task::Progress;
+use crate::report::imported;
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::import::{
+    Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
+};
+use palpate_sessions::{FolderError, Imported, Labels, library_folder};
+use palpate_sessions::{new_session_folder, new_session_id};
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fmt;
+use std::ops::ControlFlow;
+use std::path::{Path, PathBuf};
+
+/// No session was made.
+#[derive(Debug)]
+pub enum ImportFailure {
+    /// A file cannot be read or is not understood.
+    Foreign(ForeignError),
+    /// A session cannot be kept.
+    Keep(KeepError),
+    /// There is no library.
+    Library(FolderError),
+    /// A folder is there already or would be made twice.
+    Taken(PathBuf),
+    /// Nobody wants the rest.
+    Cancelled,
+}
+
+impl fmt::Display for ImportFailure {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Foreign(err) => err.fmt(f),
+            Self::Keep(err) => err.fmt(f),
+            Self::Library(err) => err.fmt(f),
+            Self::Taken(folder) => write!(
+                f,
+                "{} is there already or would be made twice; choose another folder with --into",
+                folder.display()
+            ),
+            Self::Cancelled => f.write_str("cancelled"),
+        }
+    }
+}
+
+/// Where sessions go, and what is told of them.
+#[derive(Clone, Debug, Default)]
+pub struct Request {
+    /// The files.
+    pub files: Vec<PathBuf>,
+    /// What is told of their layout; all else is detected.
+    pub told: Told,
+    /// Who, what, with which probe.
+    pub labels: Labels,
+    /// Folder for the new session folders, each named after its file.
+    pub into: Option<PathBuf>,
+    /// The library, where no folder is given; the user's own without it.
+    pub library: Option<PathBuf>,
+    /// Only tell how the files would be read.
+    pub is_dry_run: bool,
+}
+
+/// What was made of a file.
+#[derive(Debug, Serialize)]
+pub struct FileReport {
+    /// The file.
+    pub file: PathBuf,
+    /// Its parts: sheets, blocks, intervals.
+    pub parts: Vec<PartReport>,
+    /// What was left out of it, in sentences.
+    pub left_out: Vec<String>,
+}
+
+/// What was made of a part of a file.
+#[derive(Debug, Serialize)]
+pub struct PartReport {
+    /// The session; none of a dry run.
+    pub session: Option<PathBuf>,
+    /// Samples in it.
+    pub samples: usize,
+    /// From the first to the last of them, in s.
+    pub duration_s: f64,
+    /// How it was read.
+    #[serde(flatten)]
+    pub imported: Imported,
+}
+
+/// Makes sessions of files. `tell` hears how many of how many steps are done and which file is next, and may break it.
+pub fn import(
+    request: &Request,
+    tell: &mut dyn FnMut(usize, usize, &Path) -> ControlFlow<()>,
+) -> Result<Vec<FileReport>, ImportFailure> {
+    let read = |path: &PathBuf| open_foreign(path, &request.told).map_err(ImportFailure::Foreign);
+    // Every file is read before the first session is made: a refusal leaves nothing behind.
+    let of = request.files.len() * if request.is_dry_run { 1 } else { 2 };
+    let (mut taken, mut reports) = (BTreeSet::new(), Vec::new());
+    for (done, path) in request.files.iter().enumerate() {
+        if tell(done, of, path).is_break() {
+            return Err(ImportFailure::Cancelled);
+        }
+        let foreign = read(path)?;
+        check_folders(request.into.as_deref(), &foreign, &mut taken)?;
+        reports.push(told_of(path, foreign));
+    }
+    if !request.is_dry_run {
+        for (done, (path, file)) in request.files.iter().zip(&mut reports).enumerate() {
+            // Sessions that are made stay.
+            let _ = tell(request.files.len() + done, of, path);
+            let foreign = read(path)?;
+            for (part, told) in foreign.parts.iter().zip(&mut file.parts) {
+                told.session = Some(make(part, &foreign.bytes, request)?);
+            }
+        }
+    }
+    Ok(reports)
+}
+
+/// Refuses folders that are there already or would be made twice.
+fn check_folders(
+    into: Option<&Path>,
+    foreign: &Foreign,
+    taken: &mut BTreeSet<PathBuf>,
+) -> Result<(), ImportFailure> {
+    let Some(into) = into else { return Ok(()) };
+    for part in &foreign.parts {
+        let folder = into.join(folder_name(&part.imported));
+        if folder.exists() || !taken.insert(folder.clone()) {
+            return Err(ImportFailure::Taken(folder));
+        }
+    }
+    Ok(())
+}
+
+fn make(part: &ForeignPart, original: &[u8], request: &Request) -> Result<PathBuf, ImportFailure> {
+    let at = wall_now().into();
+    let session_id = new_session_id(at);
+    let folder = match (&request.into, &request.library) {
+        (Some(into), _) => into.join(folder_name(&part.imported)),
+        (None, Some(library)) => new_session_folder(library, &session_id),
+        (None, None) => {
+            let library = library_folder().map_err(ImportFailure::Library)?;
+            new_session_folder(&library, &session_id)
+        }
+    };
+    let kept = Kept {
+        folder: &folder,
+        original,
+        session_id,
+        at,
+        software_version: env!("CARGO_PKG_VERSION"),
+        labels: request.labels.clone(),
+    };
+    keep(part, kept).map_err(ImportFailure::Keep)?;
+    Ok(folder)
+}
+
+fn told_of(path: &Path, foreign: Foreign) -> FileReport {
+    let parts = foreign.parts.into_iter().map(|part| {
+        let ends = [part.samples.first(), part.samples.last()];
+        let [first, last] = ends.map(|one| one.map_or(0.0, |one| one.t));
+        PartReport {
+            session: None,
+            samples: part.samples.len(),
+            duration_s: last - first,
+            imported: part.imported,
+        }
+    });
+    FileReport {
+        file: path.into(),
+        parts: parts.collect(),
+        left_out: foreign.left_out,
+    }
+}
+
+/// What was made of a file, in lines.
+#[must_use]
+pub fn text(file: &FileReport) -> String {
+    let mut lines = vec![file.file.display().to_string()];
+    for part in &file.parts {
+        let rows = format!("{} over {:.3} s", part.samples, part.duration_s);
+        lines.extend(imported::lines(&part.imported, &rows));
+        lines.push(match &part.session {
+            Some(session) => format!("  session       {}", session.display()),
+            None => "  session       none made: a dry run".into(),
+        });
+    }
+    let left_out = file.left_out.iter();
+    lines.extend(left_out.map(|reason| format!("  left out      {reason}")));
+    lines.join("\n")
+}
+
+/// Makes sessions of files and tells what was made of each, in lines; for the window.
+pub fn import_and_tell(request: &Request, progress: &Progress) -> Result<Vec<String>, String> {
+    let mut tell = |done, of, path: &Path| progress.tell(done, of, &path.display().to_string());
+    let reports = import(request, &mut tell).map_err(|err| err.to_string())?;
+    Ok(reports.iter().map(text).collect())
+}

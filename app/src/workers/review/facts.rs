@@ -1,0 +1,220 @@
+//! What is known of a session besides its samples.
+
+use palpate_model::calibration::Calibration;
+use palpate_model::signal::track::Track;
+use palpate_protocols::analysed::Passing;
+use palpate_protocols::engine::{Effect, Record};
+use palpate_sessions::about::About;
+use palpate_sessions::analyses::{Input, inputs_of};
+use palpate_sessions::contacts::contacts;
+use palpate_sessions::edits::Verdict;
+use palpate_sessions::health::HealthSummary;
+use palpate_sessions::record::{EndRecord, Entry, EntryKind};
+use serde_json::Value;
+use std::path::Path;
+
+/// Something that happened.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Event {
+    /// Samples before it.
+    pub after_sample: usize,
+    /// What, in words.
+    pub text: String,
+    /// Whether it needs attention.
+    pub is_alarm: bool,
+    /// Whether a person wrote it.
+    pub is_note: bool,
+}
+
+/// Where sessions laid over each other have their time zero.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Leader {
+    /// The first sample.
+    #[default]
+    Start,
+    /// Where contact was found first.
+    Contact,
+    /// Where the first ramp begins.
+    Ramp,
+}
+
+impl Leader {
+    /// All, in the order in which they happen.
+    pub const ALL: [Self; 3] = [Self::Start, Self::Contact, Self::Ramp];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Start => "session start",
+            Self::Contact => "contact",
+            Self::Ramp => "ramp start",
+        }
+    }
+}
+
+/// What is known.
+#[derive(Clone, Debug)]
+pub struct Facts {
+    /// Who measured.
+    pub operator: String,
+    /// What was indented.
+    pub specimen: String,
+    /// The probe.
+    pub indenter: String,
+    /// What else was told.
+    pub about: About,
+    /// The protocol's name; empty where there is none.
+    pub protocol: String,
+    /// The rig's name; empty for an imported session.
+    pub rig: String,
+    /// The calibration that the forces are made with.
+    pub calibration: Option<Calibration>,
+    /// What it is worth and why.
+    pub verdict: Option<(Verdict, String)>,
+    /// How it ended.
+    pub end: Option<EndRecord>,
+    /// How the computer kept up.
+    pub health: HealthSummary,
+    /// What happened, in order; phases are told elsewhere.
+    pub events: Vec<Event>,
+    /// Samples before the first contact found.
+    pub contact: Option<usize>,
+    /// Stretches whose forces do not count: from and to in s since the first sample.
+    pub left_out_s: Vec<[f64; 2]>,
+    /// SHA-256 of each file it is made of.
+    pub hashes: Vec<Input>,
+    /// What a reader must know, one sentence each.
+    pub notes: Vec<String>,
+    /// Names of its analyses that count, each with what it is.
+    pub analyses: Vec<(String, &'static str)>,
+}
+
+impl Facts {
+    /// What a session that was read through says.
+    #[must_use]
+    pub fn of(path: &Path, passing: &Passing) -> Self {
+        let (outline, edits) = (&passing.edited.outline, &passing.edited.edits);
+        let manifest = &outline.manifest;
+        let mut notes = outline.notes.clone();
+        let hashes = inputs_of(path).unwrap_or_else(|err| {
+            notes.push(format!("its files cannot be told by their hashes: {err}"));
+            Vec::new()
+        });
+        let verdict = edits.verdict();
+        let first_contact = contacts(&outline.entries).first().copied();
+        Self {
+            operator: manifest.operator.clone(),
+            specimen: manifest.specimen.clone(),
+            indenter: manifest.indenter.clone(),
+            about: manifest.about.clone(),
+            protocol: manifest.plan["name"]
+                .as_str()
+                .unwrap_or_default()
+                .to_owned(),
+            rig: manifest
+                .rig
+                .as_ref()
+                .map_or(String::new(), |rig| rig.name.clone()),
+            calibration: serde_json::from_value(manifest.calibration.clone()).ok(),
+            verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.clone())),
+            end: outline.end.clone(),
+            health: outline.beside.health.clone(),
+            events: outline.entries.iter().filter_map(event).collect(),
+            contact: first_contact.map(|found| found.after_sample as usize),
+            left_out_s: passing.left_out_s.clone(),
+            hashes,
+            notes,
+            analyses: passing
+                .analyses
+                .counting()
+                .map(|one| (one.name.clone(), one.what.word()))
+                .collect(),
+        }
+    }
+
+    /// How the computer kept up, in one sentence, and whether it did.
+    #[must_use]
+    pub fn health_words(&self) -> (String, bool) {
+        let Some(worst) = &self.health.worst else {
+            return ("not measured".into(), true);
+        };
+        let missed = worst.missed_readings;
+        let late = worst.lateness_s * 1e3;
+        let is_well = missed == 0 && self.health.clock_jumps == 0;
+        let words = match (is_well, missed) {
+            (true, _) => format!("nothing missing, at most {late:.1} ms late"),
+            (false, 0) => format!("the wall clock was set {} times", self.health.clock_jumps),
+            (false, missed) => format!("{missed} readings missing, at most {late:.1} ms late"),
+        };
+        (words, is_well)
+    }
+
+    /// Time of a sample that something came before, in s; none without samples.
+    #[must_use]
+    pub fn contact_time(&self, track: &Track) -> Option<f64> {
+        track.time_of(self.contact?)
+    }
+}
+
+/// An entry in words; none for what stands elsewhere in the picture.
+fn event(entry: &Entry) -> Option<Event> {
+    let made = |text: String, is_alarm: bool, is_note: bool| {
+        Some(Event {
+            after_sample: usize::try_from(entry.after_sample).unwrap_or(usize::MAX),
+            text,
+            is_alarm,
+            is_note,
+        })
+    };
+    match entry.kind {
+        EntryKind::Fit => None,
+        EntryKind::Decision if entry.body["record"] == "noted" => {
+            made(words(&entry.body["text"]), false, true)
+        }
+        EntryKind::Decision => match serde_json::from_value(entry.body.clone()).ok()? {
+            Effect::Record(Record::PhaseStarted { .. }) => None,
+            Effect::Record(record) => {
+                let is_alarm = matches!(
+                    record,
+                    Record::InterlockTripped { .. } | Record::MonitorTripped { .. }
+                );
+                made(record.to_string(), is_alarm, false)
+            }
+            Effect::Finished(outcome) => made(
+                format!("{}: {}", outcome.ending, outcome.reason),
+                false,
+                false,
+            ),
+            Effect::Command(_) | Effect::ByHand(_) => None,
+        },
+        EntryKind::Input => {
+            let body = &entry.body;
+            match body["input"].as_str()? {
+                "operator" => made(
+                    format!("operator: {}", words(&body["choice"])),
+                    false,
+                    false,
+                ),
+                "fault" => made(format!("fault: {}", words(body)), true, false),
+                _ => None,
+            }
+        }
+    }
+}
+
+/// The words in what an entry says.
+fn words(value: &Value) -> String {
+    match value {
+        Value::String(text) => text.replace('_', " "),
+        Value::Object(fields) => {
+            let told = fields.iter().filter(|(key, _)| *key != "input");
+            told.map(|(_, value)| words(value))
+                .collect::<Vec<_>>()
+                .join(" ")
+        }
+        Value::Array(values) => values.iter().map(words).collect::<Vec<_>>().join(" "),
+        Value::Null => String::new(),
+        other => other.to_string(),
+    }
+}

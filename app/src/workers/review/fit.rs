@@ -1,0 +1,203 @@
+//! Fits of the sessions that are looked at, and what the fit of one foretells of another.
+
+use crate::workers::fit::Fitted;
+use crate::workers::task::Progress;
+use palpate_model::fit::{self, FitOptions, FitReport, FitSample, ProfileInterval};
+use palpate_model::signal::track::{SEGMENT, Segment, Track};
+use palpate_model::units::Newtons;
+use palpate_protocols::analysis::{Wanted, read_analysed};
+use std::path::PathBuf;
+use std::sync::Arc;
+
+/// Column of the modelled force in N.
+pub const MODELLED: usize = 0;
+/// Column of measured minus modelled force in mN; a gap where the force did not count.
+pub const RESIDUAL: usize = 1;
+
+/// Which session, how it is read, and when its ramp begins in s since its first sample.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Subject {
+    /// Its folder.
+    pub path: PathBuf,
+    /// The analysis it is read by.
+    pub analysis: Option<String>,
+    /// Time of the first sample that a fit takes.
+    pub ramp_t: f64,
+}
+
+/// A fit to look at.
+#[derive(Clone, Debug)]
+pub struct SessionFit {
+    /// What the fit found.
+    pub report: FitReport,
+    /// Intervals from the profile likelihood, or why there are none.
+    pub profile: Result<Vec<ProfileInterval>, String>,
+    /// Modelled force and residual over the session's time.
+    pub track: Track,
+    /// What the reader of the session remarked.
+    pub notes: Vec<String>,
+}
+
+/// What the fit of one session says of another.
+#[derive(Clone, Debug)]
+pub struct Prediction {
+    /// The fit of the first, its track over the second's time: the force foretold, and what is left.
+    pub fit: FitReport,
+    /// The force foretold and what is left of the measured one.
+    pub track: Track,
+    /// Root mean square of what is left, in N.
+    pub rms_n: f64,
+    /// The highest measured force in N.
+    pub peak_n: f64,
+    /// The highest force foretold in N.
+    pub predicted_peak_n: f64,
+    /// Samples compared.
+    pub samples: usize,
+}
+
+fn samples_of(subject: &Subject) -> Result<Fitted, String> {
+    let options = FitOptions::default();
+    // Whoever looks at a session sees its fit, whatever the session is worth.
+    let wanted = Wanted::whatever_it_is_worth();
+    let source = read_analysed(&subject.path, None, wanted, subject.analysis.as_deref())
+        .map_err(|err| err.to_string())?;
+    Ok(Fitted::of(source, &options).with_systematic(&options))
+}
+
+/// Modelled forces and what is left, from the time at which the ramp begins.
+fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
+    let mut track = Track::default();
+    for (samples, modelled) in samples.chunks(SEGMENT).zip(modelled.chunks(SEGMENT)) {
+        let left = samples
+            .iter()
+            .zip(modelled)
+            .map(|(one, fit)| match one.is_measured() {
+                true => ((one.force.0 - fit.0) * 1e3) as f32,
+                false => f32::NAN,
+            });
+        let columns = [
+            modelled.iter().map(|fit| fit.0 as f32).collect(),
+            left.collect(),
+        ];
+        let times = samples.iter().map(|one| ramp_t + one.t.0).collect();
+        track.push(Arc::new(Segment::new(times, &columns)));
+    }
+    track
+}
+
+/// Fits one session.
+pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
+    let fitted = samples_of(subject)?;
+    let report = fitted.result.map_err(|err| err.to_string())?;
+    let modelled = report.predict(&fitted.samples);
+    let options = FitOptions::default();
+    let profile = fit::Fitted::of(&fitted.samples, &options)
+        .and_then(|own| own.profile(0))
+        .map_err(|err| err.to_string());
+    Ok(SessionFit {
+        track: track_of(&fitted.samples, &modelled, subject.ramp_t),
+        report,
+        profile,
+        notes: fitted.notes,
+    })
+}
+
+/// What became of the fit of one session.
+pub type FitAnswer = (Subject, Result<Arc<SessionFit>, String>);
+
+/// Fits several, one after the other.
+pub fn fit_sessions(subjects: &[Subject], progress: &Progress) -> Result<Vec<FitAnswer>, String> {
+    let mut answers = Vec::with_capacity(subjects.len());
+    for (number, subject) in subjects.iter().enumerate() {
+        let name = subject.path.file_name().unwrap_or_default();
+        let what = name.to_string_lossy();
+        if progress.tell(number, subjects.len(), &what).is_break() {
+            return Err("cancelled".into());
+        }
+        answers.push((subject.clone(), fit_session(subject).map(Arc::new)));
+    }
+    Ok(answers)
+}
+
+/// Fits the first session and lays what its body would answer to the second's depths over the second.
+pub fn predict(pair: &[Subject; 2], progress: &Progress) -> Result<Prediction, String> {
+    let [known, other] = pair;
+    if progress.tell(0, 2, "fitting the first").is_break() {
+        return Err("cancelled".into());
+    }
+    let fit = samples_of(known)?.result.map_err(|err| err.to_string())?;
+    if progress.tell(1, 2, "foretelling the second").is_break() {
+        return Err("cancelled".into());
+    }
+    let samples = samples_of(other)?.samples;
+    let modelled = fit.predict(&samples);
+    let pairs = || {
+        samples
+            .iter()
+            .zip(&modelled)
+            .filter(|(one, _)| one.is_measured())
+    };
+    let count = pairs().count();
+    if count == 0 {
+        return Err("no force of the second session counts; there is nothing to compare".into());
+    }
+    let squares: f64 = pairs()
+        .map(|(one, fit)| (one.force.0 - fit.0).powi(2))
+        .sum();
+    let highest = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::NEG_INFINITY, f64::max);
+    Ok(Prediction {
+        track: track_of(&samples, &modelled, other.ramp_t),
+        rms_n: (squares / count as f64).sqrt(),
+        peak_n: highest(&mut pairs().map(|(one, _)| one.force.0)),
+        predicted_peak_n: highest(&mut pairs().map(|(_, fit)| fit.0)),
+        samples: count,
+        fit,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::path::Path;
+
+    fn recorded() -> Subject {
+        Subject {
+            path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab"),
+            analysis: None,
+            ramp_t: 3.0,
+        }
+    }
+
+    #[test]
+    fn what_is_left_is_what_the_report_says() {
+        let found = fit_session(&recorded()).unwrap();
+        let values: Vec<f32> = found
+            .track
+            .segments()
+            .iter()
+            .flat_map(|one| one.values(RESIDUAL).to_vec())
+            .collect();
+        let squares: f64 = values.iter().map(|one| f64::from(*one).powi(2)).sum();
+        let rms_n = (squares / values.len() as f64).sqrt() * 1e-3;
+        assert_eq!(values.len(), found.report.samples);
+        assert!((rms_n / found.report.rmse_n - 1.0).abs() < 1e-3, "{rms_n}");
+        assert!((found.track.span().unwrap()[0] - 3.0).abs() < 1e-9);
+        assert!(found.profile.unwrap().len() >= 5);
+    }
+
+    #[test]
+    fn a_session_foretells_itself_as_well_as_it_is_fitted() {
+        let pair = [recorded(), recorded()];
+        let found = predict(&pair, &Progress::default()).unwrap();
+        assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
+        assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
+        let gone = Subject {
+            path: "/nowhere/at-all".into(),
+            ..recorded()
+        };
+        let refused = predict(&[gone.clone(), recorded()], &Progress::default());
+        assert!(refused.unwrap_err().contains("/nowhere/at-all"));
+        let answers = fit_sessions(&[gone, recorded()], &Progress::default()).unwrap();
+        assert!(answers[0].1.is_err() && answers[1].1.is_ok());
+    }
+}

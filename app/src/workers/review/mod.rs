@@ -1,0 +1,294 @@
+//! Sessions as the review screen shows them: read block by block on a thread of their own, shown as they come.
+
+mod facts;
+pub mod fit;
+mod read;
+
+pub use facts::{Event, Facts, Leader};
+pub use read::read;
+
+use eframe::egui::Context;
+use palpate_model::rig::Phase;
+use palpate_model::signal::track::{Segment, Track};
+use palpate_sessions::log::Summary;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::mpsc::{Receiver, SyncSender, TryRecvError, sync_channel};
+
+/// A quantity of a session over time; its place is that of its column in a track.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum Quantity {
+    /// Force above tare.
+    Force,
+    /// Depth below contact.
+    Depth,
+    /// The raw signal of the load cell.
+    Volts,
+    /// Position from home.
+    Position,
+}
+
+impl Quantity {
+    /// All, in the order of the columns.
+    pub const ALL: [Self; 4] = [Self::Force, Self::Depth, Self::Volts, Self::Position];
+
+    /// Its name.
+    #[must_use]
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Force => "Force",
+            Self::Depth => "Depth",
+            Self::Volts => "Raw signal",
+            Self::Position => "Position",
+        }
+    }
+
+    /// What stands at its axis.
+    #[must_use]
+    pub const fn axis(self) -> &'static str {
+        match self {
+            Self::Force => "force above tare (N)",
+            Self::Depth => "depth from contact (mm)",
+            Self::Volts => "raw signal (V)",
+            Self::Position => "position from home (mm)",
+        }
+    }
+
+    /// Its unit.
+    #[must_use]
+    pub const fn unit(self) -> &'static str {
+        match self {
+            Self::Force => "N",
+            Self::Depth | Self::Position => "mm",
+            Self::Volts => "V",
+        }
+    }
+}
+
+/// Samples that have something in common, up to where the next ones begin.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stretch<T> {
+    /// Number of the first sample.
+    pub first: usize,
+    /// Its time in s since the first sample of the session.
+    pub t: f64,
+    /// What they have in common.
+    pub what: T,
+}
+
+/// What a reader tells while it reads.
+pub enum News {
+    /// What the first and the last chunk say.
+    Head(Box<Summary>),
+    /// The next samples.
+    Samples {
+        /// Those.
+        segment: Arc<Segment>,
+        /// Phases that begin in it.
+        phases: Vec<Stretch<Phase>>,
+        /// Cycles that begin in it; 0 is none.
+        cycles: Vec<Stretch<u32>>,
+    },
+    /// Everything was there, and this is what is known besides.
+    Whole(Box<Facts>),
+    /// The session cannot be read.
+    Failed(String),
+}
+
+/// How far a session is.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Stage {
+    /// Not begun.
+    Waiting,
+    /// Being read.
+    Reading,
+    /// All there.
+    Whole,
+    /// Not read to its end because somebody wanted it so.
+    Cancelled,
+    /// Cannot be read.
+    Failed(String),
+}
+
+/// A session as far as it has been read.
+pub struct Recording {
+    /// Its folder.
+    pub path: PathBuf,
+    /// The analysis it is read by.
+    pub analysis: Option<String>,
+    /// Every sample so far.
+    pub track: Track,
+    /// Phases so far.
+    pub phases: Vec<Stretch<Phase>>,
+    /// Cycles so far.
+    pub cycles: Vec<Stretch<u32>>,
+    /// What its ends say.
+    pub head: Option<Box<Summary>>,
+    /// What is known once all was read.
+    pub facts: Option<Box<Facts>>,
+    /// How far it is.
+    pub stage: Stage,
+    /// Raised with everything that came.
+    pub version: u64,
+    news: Option<Receiver<News>>,
+}
+
+/// Pieces that may wait for the window; the reader waits then.
+const QUEUE: usize = 64;
+
+impl Recording {
+    /// A session that is not yet read.
+    #[must_use]
+    pub fn new(path: &Path, analysis: Option<&str>) -> Self {
+        Self {
+            path: path.to_owned(),
+            analysis: analysis.map(str::to_owned),
+            track: Track::default(),
+            phases: Vec::new(),
+            cycles: Vec::new(),
+            head: None,
+            facts: None,
+            stage: Stage::Waiting,
+            version: 0,
+            news: None,
+        }
+    }
+
+    /// Begins to read.
+    pub fn start(&mut self, ctx: &Context) {
+        let (sender, receiver) = sync_channel(QUEUE);
+        let (path, analysis, wake) = (self.path.clone(), self.analysis.clone(), ctx.clone());
+        let work = move || {
+            let tell = |news| told(&sender, news, &wake);
+            if let Err(reason) = read(&path, analysis.as_deref(), &tell) {
+                let _ = tell(News::Failed(reason));
+            }
+        };
+        let started = std::thread::Builder::new()
+            .name("review-read".into())
+            .spawn(work);
+        match started {
+            Ok(_) => {
+                self.news = Some(receiver);
+                self.stage = Stage::Reading;
+            }
+            Err(err) => self.stage = Stage::Failed(format!("it cannot be read now: {err}")),
+        }
+    }
+
+    /// Fetches what has come.
+    pub fn poll(&mut self) {
+        let Some(news) = &self.news else {
+            return;
+        };
+        loop {
+            let piece = match news.try_recv() {
+                Ok(piece) => piece,
+                Err(TryRecvError::Empty) => return,
+                Err(TryRecvError::Disconnected) => {
+                    if self.stage == Stage::Reading {
+                        let gone = "reading ended unexpectedly; show the session again, and report it if it happens twice";
+                        self.stage = Stage::Failed(gone.into());
+                    }
+                    self.news = None;
+                    return;
+                }
+            };
+            self.version += 1;
+            match piece {
+                News::Head(head) => self.head = Some(head),
+                News::Samples {
+                    segment,
+                    phases,
+                    cycles,
+                } => {
+                    self.track.push(segment);
+                    self.phases.extend(phases);
+                    self.cycles.extend(cycles);
+                }
+                News::Whole(facts) => {
+                    self.facts = Some(facts);
+                    self.stage = Stage::Whole;
+                }
+                News::Failed(reason) => self.stage = Stage::Failed(reason),
+            }
+        }
+    }
+
+    /// Ends the reading; what has come stays.
+    pub fn cancel(&mut self) {
+        if matches!(self.stage, Stage::Reading | Stage::Waiting) {
+            self.news = None;
+            self.stage = Stage::Cancelled;
+        }
+    }
+
+    /// Whether it is being read.
+    #[must_use]
+    pub fn is_reading(&self) -> bool {
+        self.stage == Stage::Reading
+    }
+
+    /// Share of the samples that is there, 0 to 1.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        let all = self.head.as_ref().map_or(0, |head| head.samples);
+        match (&self.stage, all) {
+            (Stage::Whole, _) => 1.0,
+            (_, 0) => 0.0,
+            (_, all) => (self.track.len() as f64 / all as f64).min(1.0),
+        }
+    }
+
+    /// From the first sample to the last, though not all may be there yet, in s.
+    #[must_use]
+    pub fn span(&self) -> [f64; 2] {
+        let own = self.track.span().unwrap_or([0.0, 0.0]);
+        let expected = match (&self.stage, &self.head) {
+            (Stage::Reading, Some(head)) => head.last.seconds().0,
+            _ => 0.0,
+        };
+        [own[0], own[1].max(expected)]
+    }
+
+    /// What it is called: its session's name without what all names have.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let own = self
+            .head
+            .as_ref()
+            .map(|head| head.manifest.session_id.clone());
+        own.unwrap_or_else(|| {
+            let name = self.path.file_name().unwrap_or(self.path.as_os_str());
+            name.to_string_lossy().into_owned()
+        })
+    }
+
+    /// Time of the first sample of a phase; `None` without one.
+    #[must_use]
+    pub fn phase_start(&self, phase: Phase) -> Option<f64> {
+        let found = self.phases.iter().find(|one| one.what == phase);
+        found.map(|one| one.t)
+    }
+
+    /// Stretches with their ends, the last one up to what has come.
+    pub fn ended<T: Copy>(
+        stretches: &[Stretch<T>],
+        end: f64,
+    ) -> impl Iterator<Item = (f64, f64, T)> {
+        let ends = stretches.iter().skip(1).map(|next| next.t).chain([end]);
+        stretches
+            .iter()
+            .zip(ends)
+            .map(|(one, end)| (one.t, end, one.what))
+    }
+}
+
+/// Hands a piece over; false once nobody listens.
+fn told(sender: &SyncSender<News>, news: News, wake: &Context) -> bool {
+    let is_heard = sender.send(news).is_ok();
+    if is_heard {
+        wake.request_repaint();
+    }
+    is_heard
+}

@@ -1,0 +1,251 @@
+//! Reads a session through once, or twice where its edits or an analysis change its samples, and never holds
+//! more than one block of rows.
+//!
+//! What a sample costs in memory is told at [`Track`](palpate_model::signal::track::Track): 26.7 bytes for time,
+//! force, depth, signal and position, 267 MB for ten million samples.
+
+use super::facts::Facts;
+use super::{News, Quantity, Stretch};
+use palpate_model::rig::Phase;
+use palpate_model::signal::track::{SEGMENT, Segment};
+use palpate_protocols::analysed;
+use palpate_sessions::edits::{Change, Edits};
+use palpate_sessions::log::{Session, Summary};
+use palpate_sessions::manifest::Manifest;
+use palpate_sessions::record::Row;
+use std::cell::RefCell;
+use std::path::Path;
+use std::sync::Arc;
+
+/// Samples of the first piece: enough for a picture, and there at once.
+const FIRST: usize = 1 << 12;
+
+/// Reads a session as an analysis has it and tells what comes; `tell` says whether anybody listens still.
+pub fn read(
+    path: &Path,
+    analysis: Option<&str>,
+    tell: &dyn Fn(News) -> bool,
+) -> Result<(), String> {
+    let summary = Summary::read(path).map_err(|err| err.to_string())?;
+    let manifest = summary.manifest.clone();
+    let edits = Edits::read(path, &manifest.session_id).map_err(|err| err.to_string())?;
+    let is_moved = |change: &Change| matches!(change, Change::Contact { .. });
+    let is_as_recorded = analysis.is_none() && !edits.all.iter().any(|edit| is_moved(&edit.change));
+    if !tell(News::Head(Box::new(summary))) {
+        return Ok(());
+    }
+    let builder = RefCell::new(Builder::new(&manifest, tell));
+    let passing = if is_as_recorded {
+        let outline = Session::scan(path, &mut |block| {
+            let mut builder = builder.borrow_mut();
+            block.rows().for_each(|row| builder.take(&row));
+        })
+        .map_err(|err| err.to_string())?;
+        analysed::of_outline(path, outline, None)
+    } else {
+        analysed::passing(path, analysis)
+    };
+    let passing = passing.map_err(|err| err.to_string())?;
+    if !is_as_recorded {
+        let take = &mut |rows: &[Row]| rows.iter().for_each(|row| builder.borrow_mut().take(row));
+        passing.rows(path, take).map_err(|err| err.to_string())?;
+    }
+    let mut builder = builder.into_inner();
+    builder.hand_over();
+    if builder.is_heard {
+        tell(News::Whole(Box::new(Facts::of(path, &passing))));
+    }
+    Ok(())
+}
+
+/// Rows on their way into segments.
+struct Builder<'a> {
+    manifest: &'a Manifest,
+    tell: &'a dyn Fn(News) -> bool,
+    mm_per_pulse: f64,
+    first_tick: Option<u64>,
+    times: Vec<f64>,
+    columns: Vec<Vec<f32>>,
+    phases: Vec<Stretch<Phase>>,
+    cycles: Vec<Stretch<u32>>,
+    phase: Option<Phase>,
+    cycle: Option<u32>,
+    samples: usize,
+    /// When the samples are handed over.
+    room: usize,
+    is_heard: bool,
+}
+
+impl<'a> Builder<'a> {
+    fn new(manifest: &'a Manifest, tell: &'a dyn Fn(News) -> bool) -> Self {
+        Self {
+            manifest,
+            tell,
+            mm_per_pulse: manifest.rig.as_ref().map_or(0.0, |rig| rig.mm_per_pulse),
+            first_tick: None,
+            times: Vec::new(),
+            columns: vec![Vec::new(); Quantity::ALL.len()],
+            phases: Vec::new(),
+            cycles: Vec::new(),
+            phase: None,
+            cycle: None,
+            samples: 0,
+            room: FIRST,
+            is_heard: true,
+        }
+    }
+
+    fn take(&mut self, row: &Row) {
+        // Nobody wants the rest; what is read on the way to its end is thrown away.
+        if !self.is_heard {
+            return;
+        }
+        let first = *self.first_tick.get_or_insert(row.tick);
+        let t = self.manifest.time_of(row.tick.wrapping_sub(first) as i64).0;
+        let (number, gap) = (self.samples, f64::NAN);
+        if self.phase.replace(row.phase) != Some(row.phase) {
+            self.phases.push(Stretch {
+                first: number,
+                t,
+                what: row.phase,
+            });
+        }
+        if self.cycle.replace(row.cycle) != Some(row.cycle) {
+            self.cycles.push(Stretch {
+                first: number,
+                t,
+                what: row.cycle,
+            });
+        }
+        self.samples += 1;
+        self.times.push(t);
+        let position = row.pulses.map(|pulses| pulses as f64 * self.mm_per_pulse);
+        for (column, value) in self
+            .columns
+            .iter_mut()
+            .zip([row.force, row.depth, row.volts, position])
+        {
+            column.push(value.unwrap_or(gap) as f32);
+        }
+        if self.times.len() >= self.room {
+            self.hand_over();
+            self.room = SEGMENT;
+        }
+    }
+
+    fn hand_over(&mut self) {
+        if self.times.is_empty() {
+            return;
+        }
+        let times = std::mem::take(&mut self.times);
+        let segment = Arc::new(Segment::new(times, &self.columns));
+        self.columns.iter_mut().for_each(Vec::clear);
+        self.is_heard = (self.tell)(News::Samples {
+            segment,
+            phases: std::mem::take(&mut self.phases),
+            cycles: std::mem::take(&mut self.cycles),
+        });
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Recording;
+    use super::*;
+    use eframe::egui::Context;
+    use palpate_model::signal::track::Track;
+    use std::path::PathBuf;
+
+    fn recorded(name: &str) -> PathBuf {
+        Path::new(env!("CARGO_MANIFEST_DIR"))
+            .join("../tests/sessions")
+            .join(name)
+    }
+
+    #[test]
+    fn every_sample_of_a_session_arrives_as_it_was_recorded() {
+        let path = recorded("ramp-hold-lab");
+        let session = Session::open(&path).unwrap();
+        let news = RefCell::new(Vec::new());
+        read(&path, None, &|piece| {
+            news.borrow_mut().push(piece);
+            true
+        })
+        .unwrap();
+        let (mut track, mut phases) = (Track::default(), Vec::new());
+        let mut facts = None;
+        for piece in news.into_inner() {
+            match piece {
+                News::Samples {
+                    segment,
+                    phases: own,
+                    ..
+                } => {
+                    track.push(segment);
+                    phases.extend(own);
+                }
+                News::Whole(whole) => facts = Some(whole),
+                News::Head(head) => assert_eq!(head.samples, session.rows.len() as u64),
+                News::Failed(reason) => panic!("{reason}"),
+            }
+        }
+        assert_eq!(track.len(), session.rows.len());
+        let times = track.segments().iter().flat_map(|one| one.times().to_vec());
+        let own = |quantity: Quantity| {
+            let segments = track.segments().iter();
+            let values = segments.flat_map(|one| one.values(quantity as usize).to_vec());
+            values.collect::<Vec<f32>>()
+        };
+        let [force, depth, volts, position] = Quantity::ALL.map(own);
+        let rig = session.manifest.rig.as_ref().unwrap();
+        let same = |value: f32, row: Option<f64>| match row {
+            Some(row) => value == row as f32,
+            None => value.is_nan(),
+        };
+        for (index, (row, t)) in session.rows.iter().zip(times).enumerate() {
+            let ticks = (row.tick - session.rows[0].tick) as f64;
+            assert!((t - ticks * rig.tick().0).abs() < 1e-9);
+            assert!(same(force[index], row.force), "{index}");
+            assert!(same(depth[index], row.depth), "{index}");
+            assert!(same(volts[index], row.volts), "{index}");
+            let mm = row.pulses.map(|pulses| pulses as f64 * rig.mm_per_pulse);
+            assert!(same(position[index], mm), "{index}");
+            let phase = phases.iter().rev().find(|one| one.first <= index).unwrap();
+            assert_eq!(phase.what, row.phase);
+        }
+        let facts = facts.unwrap();
+        assert!(facts.contact.is_some() && facts.events.len() > 3);
+        assert!(facts.hashes.iter().any(|one| one.what.ends_with(".mcap")));
+    }
+
+    #[test]
+    fn what_cannot_be_read_says_why_and_what_nobody_wants_ends() {
+        let ctx = Context::default();
+        let finish = |recording: &mut Recording| {
+            for _ in 0..2000 {
+                recording.poll();
+                if !recording.is_reading() {
+                    return;
+                }
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+            panic!("it stayed busy");
+        };
+        let mut missing = Recording::new(Path::new("/nowhere/at-all"), None);
+        missing.start(&ctx);
+        finish(&mut missing);
+        assert!(
+            matches!(&missing.stage, super::super::Stage::Failed(reason) if reason.contains("/nowhere/at-all"))
+        );
+        let mut unknown = Recording::new(&recorded("ramp-hold-lab"), Some("no such"));
+        unknown.start(&ctx);
+        finish(&mut unknown);
+        assert!(
+            matches!(&unknown.stage, super::super::Stage::Failed(reason) if reason.contains("no such"))
+        );
+        let mut left = Recording::new(&recorded("ramp-hold-lab"), None);
+        left.start(&ctx);
+        left.cancel();
+        assert!(left.stage == super::super::Stage::Cancelled && left.share() < 1.0);
+    }
+}

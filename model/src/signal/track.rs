@@ -1,0 +1,364 @@
+//! Several quantities of one recording over time, for drawing: columns of samples in segments that are shared
+//! between the thread that reads and the one that draws.
+//!
+//! Memory: 8 bytes a sample for its time, and for each quantity 4 bytes for its value as an f32, which has the
+//! digits of a 24-bit converter, and 0.67 bytes for its [`Pyramid`].
+
+use super::pyramid::{Mark, Pyramid, column_for};
+use std::sync::Arc;
+
+/// Samples in a segment: as many as the log has in its largest block.
+pub const SEGMENT: usize = 1 << 16;
+
+/// Samples that follow each other: their times, and a pyramid for each quantity.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Segment {
+    times: Vec<f64>,
+    columns: Vec<Pyramid>,
+}
+
+impl Segment {
+    /// A segment of times in s, not decreasing, with as many values of each quantity; what is not a finite
+    /// number is a gap.
+    ///
+    /// # Panics
+    /// If a quantity has not as many values as there are times.
+    #[must_use]
+    pub fn new(times: Vec<f64>, columns: &[Vec<f32>]) -> Self {
+        let pyramid = |values: &Vec<f32>| {
+            assert_eq!(values.len(), times.len(), "a value for every time");
+            let mut pyramid = Pyramid::with_capacity(values.len());
+            pyramid.extend(values.iter().copied());
+            pyramid
+        };
+        let columns = columns.iter().map(pyramid).collect();
+        Self { times, columns }
+    }
+
+    /// Times in s.
+    #[must_use]
+    pub fn times(&self) -> &[f64] {
+        &self.times
+    }
+
+    /// The values of a quantity; empty where there is no such one.
+    #[must_use]
+    pub fn values(&self, quantity: usize) -> &[f32] {
+        self.columns.get(quantity).map_or(&[], Pyramid::values)
+    }
+
+    fn bytes(&self) -> usize {
+        let columns = self.columns.iter().map(Pyramid::bytes).sum::<usize>();
+        size_of_val(self.times.as_slice()) + columns
+    }
+}
+
+/// What was drawn of a track.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Drawn {
+    /// Points handed out.
+    pub points: usize,
+    /// The most samples that share a lowest and a highest one; 1 where every sample is drawn.
+    pub samples_per_column: usize,
+}
+
+/// A place on a track.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Place {
+    /// Number of the sample.
+    pub index: usize,
+    /// Its time in s.
+    pub t: f64,
+    segment: usize,
+    within: usize,
+}
+
+/// A recording as segments in order of time.
+#[derive(Clone, Debug, Default)]
+pub struct Track {
+    segments: Vec<Arc<Segment>>,
+    /// Samples before each segment.
+    before: Vec<usize>,
+    samples: usize,
+}
+
+impl Track {
+    /// Adds what follows; a segment without samples is none.
+    pub fn push(&mut self, segment: Arc<Segment>) {
+        if segment.times.is_empty() {
+            return;
+        }
+        self.before.push(self.samples);
+        self.samples += segment.times.len();
+        self.segments.push(segment);
+    }
+
+    /// How many samples there are.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.samples
+    }
+
+    /// Whether there are none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.samples == 0
+    }
+
+    /// Bytes of all samples and their pyramids.
+    #[must_use]
+    pub fn bytes(&self) -> usize {
+        self.segments.iter().map(|one| one.bytes()).sum()
+    }
+
+    /// The segments in order of time.
+    #[must_use]
+    pub fn segments(&self) -> &[Arc<Segment>] {
+        &self.segments
+    }
+
+    /// Times of the first and the last sample.
+    #[must_use]
+    pub fn span(&self) -> Option<[f64; 2]> {
+        let first = self.segments.first()?.times.first()?;
+        Some([*first, *self.segments.last()?.times.last()?])
+    }
+
+    /// Time of a sample; of the last one beyond the end.
+    #[must_use]
+    pub fn time_of(&self, index: usize) -> Option<f64> {
+        let index = index.min(self.samples.checked_sub(1)?);
+        let segment = self.before.partition_point(|before| *before <= index) - 1;
+        Some(self.segments[segment].times[index - self.before[segment]])
+    }
+
+    /// The last sample not after a time; the first one before all.
+    #[must_use]
+    pub fn place(&self, t: f64) -> Option<Place> {
+        let after = self.segments.partition_point(|one| one.times[0] <= t);
+        let segment = after.saturating_sub(1);
+        let times = &self.segments.get(segment)?.times;
+        let within = times.partition_point(|one| *one <= t).saturating_sub(1);
+        Some(Place {
+            index: self.before[segment] + within,
+            t: times[within],
+            segment,
+            within,
+        })
+    }
+
+    /// A quantity at a place; `None` in a gap.
+    #[must_use]
+    pub fn value(&self, quantity: usize, place: Place) -> Option<f64> {
+        let values = self.segments.get(place.segment)?.values(quantity);
+        let value = f64::from(*values.get(place.within)?);
+        value.is_finite().then_some(value)
+    }
+
+    /// The lowest and the highest value of a quantity between two samples, the second excluded, each with its
+    /// time; `None` without a number there.
+    #[must_use]
+    pub fn extremes(&self, quantity: usize, from: usize, to: usize) -> Option<[(f64, f64); 2]> {
+        let mut found: Option<[(f64, f64); 2]> = None;
+        for (segment, before) in self.segments.iter().zip(&self.before) {
+            let (from, to) = (from.saturating_sub(*before), to.saturating_sub(*before));
+            let Some(column) = segment.columns.get(quantity) else {
+                continue;
+            };
+            if from >= segment.times.len() || to == 0 {
+                continue;
+            }
+            let Some(ends) = column.extremes(from, to) else {
+                continue;
+            };
+            let [low, high] = ends.map(|(index, value)| (segment.times[index], f64::from(value)));
+            found = Some(match found {
+                None => [low, high],
+                Some([lowest, highest]) => [
+                    if low.1 < lowest.1 { low } else { lowest },
+                    if high.1 > highest.1 { high } else { highest },
+                ],
+            });
+        }
+        found
+    }
+
+    /// Draws a quantity between two times on so many pixels, one sample before and one behind included, so that
+    /// the line reaches the edges: at most two points a pixel, the lowest and the highest of every column in
+    /// order of time, and the first and the last sample of the track. `None` breaks the line.
+    ///
+    /// How wide a column is follows from each segment's own share of the pixels, so that a slow part of a
+    /// recording is not thinned for the sake of a fast one.
+    pub fn draw(
+        &self,
+        quantity: usize,
+        [from, to]: [f64; 2],
+        pixels: f64,
+        mut draw: impl FnMut(Option<[f64; 2]>),
+    ) -> Drawn {
+        let per_second = pixels / (to - from);
+        let mut pen = Pen {
+            draw: &mut draw,
+            newest: None,
+            drawn: Drawn::default(),
+        };
+        if self.segments.is_empty() || !(per_second.is_finite() && per_second > 0.0) {
+            return pen.drawn;
+        }
+        let first_shown = self.place(from).map_or(0, |place| place.segment);
+        for number in first_shown..self.segments.len() {
+            let (segment, before) = (&self.segments[number], self.before[number]);
+            let times = &segment.times;
+            let Some(column) = segment.columns.get(quantity) else {
+                break;
+            };
+            let count = times.len();
+            let start = times.partition_point(|t| *t < from).saturating_sub(1);
+            let end = (times.partition_point(|t| *t <= to) + 1).min(count);
+            // To the next segment, or this one would be narrower than it is.
+            let next = self.segments.get(number + 1);
+            let until = next.map_or(times[count - 1], |next| next.times[0]);
+            let size = column_for(count, (until - times[0]) * per_second);
+            pen.drawn.samples_per_column = pen.drawn.samples_per_column.max(size.min(count));
+            let values = column.values();
+            // The ends of the recording stay where they are.
+            if number == 0 && start == 0 && values[0].is_finite() {
+                pen.point(0, times[0], values[0]);
+            }
+            column.draw(start, end, size, |mark| match mark {
+                Mark::Point(index, value) => pen.point(before + index, times[index], value),
+                Mark::Gap => pen.gap(),
+            });
+            if next.is_none() && end == count && values[count - 1].is_finite() {
+                pen.point(before + count - 1, times[count - 1], values[count - 1]);
+            }
+            if times[count - 1] > to {
+                break;
+            }
+        }
+        pen.drawn
+    }
+}
+
+/// Hands out points, each once.
+struct Pen<'a, F> {
+    draw: &'a mut F,
+    newest: Option<usize>,
+    drawn: Drawn,
+}
+
+impl<F: FnMut(Option<[f64; 2]>)> Pen<'_, F> {
+    fn point(&mut self, index: usize, t: f64, value: f32) {
+        if self.newest.is_none_or(|newest| newest < index) {
+            self.newest = Some(index);
+            self.drawn.points += 1;
+            (self.draw)(Some([t, f64::from(value)]));
+        }
+    }
+
+    fn gap(&mut self) {
+        (self.draw)(None);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::SplitMix;
+
+    /// Segments of any length at a rate that changes, with gaps; the raw samples beside them.
+    fn track(random: &mut SplitMix, segments: usize) -> (Track, Vec<(f64, f32)>) {
+        let (mut track, mut raw, mut t) = (Track::default(), Vec::new(), 0.0);
+        for _ in 0..segments {
+            let count = 1 + random.below(3000);
+            let step = [1e-3, 0.05, 1.0][random.below(3)];
+            let mut times = Vec::new();
+            let mut values = Vec::new();
+            for _ in 0..count {
+                times.push(t);
+                values.push(match random.below(200) {
+                    0 => f32::NAN,
+                    _ => random.normal() as f32,
+                });
+                t += step;
+            }
+            raw.extend(times.iter().copied().zip(values.iter().copied()));
+            track.push(Arc::new(Segment::new(times, &[values])));
+        }
+        (track, raw)
+    }
+
+    #[test]
+    fn a_window_shows_the_extremes_of_what_is_in_it_and_keeps_the_ends() {
+        let mut random = SplitMix::seeded(21);
+        for _ in 0..60 {
+            let count = 1 + random.below(8);
+            let (track, raw) = track(&mut random, count);
+            let [start, end] = track.span().unwrap();
+            assert_eq!((start, track.len()), (raw[0].0, raw.len()));
+            let share = |random: &mut SplitMix| random.below(1000) as f64 / 999.0;
+            let (a, b) = (share(&mut random), share(&mut random));
+            let window = [a.min(b), a.max(b) + 0.01].map(|one| start + one * (end - start + 1e-3));
+            let mut points = Vec::new();
+            let drawn = track.draw(0, window, 500.0, |point| points.extend(point));
+            assert_eq!(drawn.points, points.len());
+            assert!(points.windows(2).all(|pair| pair[0][0] <= pair[1][0]));
+            // Segments that are narrower than a pixel have two points each.
+            assert!(drawn.points <= 2 * (500 + 3 * count), "{}", drawn.points);
+            let is_in = |t: f64| (window[0]..=window[1]).contains(&t);
+            let inside = raw.iter().filter(|one| is_in(one.0) && one.1.is_finite());
+            let high = inside.clone().map(|one| f64::from(one.1)).reduce(f64::max);
+            let low = inside.clone().map(|one| f64::from(one.1)).reduce(f64::min);
+            // Columns at the edges may reach beyond: what is shown is at least what is there.
+            let shown = points.iter().map(|point| point[1]);
+            assert!(shown.clone().reduce(f64::max) >= high);
+            assert!(shown.reduce(f64::min) <= low || low.is_none());
+            let whole = [start, end.max(start + 1e-3)];
+            let mut all = Vec::new();
+            track.draw(0, whole, 500.0, |point| all.extend(point));
+            let finite = |one: &&(f64, f32)| one.1.is_finite();
+            for (place, edge) in [(0, raw.first()), (all.len().saturating_sub(1), raw.last())] {
+                let Some((t, value)) = edge.filter(finite) else {
+                    continue;
+                };
+                assert_eq!(all[place], [*t, f64::from(*value)]);
+            }
+        }
+    }
+
+    #[test]
+    fn places_and_extremes_are_those_of_the_samples() {
+        let mut random = SplitMix::seeded(22);
+        let (track, raw) = track(&mut random, 7);
+        let end = track.span().unwrap()[1];
+        for _ in 0..500 {
+            let t = end * (random.below(1200) as f64 / 1000.0 - 0.1);
+            let expected = raw.partition_point(|one| one.0 <= t).saturating_sub(1);
+            let place = track.place(t).unwrap();
+            assert_eq!((place.index, place.t), (expected, raw[expected].0));
+            assert_eq!(track.time_of(expected), Some(raw[expected].0));
+            let value = track.value(0, place);
+            let known = Some(f64::from(raw[expected].1)).filter(|one| one.is_finite());
+            assert_eq!(value, known);
+            let (a, b) = (random.below(raw.len()), random.below(raw.len()));
+            let (from, to) = (a.min(b), a.max(b));
+            let own = raw[from..to].iter().filter(|one| one.1.is_finite());
+            let high = own.map(|one| f64::from(one.1)).reduce(f64::max);
+            assert_eq!(track.extremes(0, from, to).map(|ends| ends[1].1), high);
+        }
+        assert_eq!(Track::default().place(1.0), None);
+        assert_eq!(track.time_of(usize::MAX), Some(end));
+        assert_eq!(track.extremes(3, 0, 10), None);
+    }
+
+    #[test]
+    fn memory_is_as_stated() {
+        let count = 1 << 16;
+        let times = (0..count).map(f64::from).collect();
+        let mut track = Track::default();
+        let values = vec![1.0f32; count as usize];
+        track.push(Arc::new(Segment::new(times, &vec![values; 4])));
+        let per_sample = track.bytes() as f64 / f64::from(count);
+        assert!((26.6..26.7).contains(&per_sample), "{per_sample}");
+    }
+}

@@ -1,0 +1,132 @@
+//! A query as people type it: days, and one line of words and conditions.
+
+use super::condition::{Condition, ConditionError, is_sign};
+use chrono::{DateTime, Days, NaiveDate, NaiveTime, Utc};
+use palpate_model::quantity::base_unit;
+use thiserror::Error;
+
+/// Something is no day.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum DayError {
+    /// Neither a day nor a time.
+    #[error("write a day like 2026-03-05, or a time like 2026-03-05T14:15:00Z")]
+    Form,
+    /// There is no day after it.
+    #[error("no day can be that late")]
+    Late,
+}
+
+/// A day, or a time; and whether it is a day.
+fn moment(text: &str) -> Result<(DateTime<Utc>, bool), DayError> {
+    let day = text.parse::<NaiveDate>();
+    let day = day.map(|day| (day.and_time(NaiveTime::MIN).and_utc(), true));
+    let time = DateTime::parse_from_rfc3339(text).map(|time| (time.to_utc(), false));
+    day.or(time).map_err(|_| DayError::Form)
+}
+
+/// The first moment of a day of UTC, or a time.
+pub fn beginning(text: &str) -> Result<DateTime<Utc>, DayError> {
+    moment(text).map(|(at, _)| at)
+}
+
+/// The first moment after a day of UTC, or a time: the first that does not count any more.
+pub fn ending(text: &str) -> Result<DateTime<Utc>, DayError> {
+    let (at, is_day) = moment(text)?;
+    let next = at.checked_add_days(Days::new(u64::from(is_day)));
+    next.ok_or(DayError::Late)
+}
+
+/// One line of words and conditions, in any order: `pig depth>=2cm "specimen.source=pig stomach"`.
+///
+/// What has a sign of comparison in it is a condition; a sign may stand alone between spaces, and a unit after its number.
+/// Quotes keep together what has spaces in it.
+pub fn words_and_conditions(line: &str) -> Result<(String, Vec<Condition>), ConditionError> {
+    let mut pieces: Vec<String> = Vec::new();
+    for piece in unquoted(line) {
+        let is_unit = base_unit(&piece).is_some();
+        let joins = pieces.last().is_some_and(|before| {
+            let has_open_end = before.ends_with(is_sign);
+            let has_bare_number = before
+                .rsplit(is_sign)
+                .next()
+                .is_some_and(|value| before.contains(is_sign) && value.parse::<f64>().is_ok());
+            has_open_end
+                || piece.starts_with(is_sign)
+                || piece.starts_with("!=")
+                || (is_unit && has_bare_number)
+        });
+        match pieces.last_mut().filter(|_| joins) {
+            Some(before) => before.push_str(&piece),
+            None => pieces.push(piece),
+        }
+    }
+    let (conditions, words): (Vec<String>, Vec<String>) = pieces
+        .into_iter()
+        .partition(|piece| piece.contains(is_sign));
+    let conditions = conditions.iter().map(|piece| piece.parse());
+    Ok((words.join(" "), conditions.collect::<Result<_, _>>()?))
+}
+
+/// The pieces of a line between spaces; within quotes spaces part nothing.
+fn unquoted(line: &str) -> Vec<String> {
+    let (mut pieces, mut piece, mut is_within) = (Vec::new(), String::new(), false);
+    for letter in line.chars() {
+        match letter {
+            '"' => is_within = !is_within,
+            letter if letter.is_whitespace() && !is_within => {
+                pieces.push(std::mem::take(&mut piece));
+            }
+            letter => piece.push(letter),
+        }
+    }
+    pieces.push(piece);
+    pieces.retain(|piece| !piece.is_empty());
+    pieces
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_last_day_counts_whole_and_a_time_to_the_second() {
+        let text = |at: Result<DateTime<Utc>, DayError>| at.map(|at| at.to_rfc3339());
+        let day = |text: &str| Ok(format!("{text}T00:00:00+00:00"));
+        assert_eq!(text(beginning("2026-03-05")), day("2026-03-05"));
+        assert_eq!(text(ending("2026-02-28")), day("2026-03-01"));
+        let time = "2026-03-05T14:15:00+01:00";
+        assert_eq!(text(ending(time)), Ok("2026-03-05T13:15:00+00:00".into()));
+        for none in ["yesterday", "2026-02-30", "", "5.3.2026"] {
+            assert_eq!(beginning(none), Err(DayError::Form), "{none}");
+        }
+        assert_eq!(ending("+262142-12-31"), Err(DayError::Late));
+    }
+
+    #[test]
+    fn words_and_conditions_stand_in_one_line() {
+        for (line, words, conditions) in [
+            ("", "", &[][..]),
+            ("  pig   fund ", "pig fund", &[]),
+            ("pig depth>=2cm fund", "pig fund", &["depth>=2cm"]),
+            ("depth >= 20 mm pig", "pig", &["depth>=20mm"]),
+            ("depth>= 20 depth <30", "", &["depth>=20", "depth<30"]),
+            ("depth=20 Ada", "Ada", &["depth=20"]),
+            ("mode != slow", "", &["mode!=slow"]),
+            ("\"stomach 7\" good!", "stomach 7 good!", &[]),
+            (
+                "\"specimen.source=pig stomach\"",
+                "",
+                &["specimen.source=pig stomach"],
+            ),
+        ] {
+            let wanted: Vec<Condition> =
+                conditions.iter().map(|one| one.parse().unwrap()).collect();
+            let read = words_and_conditions(line).unwrap();
+            assert_eq!(read, (words.to_owned(), wanted), "{line}");
+        }
+        for line in ["pig >=", "depth=", "= 3", "depth_mm>2cm"] {
+            assert!(words_and_conditions(line).is_err(), "{line}");
+        }
+    }
+}

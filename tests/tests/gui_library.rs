@@ -1,0 +1,267 @@
+//! The library's screen: found, chosen, looked at, spoken of, taken back, written out.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use eframe::egui::{Key, Modifiers, Role};
+use egui_kittest::kittest::Queryable;
+use palpate_protocols::edited;
+use palpate_protocols::runner::TimeScale;
+use palpate_sessions::edits::{Change, Edits, Verdict};
+use palpate_tests::flow::{Flow, Window};
+use palpate_tests::many::{original, write};
+use std::fs;
+use std::path::{Path, PathBuf};
+use tempfile::TempDir;
+
+/// Sessions in the library of these tests.
+const SESSIONS: usize = 24;
+
+/// A library, the folder of each of its sessions, and the window on its library screen.
+fn opened() -> (Flow, Vec<PathBuf>) {
+    let folder = TempDir::new().unwrap();
+    let original = original();
+    let sessions = (0..SESSIONS).map(|number| write(folder.path(), &original, number));
+    let sessions = sessions.collect();
+    let mut flow = Flow::open_in(folder, TimeScale::Max);
+    flow.window
+        .key_press_modifiers(Modifiers::COMMAND, Key::Num4);
+    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    (flow, sessions)
+}
+
+/// Waits until the window says so.
+fn says(flow: &mut Flow, words: &str) {
+    let is_said = |window: &Window| window.query_all_by_label_contains(words).next().is_some();
+    flow.wait(words, is_said);
+    flow.window.run_steps(2);
+}
+
+/// The row of a session, by its number.
+fn row(number: usize) -> String {
+    format!("20260101T000000Z-{number:08x}")
+}
+
+fn click_row(flow: &mut Flow, number: usize, modifiers: Modifiers) {
+    let name = row(number);
+    let row = flow.window.get_by_label_contains(&name);
+    match modifiers {
+        Modifiers::NONE => row.click(),
+        held => row.click_modifiers(held),
+    }
+    flow.window.run_steps(3);
+}
+
+/// Takes a name from a list that is open.
+fn pick(flow: &mut Flow, name: &str) {
+    let button = flow.window.get_by_role_and_label(Role::Button, name);
+    button.click_accesskit();
+    flow.window.run_steps(2);
+}
+
+fn edits(session: &Path) -> Edits {
+    let id = session.file_name().unwrap().to_str().unwrap();
+    Edits::read(session, id).unwrap()
+}
+
+#[test]
+fn sessions_are_found_by_words_conditions_and_choices() {
+    let (mut flow, _) = opened();
+    flow.window.check_accessibility();
+    // Latest first: that one is in sight.
+    assert!(flow.says(&row(SESSIONS - 1)));
+    flow.type_into("find", "pig ada depth>=1cm");
+    says(&mut flow, "3 sessions, found in");
+    assert!(flow.says(&row(12)) && !flow.says(&row(13)) && !flow.says(&row(8)));
+    // What is wrong with it is told in words, and the list stays.
+    flow.type_into("find", "depth>=deep");
+    says(&mut flow, "'deep' in 'depth>=deep' is no number");
+    assert!(flow.says("3 sessions, found in"));
+    flow.type_into("find", "thickness>=3");
+    says(&mut flow, "no session has a value called thickness");
+    flow.type_into("find", "");
+    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.type_into("from", "yesterday");
+    says(
+        &mut flow,
+        "'yesterday' is no day: write a day like 2026-03-05",
+    );
+    flow.click("Show all");
+    flow.click("verdict is");
+    pick(&mut flow, "suspect");
+    says(&mut flow, "2 sessions, found in");
+    assert!(flow.says(&row(8)) && flow.says(&row(17)));
+    flow.click("operator is");
+    pick(&mut flow, "Ada");
+    says(&mut flow, "1 session, found in");
+    assert!(flow.says("Session stomach 8, ramp-hold, Ada"));
+    flow.click("Show all");
+    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.click("sort by specimen");
+    flow.wait("the other order", |window| {
+        let top = |number| {
+            let name = row(number);
+            let row = window.query_by_label_contains(&name);
+            row.map(|row| row.rect().top())
+        };
+        top(0).is_some() && top(0) < top(10)
+    });
+}
+
+#[test]
+fn sessions_are_chosen_by_keys_and_by_the_pointer_and_reviewed() {
+    let (mut flow, sessions) = opened();
+    // Nothing has the focus: the list has the keys.
+    flow.window.key_press(Key::ArrowDown);
+    flow.window.key_press(Key::ArrowDown);
+    flow.window.run_steps(3);
+    says(&mut flow, "1 chosen");
+    flow.window
+        .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
+    flow.window
+        .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
+    says(&mut flow, "3 chosen");
+    assert!(flow.says("3 sessions chosen"));
+    flow.window.key_press(Key::End);
+    flow.window.run_steps(4);
+    says(&mut flow, "1 chosen");
+    // Far below: scrolled into sight.
+    assert!(flow.says(&row(0)));
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::A);
+    says(&mut flow, &format!("{SESSIONS} chosen"));
+    // Keys are the text field's while it is typed in.
+    flow.type_into("note", "x");
+    flow.window.key_press(Key::ArrowUp);
+    flow.window.run_steps(3);
+    assert!(flow.says(&format!("{SESSIONS} chosen")));
+    flow.window.key_press(Key::Home);
+    click_row(&mut flow, 3, Modifiers::NONE);
+    assert!(flow.says(", 1 chosen"));
+    click_row(&mut flow, 5, Modifiers::COMMAND);
+    assert!(flow.says(", 2 chosen"));
+    click_row(&mut flow, 8, Modifiers::SHIFT);
+    assert!(flow.says(", 4 chosen"));
+    click_row(&mut flow, 3, Modifiers::NONE);
+    assert!(flow.says("finished, no sample missing"));
+    assert!(flow.says(&format!(
+        "palpate replay \"{}\" --window",
+        sessions[3].display()
+    )));
+    flow.window.key_press(Key::Enter);
+    flow.window.run_steps(3);
+    assert!(!flow.says("found in"), "the review screen is shown");
+}
+
+#[test]
+fn what_is_said_is_a_record_and_can_be_taken_back() {
+    let (mut flow, sessions) = opened();
+    assert!(!flow.is_enabled("Accept") && flow.says("choose sessions first"));
+    click_row(&mut flow, 20, Modifiers::NONE);
+    click_row(&mut flow, 18, Modifiers::SHIFT);
+    flow.type_into("by", "Grace");
+    flow.type_into("tags", "+pilot -absent");
+    flow.click("Change tags");
+    says(&mut flow, "tags +pilot -absent on 3 sessions");
+    for session in &sessions[18..21] {
+        assert!(edits(session).tags().contains("pilot"));
+    }
+    flow.click("tag is");
+    pick(&mut flow, "pilot");
+    says(&mut flow, "3 sessions, 3 chosen, found in");
+    flow.click("Undo: tags +pilot -absent on 3 sessions");
+    // Nothing has that tag now.
+    says(&mut flow, "0 sessions, found in");
+    assert!(edits(&sessions[19]).tags().is_empty());
+    assert_eq!(edits(&sessions[19]).all.len(), 3, "both are in the record");
+    flow.click("Redo: tags +pilot -absent on 3 sessions");
+    says(&mut flow, "3 sessions, found in");
+    flow.click("Show all");
+    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    click_row(&mut flow, 20, Modifiers::NONE);
+    assert!(!flow.is_enabled("Suspect") && flow.says("write the reason first"));
+    flow.type_into("reason", "hair under the probe");
+    flow.click("Suspect");
+    says(&mut flow, "suspect: hair under the probe");
+    flow.type_into("note", "the gel was warm");
+    flow.click("Add note");
+    says(&mut flow, "the gel was warm (Grace)");
+    flow.type_into("reason", "looked at with the video");
+    flow.click("Accept");
+    says(&mut flow, "accepted, by Grace: looked at with the video");
+    let told = edits(&sessions[20]);
+    let (worth, why) = told.verdict().unwrap();
+    assert_eq!((worth, why.by.as_str()), (Verdict::Suspect, "Grace"));
+    assert_eq!(told.notes().count(), 1);
+    assert!(
+        told.all
+            .iter()
+            .any(|edit| matches!(edit.change, Change::Review { .. }))
+    );
+    flow.window.check_accessibility();
+    // Whoever types a note finds the session by it.
+    flow.type_into("find", "warm gel");
+    says(&mut flow, "1 session, 1 chosen, found in");
+    flow.type_into("find", "");
+    says(
+        &mut flow,
+        &format!("{SESSIONS} sessions, 1 chosen, found in"),
+    );
+    flow.click("Undo: verdict suspect on 1 session");
+    says(&mut flow, "valid: finished, no sample missing");
+    // The review saw another verdict.
+    says(&mut flow, "outdated, by Grace");
+    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Valid);
+    // A verdict that somebody has given since is not taken back.
+    flow.type_into("reason", "hair again");
+    flow.click("Rejected");
+    says(&mut flow, "rejected: hair again");
+    let subject = palpate_app::workers::edits::Subject::read(&sessions[20]).unwrap();
+    let verdict = Verdict::Suspect;
+    subject
+        .say("Mary", "not that bad", Change::Verdict { verdict })
+        .unwrap();
+    flow.click("Undo: verdict rejected on 1 session");
+    says(&mut flow, "its verdict was given again since");
+    assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Suspect);
+    says(&mut flow, "suspect: not that bad");
+}
+
+#[test]
+fn damage_is_told_and_sessions_are_written_out() {
+    let (mut flow, sessions) = opened();
+    fs::write(sessions[7].join("000.mcap"), b"no log").unwrap();
+    let log = fs::read(sessions[6].join("000.mcap")).unwrap();
+    fs::write(sessions[6].join("000.mcap"), &log[..log.len() / 2]).unwrap();
+    flow.click("Look for new sessions");
+    says(&mut flow, "damaged: ");
+    says(&mut flow, "unfinished");
+    let to = flow.folder.path().join("out/tables");
+    click_row(&mut flow, 9, Modifiers::NONE);
+    click_row(&mut flow, 7, Modifiers::SHIFT);
+    assert!(!flow.is_enabled("Export") && flow.says("write the folder that they go to first"));
+    flow.type_into("to folder", &to.display().to_string());
+    flow.click("Export");
+    says(&mut flow, "2 of 3 sessions written as csv to");
+    assert!(flow.says(&format!("{}: ", row(7))), "what was not is told");
+    let text = fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap();
+    let rows = edited::open(&sessions[8]).unwrap().session.rows.len();
+    assert_eq!(text.lines().count(), rows + 1);
+    // Nothing is written over.
+    fs::write(to.join(format!("{}.csv", row(8))), "mine").unwrap();
+    flow.click("Export");
+    says(&mut flow, "0 of 3 sessions written as csv to");
+    says(&mut flow, "exists already");
+    assert_eq!(
+        fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap(),
+        "mine"
+    );
+    let lake = flow.folder.path().join("out/lake");
+    flow.type_into("to folder", &lake.display().to_string());
+    flow.click("as");
+    pick(&mut flow, "one data set (lake)");
+    flow.click("Export");
+    says(&mut flow, "2 of 3 sessions added to");
+    let listed = palpate_tests::files_below(&lake, "parquet");
+    assert_eq!(listed.len(), 6);
+    flow.click("Export");
+    says(&mut flow, "0 of 3 sessions added to");
+    assert!(flow.says("2 were there"));
+}

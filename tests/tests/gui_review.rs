@@ -1,0 +1,171 @@
+//! The review screen, driven by accessible name: sessions closely and beside each other.
+#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
+
+use eframe::egui::{Key, Modifiers};
+use palpate_protocols::runner::TimeScale;
+use palpate_sessions::Session;
+use palpate_tests::flow::Flow;
+use palpate_tests::workspace;
+use std::path::PathBuf;
+
+/// A window on the review screen.
+fn review() -> Flow {
+    let mut flow = Flow::open(TimeScale::Max);
+    flow.window
+        .key_press_modifiers(Modifiers::COMMAND, Key::Num5);
+    flow.window.run_steps(3);
+    flow
+}
+
+/// Shows a copy of a recorded session.
+fn show(flow: &mut Flow, name: &str) -> PathBuf {
+    let path = flow.folder.path().join(name);
+    std::fs::create_dir(&path).unwrap();
+    for item in std::fs::read_dir(workspace().join("tests/sessions").join(name)).unwrap() {
+        let item = item.unwrap();
+        std::fs::copy(item.path(), path.join(item.file_name())).unwrap();
+    }
+    flow.type_into("session", &path.display().to_string());
+    flow.click("Show besides");
+    let id = Session::open(&path).unwrap().manifest.session_id;
+    let words = format!("remove: {id}");
+    flow.wait("the session", |window| {
+        use egui_kittest::kittest::Queryable;
+        let says = |words: &str| window.query_all_by_label_contains(words).next().is_some();
+        says(&words) && !says("still reading") && !says("waits to be read")
+    });
+    flow.window.run_steps(3);
+    path
+}
+
+#[test]
+fn one_session_is_looked_at_closely() {
+    let mut flow = review();
+    assert!(flow.says("no session is shown") && !flow.is_enabled("Show besides"));
+    assert!(flow.says("type the path of a session's folder"));
+    let path = show(&mut flow, "ramp-hold-lab");
+    let session = Session::open(&path).unwrap();
+    // What is known of it.
+    for words in [
+        session.manifest.session_id.as_str(),
+        session.manifest.specimen.as_str(),
+        "ending",
+        "000.mcap",
+        "health",
+        "contact",
+        "thinned to min/max of",
+    ] {
+        assert!(flow.says(words), "{words}");
+    }
+    flow.window.check_accessibility();
+    // Cursors and what stands between them, by button and by key.
+    assert!(flow.says("set cursors A and B"));
+    flow.click("Cursor A");
+    assert!(flow.says("F at A") && !flow.says("dF"));
+    flow.window.key_press(Key::B);
+    flow.window.run_steps(2);
+    for words in ["t at A", "t at B", "dt +", "dF", "ddepth", "signal at B"] {
+        assert!(flow.says(words), "{words}");
+    }
+    flow.click("Copy readout");
+    flow.click("No cursors");
+    assert!(!flow.says("F at A"));
+    // From far away to every sample and back.
+    for _ in 0..14 {
+        flow.click("Zoom in");
+    }
+    assert!(flow.says("every sample is drawn"));
+    flow.window.key_press(Key::ArrowRight);
+    flow.window.key_press(Key::Minus);
+    flow.window.key_press(Key::Home);
+    flow.window.run_steps(2);
+    assert!(flow.says("thinned to min/max of"));
+    // Which quantities, and where time begins.
+    for name in ["Raw signal", "Depth", "Force"] {
+        flow.click(name);
+    }
+    assert!(flow.says("choose on the left what is shown"));
+    flow.click("Position");
+    flow.click("Force");
+    flow.click("contact");
+    flow.click("ramp start");
+    flow.window.check_accessibility();
+    // The loop, found beside the window.
+    flow.click("Over depth");
+    flow.wait("the loop", |window| {
+        use egui_kittest::kittest::Queryable;
+        let mut found = window.query_all_by_label_contains("none is more than half a pixel");
+        found.next().is_some()
+    });
+    flow.click("Zoom in");
+    flow.click("Cycles");
+    assert!(flow.says("peak force (N)"));
+    flow.window.check_accessibility();
+}
+
+#[test]
+fn sessions_are_fitted_compared_and_foretold() {
+    let mut flow = review();
+    let path = show(&mut flow, "ramp-hold-lab");
+    flow.click("Parameters");
+    assert!(flow.says("no session shown has been fitted here yet"));
+    flow.click("Prediction");
+    assert!(!flow.is_enabled("Foretell the second session"));
+    assert!(flow.says("show two sessions"));
+    let other = show(&mut flow, "hold-until-lab");
+    flow.click("Fit the sessions shown");
+    flow.wait("the fits", |window| {
+        use egui_kittest::kittest::Queryable;
+        let mut found = window.query_all_by_label_contains("from the profile likelihood");
+        found.next().is_some()
+    });
+    flow.window.run_steps(2);
+    // The same words as the command line has.
+    let fitted = palpate_app::workers::fit::fit_source(
+        &path,
+        None,
+        palpate_protocols::analysis::Wanted::whatever_it_is_worth(),
+        &palpate_model::fit::FitOptions::default(),
+    );
+    let report = fitted.unwrap().result.unwrap();
+    assert!(flow.says(&palpate_app::report::text::quality(&report)));
+    for sentence in report.sentences() {
+        assert!(flow.says(sentence), "{sentence}");
+    }
+    flow.click("Over time");
+    flow.click("Residuals of the fit");
+    flow.click("Parameters");
+    let tau = format!("{:.3}", report.value("tau_eps").unwrap());
+    assert!(flow.says("tau_eps (s)") && flow.says(&tau), "{tau}");
+    flow.window.check_accessibility();
+    flow.click("Prediction");
+    flow.click("Foretell the second session");
+    flow.wait("the prediction", |window| {
+        use egui_kittest::kittest::Queryable;
+        window
+            .query_all_by_label_contains("mN rms")
+            .next()
+            .is_some()
+    });
+    flow.window.run_steps(3);
+    flow.window.check_accessibility();
+    // The other one comes to the front, and the first is removed.
+    let id = |path: &PathBuf| Session::open(path).unwrap().manifest.session_id;
+    let (first, second) = (id(&path), id(&other));
+    flow.click(&format!("front: {second}"));
+    assert!(flow.says(&format!("front: {first}")));
+    flow.click(&format!("remove: {first}"));
+    assert!(!flow.says(&format!("remove: {first}")) && flow.says(&format!("remove: {second}")));
+    // A folder that is none says so and leaves the rest as it is.
+    flow.type_into("session", "/nowhere/at-all");
+    flow.click("Show besides");
+    flow.wait("the refusal", |window| {
+        use egui_kittest::kittest::Queryable;
+        let mut found =
+            window.query_all_by_label_contains("there is no session at /nowhere/at-all");
+        found.next().is_some()
+    });
+    flow.click("read again: at-all");
+    flow.click("remove: at-all");
+    assert!(!flow.says("/nowhere/at-all"));
+}
