@@ -189,6 +189,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.type_into("name", "knock");
     panel.click("Make analysis");
     panel.wait_for("forces are left out");
+    panel.wait_for("Found by 'knock'");
     let kept = panel.analyses();
     let Analysed::Mask { left_out_s } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);

@@ -175,8 +175,10 @@ impl AnalysesPanel {
     }
 
     fn known_ui(&mut self, ui: &mut Ui, known: &Known, looked: &mut Looked) {
-        if let Some(made) = self.made.take() {
-            looked.analysis = known.analyses.get(&made).is_ok().then_some(made);
+        // What was made is chosen once it is among what is known.
+        let is_known = |made: &mut String| known.analyses.all.iter().any(|one| one.name == *made);
+        if let Some(made) = self.made.take_if(is_known) {
+            looked.analysis = Some(made);
         }
         let is_gone = |name: &String| known.analyses.get(name).is_err();
         if looked.analysis.as_ref().is_some_and(is_gone) {
