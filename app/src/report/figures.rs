@@ -188,6 +188,15 @@ impl Traces {
         )
     }
 
+    /// Where the interlock's limit is, if it is too far above the force to be drawn; else empty.
+    #[must_use]
+    pub fn limit_above(&self) -> String {
+        match (self.limit, limit_in_reach(self, &time_panel(self))) {
+            (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),
+            _ => String::new(),
+        }
+    }
+
     /// Time that counts as 0 in an overlay, if the session has it.
     #[must_use]
     pub fn origin(&self, align: Align) -> Option<f64> {
@@ -232,16 +241,24 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
 const TOP: f64 = 66.0;
 const BOTTOM: f64 = 380.0;
 
+fn time_panel(traces: &Traces) -> Panel {
+    let series: Vec<&[[f64; 2]]> = traces.force_time.iter().map(Vec::as_slice).collect();
+    Panel::around([LEFT, TOP, RIGHT, BOTTOM], traces.ends, &series)
+}
+
+/// The interlock's limit in N, unless it is so far above that the force would be flat beneath it.
+fn limit_in_reach(traces: &Traces, panel: &Panel) -> Option<f64> {
+    let limit = traces.limit?.0;
+    (limit <= panel.y[1] + 1.5 * (panel.y[1] - panel.y[0])).then_some(limit)
+}
+
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
 #[must_use]
 pub fn force_time(traces: &Traces) -> Drawing {
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, &traces.name, "force over time");
-    let series: Vec<&[[f64; 2]]> = traces.force_time.iter().map(Vec::as_slice).collect();
-    let mut panel = Panel::around([LEFT, TOP, RIGHT, BOTTOM], traces.ends, &series);
-    // A limit far above would leave the force flat.
-    let limit = traces.limit.map(|limit| limit.0);
-    let limit = limit.filter(|limit| *limit <= panel.y[1] + 1.5 * (panel.y[1] - panel.y[0]));
+    let mut panel = time_panel(traces);
+    let limit = limit_in_reach(traces, &panel);
     if let Some(limit) = limit {
         panel.y[1] = panel.y[1].max(1.06 * limit);
     }
@@ -274,12 +291,10 @@ pub fn force_time(traces: &Traces) -> Drawing {
     if let Some(limit) = limit {
         let line = traces.ends.map(|x| panel.at([x, limit]));
         svg.dashed_line(&line, LIGHT.limit, 1.2, 5.0);
-        let place = [LEFT + 6.0, line[0][1] - 5.0];
-        svg.text(
-            place,
-            Ink::plain(LIGHT.text),
-            &format!("interlock at {limit:.1} N"),
-        );
+        // Beneath, for the names of the phases stand above.
+        let ink = Ink::plain(LIGHT.text).anchored(Anchor::End);
+        let place = [RIGHT - 6.0, line[0][1] + 16.0];
+        svg.text(place, ink, &format!("interlock at {limit:.1} N"));
     }
     for line in &traces.force_time {
         panel.line(&mut svg, line, LIGHT.series, 1.4);

@@ -25,10 +25,14 @@ fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
         assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
     }
     let svg = force_time(&traces).svg();
-    assert!(
-        svg.contains(">hold<") && svg.contains("interlock at"),
-        "{svg}"
-    );
+    assert!(svg.contains(">contact<"), "{svg}");
+    // 9 N would leave a force of 2 N flat; a limit in reach is drawn.
+    assert!(!svg.contains("interlock at") && traces.limit_above().contains("9.0 N"));
+    let low = Traces {
+        limit: Some(Newtons(3.0)),
+        ..traces
+    };
+    assert!(force_time(&low).svg().contains("interlock at 3.0 N") && low.limit_above().is_empty());
 }
 
 #[test]

@@ -145,7 +145,10 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     let thinning = capital(&traces.thinning());
     body.figure(
         &figures::force_time(traces).svg(),
-        &format!("Force over time, phases shaded. {thinning}."),
+        &format!(
+            "Force over time, phases shaded. {thinning}.{}",
+            traces.limit_above()
+        ),
     );
     body.figure(
         &figures::force_depth(traces).svg(),
