@@ -36,10 +36,13 @@ impl Panel {
     /// A recorded session in a folder of its own, and the panel on it.
     fn open() -> Self {
         let folder = tempfile::tempdir().expect("a folder");
-        let session = folder.path().join("press");
-        fs::create_dir(&session).expect("a session folder");
-        let log = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
-        fs::copy(log, session.join("000.mcap")).expect("a log");
+        let [session, beside] = ["press", "beside"].map(|name| {
+            let session = folder.path().join(name);
+            fs::create_dir(&session).expect("a session folder");
+            let log = workspace().join("tests/sessions/ramp-hold-lab/000.mcap");
+            fs::copy(log, session.join("000.mcap")).expect("a log");
+            session
+        });
         let shown = Shown {
             panel: AnalysesPanel::new(Ok(folder.path().join("library"))),
             looked: Looked {
@@ -50,9 +53,13 @@ impl Panel {
         let window = Harness::builder()
             .with_size((340.0, 1400.0))
             .build_ui_state(
-                |ui, shown: &mut Shown| {
+                move |ui, shown: &mut Shown| {
                     shown.panel.poll(&ui.ctx().clone());
-                    let all = [shown.looked.clone(), shown.looked.clone()];
+                    let second = Looked {
+                        session: beside.clone(),
+                        analysis: None,
+                    };
+                    let all = [shown.looked.clone(), second];
                     shown.panel.set_shown(&all);
                     let mut commands = Default::default();
                     shown.panel.ui(ui, &mut shown.looked, &mut commands);
@@ -106,6 +113,11 @@ impl Panel {
 
     fn chosen(&self) -> Option<String> {
         self.window.state().looked.analysis.clone()
+    }
+
+    fn cursors(&mut self, cursors: Option<[f64; 2]>) {
+        self.window.state_mut().panel.set_cursors(cursors);
+        self.window.run_steps(2);
     }
 
     fn analyses(&self) -> Analyses {
@@ -170,11 +182,14 @@ fn a_fit_is_made_compared_and_taken_back() {
 #[test]
 fn another_model_another_calibration_and_a_stretch_left_out() {
     let mut panel = Panel::open();
-    panel.window.state_mut().panel.propose_span(22.0, 20.00001);
-    panel.window.run_steps(2);
+    panel.click("Leave out");
+    assert!(!panel.is_enabled("Between the cursors") && panel.says("set cursors A and B"));
+    panel.cursors(Some([22.0, 20.00001]));
+    panel.click("Between the cursors");
     panel.type_into("name", "knock");
     panel.click("Make analysis");
     panel.wait_for("forces are left out");
+    panel.wait_for("Found by 'knock'");
     let kept = panel.analyses();
     let Analysed::Mask { left_out_s } = &kept.all[0].what else {
         panic!("{:?}", kept.all[0]);
@@ -218,8 +233,28 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.click("Undo the last");
     panel.wait_for("withdrawn by");
     assert!(panel.analyses().get("anew").is_err());
-    let changed = panel.window.state_mut().panel.take_changed();
-    assert_eq!(changed.as_deref(), Some(panel.session.as_path()));
+    // The log is read again only where an edit changes what it means.
+    assert_eq!(panel.window.state_mut().panel.take_changed(), None);
+}
+
+#[test]
+fn sessions_shown_together_are_fitted_as_one_body() {
+    let mut panel = Panel::open();
+    panel.click("one body for this and the other shown");
+    panel.type_into("name", "together");
+    panel.click("Make analysis");
+    panel.wait_for("kept as 'together'");
+    let kept = panel.analyses();
+    let Analysed::Fit {
+        settings, results, ..
+    } = &kept.all[0].what
+    else {
+        panic!("{:?}", kept.all[0]);
+    };
+    assert_eq!(settings["together_with"][0]["session"], "beside");
+    assert_eq!(results["shared"].as_array().map(Vec::len), Some(5));
+    let logs = kept.all[0].inputs.iter();
+    assert_eq!(logs.filter(|one| one.what.ends_with("000.mcap")).count(), 2);
 }
 
 #[test]
@@ -238,6 +273,8 @@ fn a_verdict_and_a_contact_are_corrected_with_a_reason() {
     panel.type_into("really at", "40.5");
     panel.click("Correct contact");
     panel.wait_for("contact 1 at 40.500 mm");
+    let changed = panel.window.state_mut().panel.take_changed();
+    assert_eq!(changed.as_deref(), Some(panel.session.as_path()));
     let edits = Edits::read(&panel.session, &panel.id()).expect("edits");
     let verdict = edits
         .verdict()

@@ -2,10 +2,11 @@
 
 use super::picture::{LEFT, RIGHT, WIDTH, look, title};
 use super::svg::{Anchor, Drawing, Ink, Panel, Svg};
-use super::thin::{steps, thin};
-use crate::theme::tokens::{LIGHT, PAPER_SERIES};
+use super::thin::thin;
+use crate::theme::tokens::LIGHT;
 use eframe::egui::Color32;
 use palpate_model::rig::Phase;
+use palpate_model::signal::polyline::Reducer;
 use palpate_model::units::Newtons;
 use palpate_sessions::contacts::contacts;
 use palpate_sessions::log::Session;
@@ -187,6 +188,15 @@ impl Traces {
         )
     }
 
+    /// Where the interlock's limit is, if it is too far above the force to be drawn; else empty.
+    #[must_use]
+    pub fn limit_above(&self) -> String {
+        match (self.limit, limit_in_reach(self, &time_panel(self))) {
+            (Some(limit), None) => format!(" The interlock is above, at {:.1} N.", limit.0),
+            _ => String::new(),
+        }
+    }
+
     /// Time that counts as 0 in an overlay, if the session has it.
     #[must_use]
     pub fn origin(&self, align: Align) -> Option<f64> {
@@ -215,11 +225,14 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
     let (x, y) = (ends(0), ends(1));
     let scale = |[low, high]: [f64; 2], px: f64| px / (high - low).max(1e-9);
     let (across, up) = (scale(x, RIGHT - LEFT), scale(y, BOTTOM - TOP));
-    let lines = steps(points().map(|[depth, force]| [depth * across, force * up]));
+    let mut reducer = Reducer::new(RIGHT - LEFT, BOTTOM - TOP);
+    for [depth, force] in points() {
+        reducer.push((depth - x[0]) * across, (force - y[0]) * up);
+    }
+    let (lines, _) = reducer.finish();
     let back = |line: Vec<[f64; 2]>| {
-        line.into_iter()
-            .map(|[x, y]| [x / across, y / up])
-            .collect()
+        let place = |[right, high]: [f64; 2]| [x[0] + right / across, y[0] + high / up];
+        line.into_iter().map(place).collect()
     };
     lines.into_iter().map(back).collect()
 }
@@ -228,16 +241,24 @@ fn loops(session: &Session, within: &[usize]) -> Vec<Vec<[f64; 2]>> {
 const TOP: f64 = 66.0;
 const BOTTOM: f64 = 380.0;
 
+fn time_panel(traces: &Traces) -> Panel {
+    let series: Vec<&[[f64; 2]]> = traces.force_time.iter().map(Vec::as_slice).collect();
+    Panel::around([LEFT, TOP, RIGHT, BOTTOM], traces.ends, &series)
+}
+
+/// The interlock's limit in N, unless it is so far above that the force would be flat beneath it.
+fn limit_in_reach(traces: &Traces, panel: &Panel) -> Option<f64> {
+    let limit = traces.limit?.0;
+    (limit <= panel.y[1] + 1.5 * (panel.y[1] - panel.y[0])).then_some(limit)
+}
+
 /// Force over time, phases shaded, the interlock's limit drawn where it is in reach.
 #[must_use]
 pub fn force_time(traces: &Traces) -> Drawing {
     let mut svg = Svg::new(WIDTH);
     title(&mut svg, &traces.name, "force over time");
-    let series: Vec<&[[f64; 2]]> = traces.force_time.iter().map(Vec::as_slice).collect();
-    let mut panel = Panel::around([LEFT, TOP, RIGHT, BOTTOM], traces.ends, &series);
-    // A limit far above would leave the force flat.
-    let limit = traces.limit.map(|limit| limit.0);
-    let limit = limit.filter(|limit| *limit <= panel.y[1] + 1.5 * (panel.y[1] - panel.y[0]));
+    let mut panel = time_panel(traces);
+    let limit = limit_in_reach(traces, &panel);
     if let Some(limit) = limit {
         panel.y[1] = panel.y[1].max(1.06 * limit);
     }
@@ -270,12 +291,10 @@ pub fn force_time(traces: &Traces) -> Drawing {
     if let Some(limit) = limit {
         let line = traces.ends.map(|x| panel.at([x, limit]));
         svg.dashed_line(&line, LIGHT.limit, 1.2, 5.0);
-        let place = [LEFT + 6.0, line[0][1] - 5.0];
-        svg.text(
-            place,
-            Ink::plain(LIGHT.text),
-            &format!("interlock at {limit:.1} N"),
-        );
+        // Beneath, for the names of the phases stand above.
+        let ink = Ink::plain(LIGHT.text).anchored(Anchor::End);
+        let place = [RIGHT - 6.0, line[0][1] + 16.0];
+        svg.text(place, ink, &format!("interlock at {limit:.1} N"));
     }
     for line in &traces.force_time {
         panel.line(&mut svg, line, LIGHT.series, 1.4);
@@ -325,9 +344,9 @@ fn depth_panel(all: &[&Traces]) -> Panel {
 
 /// Ink and dashes of one of several.
 fn look_of(index: usize) -> (Color32, f64) {
-    let round = index / PAPER_SERIES.len();
+    let round = index / LIGHT.sessions.len();
     (
-        PAPER_SERIES[index % PAPER_SERIES.len()],
+        LIGHT.sessions[index % LIGHT.sessions.len()],
         DASHES[round % DASHES.len()],
     )
 }
@@ -403,96 +422,5 @@ fn legend(mut svg: Svg, all: &[&Traces], name: &str) -> Drawing {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use std::path::Path;
-
-    fn recorded() -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
-        Session::open(&sessions.join("ramp-hold-lab")).unwrap()
-    }
-
-    #[test]
-    fn a_session_is_drawn_in_few_points_and_keeps_its_peak() {
-        let session = recorded();
-        let traces = Traces::of("one", &session, Window::WHOLE);
-        let peak = |forces: &mut dyn Iterator<Item = f64>| forces.fold(f64::MIN, f64::max);
-        let drawn = peak(&mut traces.force_time.iter().flatten().map(|point| point[1]));
-        assert_eq!(
-            drawn,
-            peak(&mut session.rows.iter().filter_map(|row| row.force))
-        );
-        let count: usize = traces.force_time.iter().map(Vec::len).sum();
-        assert!(session.rows.len() > 50_000 && count < 2000, "{count}");
-        let count: usize = traces.force_depth.iter().map(Vec::len).sum();
-        assert!(count > 100 && count < 20_000, "{count}");
-        for drawing in [force_time(&traces), force_depth(&traces)] {
-            let svg = drawing.svg();
-            assert!(!svg.contains("NaN") && !svg.contains("inf"), "{svg}");
-        }
-        let svg = force_time(&traces).svg();
-        assert!(
-            svg.contains(">hold<") && svg.contains("interlock at"),
-            "{svg}"
-        );
-    }
-
-    #[test]
-    fn a_window_leaves_the_rest_out() {
-        let session = recorded();
-        let whole = Traces::of("one", &session, Window::WHOLE);
-        let ramp = whole.ramp.unwrap();
-        let window = Window {
-            from: ramp,
-            until: ramp + 1.0,
-        };
-        let part = Traces::of("one", &session, window);
-        assert!(part.ends[0] >= ramp && part.ends[1] <= ramp + 1.0);
-        assert!(
-            part.samples[0] > 900 && part.samples[0] < 1100,
-            "{:?}",
-            part.samples
-        );
-        let none = Traces::of(
-            "one",
-            &session,
-            Window {
-                from: 1e9,
-                until: 2e9,
-            },
-        );
-        assert!(none.is_empty() && force_time(&none).svg().contains("nothing is known"));
-    }
-
-    #[test]
-    fn sessions_over_each_other_begin_together() {
-        let session = recorded();
-        let one = Traces::of("one", &session, Window::WHOLE);
-        let mut later = one.clone();
-        later.name = "later".into();
-        for point in later.force_time.iter_mut().flatten() {
-            point[0] += 100.0;
-        }
-        later.ramp = later.ramp.map(|ramp| ramp + 100.0);
-        later.contact = None;
-        let ([time, _], lost) = overlays(&[&one, &later], Align::Ramp);
-        assert!(lost.is_empty());
-        let svg = time.svg();
-        let lines: Vec<&str> = svg
-            .lines()
-            .filter(|line| line.starts_with("<polyline"))
-            .collect();
-        let points = |ink: Color32| {
-            let ink = super::super::svg::hex(ink);
-            let own = lines
-                .iter()
-                .filter(|line| line.contains(&ink) && line.len() > 200);
-            own.map(|line| line.split('"').nth(1).unwrap().to_owned())
-                .collect::<Vec<_>>()
-        };
-        assert!(!points(PAPER_SERIES[0]).is_empty());
-        assert_eq!(points(PAPER_SERIES[0]), points(PAPER_SERIES[1]));
-        let (_, lost) = overlays(&[&one, &later], Align::Contact);
-        assert_eq!(lost, ["later"]);
-    }
-}
+#[path = "figures_tests.rs"]
+mod tests;

@@ -7,7 +7,7 @@ use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, MetadataProvider};
 use std::io;
 use vello_cpu::color::{AlphaColor, Srgb};
-use vello_cpu::kurbo::{Affine, BezPath, Circle, Point, Shape as Outline, Stroke};
+use vello_cpu::kurbo::{Affine, BezPath, Cap, Circle, Join, Point, Shape as Outline, Stroke};
 use vello_cpu::{Pixmap, RenderContext, Resources};
 
 /// Pixels for a px of the drawing: sharp on paper and on fine screens.
@@ -101,7 +101,9 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
             width,
             dash,
         } => {
-            let stroke = Stroke::new(*width).with_join(vello_cpu::kurbo::Join::Round);
+            let stroke = Stroke::new(*width)
+                .with_join(Join::Round)
+                .with_caps(Cap::Butt);
             context.set_stroke(match *dash {
                 dash if dash > 0.0 => stroke.with_dashes(0.0, [dash]),
                 _ => stroke,

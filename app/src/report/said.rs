@@ -15,6 +15,7 @@ pub fn at(time: &chrono::DateTime<chrono::Utc>) -> String {
 pub fn change(change: &Change) -> String {
     match change {
         Change::Verdict { verdict } => verdict.to_string(),
+        Change::Note => "note".to_owned(),
         Change::Tags { add, remove } => {
             let added = add.iter().map(|tag| format!("+{tag}"));
             let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));

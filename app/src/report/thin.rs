@@ -1,8 +1,6 @@
 //! Thinning for drawing: of all points that share a column of pixels the lowest and the highest
 //! stay, so no peak is lost. What is saved, fitted or exported is never thinned.
 
-use std::collections::HashSet;
-
 /// At most `2 * columns` of `points`, which come in order of x; points that are not finite are
 /// left out.
 #[must_use]
@@ -39,52 +37,6 @@ pub fn thin(points: impl Iterator<Item = [f64; 2]> + Clone, columns: usize) -> V
         column.close(&mut thinned);
     }
     thinned
-}
-
-/// Half a pixel: nobody sees less.
-const CELL: f64 = 0.5;
-
-/// Lines that look like the one through all of these points of a picture, in px, which may come in any order: a step
-/// from one half pixel to another is drawn once, however often it is made. Points that are not finite break the line.
-#[must_use]
-pub fn steps(points: impl Iterator<Item = [f64; 2]>) -> Vec<Vec<[f64; 2]>> {
-    let cell = |point: [f64; 2]| point.map(|number| (number / CELL).round() as i64);
-    let mut drawn = HashSet::new();
-    let mut lines: Vec<Vec<[f64; 2]>> = Vec::new();
-    let mut line: Vec<[f64; 2]> = Vec::new();
-    let mut last: Option<([i64; 2], [f64; 2])> = None;
-    let mut end = |line: &mut Vec<[f64; 2]>| {
-        if line.len() > 1 {
-            lines.push(std::mem::take(line));
-        }
-        line.clear();
-    };
-    for point in points {
-        if !point.iter().all(|number| number.is_finite()) {
-            end(&mut line);
-            last = None;
-            continue;
-        }
-        let here = cell(point);
-        let Some((before, from)) = last else {
-            last = Some((here, point));
-            continue;
-        };
-        if here == before {
-            continue;
-        }
-        if drawn.insert((before, here)) {
-            if line.is_empty() {
-                line.push(from);
-            }
-            line.push(point);
-        } else {
-            end(&mut line);
-        }
-        last = Some((here, point));
-    }
-    end(&mut line);
-    lines
 }
 
 /// The lowest and the highest point of a column, each with its place in the order of points.
@@ -128,38 +80,6 @@ mod tests {
         // All at one time: nothing to divide by.
         let heap = (0..100).map(|i| [5.0, f64::from(i)]);
         assert_eq!(thin(heap, 10), [[5.0, 0.0], [5.0, 99.0]]);
-    }
-
-    #[test]
-    fn a_loop_gone_round_many_times_is_drawn_once() {
-        let round = |i: u32| {
-            let angle = f64::from(i) * std::f64::consts::TAU / 1000.0;
-            [100.0 + 50.0 * angle.cos(), 100.0 + 50.0 * angle.sin()]
-        };
-        let once = steps((0..=1000).map(round));
-        let often = steps((0..=50_000).map(round));
-        let count = |lines: &[Vec<[f64; 2]>]| lines.iter().map(Vec::len).sum::<usize>();
-        // The circle is 314 px long, and a new cell begins every half pixel or later.
-        assert!(
-            count(&once) <= 1001 && count(&once) > 300,
-            "{}",
-            count(&once)
-        );
-        assert!(count(&often) <= count(&once) + 2, "{}", count(&often));
-        // No point is further from what is drawn than a cell.
-        for point in (0..1000).map(round) {
-            let is_near =
-                |other: &[f64; 2]| (point[0] - other[0]).hypot(point[1] - other[1]) <= 2.0 * CELL;
-            assert!(once.iter().flatten().any(is_near), "{point:?}");
-        }
-        let broken = [
-            [0.0, 0.0],
-            [9.0, 0.0],
-            [f64::NAN, 0.0],
-            [0.0, 9.0],
-            [9.0, 9.0],
-        ];
-        assert_eq!(steps(broken.into_iter()).len(), 2);
     }
 
     #[test]

@@ -113,15 +113,6 @@ pub const DARK: Tokens = Tokens {
     phase_band: Color32::from_rgba_premultiplied(14, 14, 14, 14),
 };
 
-/// Series beside each other on white paper, told apart by dashes as well: those of Okabe and Ito that lines on white
-/// can be seen in, and black.
-pub const PAPER_SERIES: [Color32; 4] = [
-    Color32::from_rgb(0x00, 0x72, 0xB2),
-    Color32::from_rgb(0xD5, 0x5E, 0x00),
-    Color32::from_rgb(0x00, 0x9E, 0x73),
-    grey(0x1C),
-];
-
 impl Tokens {
     /// The tokens of a theme.
     #[must_use]
@@ -180,19 +171,6 @@ mod tests {
                 let ratio = contrast(text, ground);
                 // WCAG 2.2 success criterion 1.4.3.
                 assert!(ratio >= 4.5, "{text:?} on {ground:?} has {ratio:.2}");
-            }
-        }
-    }
-
-    #[test]
-    fn series_on_paper_stand_out_from_it() {
-        // Phases lie under them, shaded by half of a control's grey.
-        let shade = Color32::from_gray(0xEE);
-        for line in PAPER_SERIES {
-            for ground in [LIGHT.canvas, shade] {
-                // WCAG 2.2 success criterion 1.4.11, graphical objects.
-                let ratio = contrast(line, ground);
-                assert!(ratio >= 2.9, "{line:?} on {ground:?} has {ratio:.2}");
             }
         }
     }

@@ -421,3 +421,32 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
     );
     assert_eq!(refused.status.code(), Some(1), "{}", stderr(&refused));
 }
+
+#[test]
+fn the_strict_reading_refuses_what_it_should() {
+    let page = |part: &str| {
+        format!(
+            "<!DOCTYPE html>\n<html lang=\"en\"><body><h1>t</h1>{part}</body></html>\n<!-- seal -->\n"
+        )
+    };
+    assert!(strict(&page("<p>plain &amp; well</p>")).contains(&"plain &amp; well".to_owned()));
+    for wrong in [
+        "<p>open",
+        "<p>crossed</b>",
+        "<script>x</script>",
+        "<p onload=\"x\">t</p>",
+        "<p>a & b</p>",
+        "<p>a > b</p>",
+        "<p>\u{202e}</p>",
+        "<h3>after h1</h3>",
+        "<th>no scope</th>",
+        "<figure>no caption</figure>",
+        "<svg width=\"1\"></svg>",
+    ] {
+        let page = page(wrong);
+        assert!(
+            std::panic::catch_unwind(|| strict(&page)).is_err(),
+            "{wrong}"
+        );
+    }
+}

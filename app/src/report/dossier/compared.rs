@@ -51,7 +51,7 @@ pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {
             align.word()
         ),
     );
-    let caption = "Force over depth. Every step of half a pixel is drawn once.";
+    let caption = "Force over depth. No sample is further than half a pixel from what is drawn.";
     body.figure(&depth.svg(), caption);
     parameters(body, subjects);
 }

@@ -2,20 +2,14 @@
 
 use super::super::page::{Body, document};
 use super::super::text::{ParameterText, capital, quality, typeset};
-use super::super::{calibration as calibrations, calibration_plot, figures, kept, said};
+use super::super::{calibration as calibrations, calibration_plot, figures, said};
 use super::compared::comparison;
 use super::files::{MADE, attributes, sealed};
+use super::happened::{afterwards, deviations, events, made_with};
 use super::{FitPart, Subject};
 use crate::report::figures::Align;
 use crate::widgets::uncertain::{error_alone, interval};
 use palpate_model::fit::Parameter;
-use palpate_protocols::engine::{Effect, Record};
-use palpate_protocols::fidelity::{Achieved, Fidelity};
-use palpate_sessions::analyses::Analysed;
-use palpate_sessions::record::EntryKind;
-
-/// More events of a session than this make a page that nobody reads.
-const EVENTS_MAX: usize = 1000;
 
 /// The whole page.
 pub(super) fn page(subjects: &[Subject], align: Align, made: &str) -> String {
@@ -151,11 +145,14 @@ fn measured(body: &mut Body, subject: &Subject, level: u8) {
     let thinning = capital(&traces.thinning());
     body.figure(
         &figures::force_time(traces).svg(),
-        &format!("Force over time, phases shaded. {thinning}."),
+        &format!(
+            "Force over time, phases shaded. {thinning}.{}",
+            traces.limit_above()
+        ),
     );
     body.figure(
         &figures::force_depth(traces).svg(),
-        "Force over depth from contact. Every step of half a pixel is drawn once.",
+        "Force over depth from contact. No sample is further than half a pixel from what is drawn.",
     );
 }
 
@@ -219,223 +216,6 @@ fn calibration(body: &mut Body, subject: &Subject, level: u8) {
             body.figure(&calibration_plot::picture(calibration, told), caption);
         }
     }
-}
-
-fn deviations(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "Deviations");
-    match &subject.fidelity {
-        Err(reason) => body.paragraph(&format!("{}.", capital(reason))),
-        Ok(found) => fidelity(body, found),
-    }
-}
-
-fn fidelity(body: &mut Body, found: &Fidelity) {
-    let late = match found.late {
-        0 => "none late".to_owned(),
-        late => format!("{late} late, by up to {:.0} ms", found.late_worst_s * 1e3),
-    };
-    let time = &found.time_use;
-    let missed = found.missed().count();
-    body.facts(
-        "How well the run did what its plan said",
-        &[
-            (
-                "samples",
-                format!("{}, {} missing, {late}", found.samples, found.dropped),
-            ),
-            (
-                "longest gap",
-                format!("{:.1} ms", found.longest_gap_s * 1e3),
-            ),
-            (
-                "time",
-                format!(
-                    "set-up {:.1} s, motion {:.1} s, hold {:.1} s, waiting {:.1} s",
-                    time.set_up_s, time.motion_s, time.hold_s, time.waiting_s
-                ),
-            ),
-            (
-                "targets",
-                format!("{}, {missed} missed", found.targets.len()),
-            ),
-        ],
-    );
-    body.list(found.remarks.iter().map(String::as_str));
-    if found.targets.is_empty() {
-        return;
-    }
-    let row = |one: &Achieved| {
-        let error = one.error_percent.map_or_else(
-            || format!("{:+.4} {}", one.achieved - one.target, one.unit),
-            |percent| format!("{percent:+.3} %"),
-        );
-        vec![
-            format!("{} {}", one.step_index + 1, one.step),
-            if one.cycle == 0 {
-                String::new()
-            } else {
-                one.cycle.to_string()
-            },
-            one.quantity.to_owned(),
-            format!("{:.4} {}", one.target, one.unit),
-            format!("{:.4} {}", one.achieved, one.unit),
-            error,
-            if one.is_within { "met" } else { "missed" }.to_owned(),
-        ]
-    };
-    let rows: Vec<Vec<String>> = found.targets.iter().map(row).collect();
-    let heads = [
-        "step", "cycle", "quantity", "target", "achieved", "error", "",
-    ];
-    body.table("Targets and what was done", &heads, &rows);
-}
-
-fn events(body: &mut Body, subject: &Subject, level: u8) {
-    let entries = subject.entries.iter();
-    let decided = entries.filter(|entry| entry.kind == EntryKind::Decision);
-    let records = decided.filter_map(|entry| {
-        let Ok(Effect::Record(record)) = serde_json::from_value(entry.body.clone()) else {
-            return None;
-        };
-        Some((format!("{:.3}", entry.now.seconds().0), record))
-    });
-    let (notes, others): (Vec<_>, Vec<_>) =
-        records.partition(|(_, record)| matches!(record, Record::Noted { .. }));
-    let row = |(at, record): (String, Record)| {
-        let text = match record {
-            Record::Noted { text } => text,
-            other => other.to_string(),
-        };
-        vec![at, text]
-    };
-    if !notes.is_empty() {
-        body.heading(level, "Notes of the run");
-        let rows: Vec<Vec<String>> = notes.into_iter().map(row).collect();
-        let heads = ["session time (s)", "note"];
-        body.table("Written down while it ran", &heads, &rows);
-    }
-    body.heading(level, "Events");
-    let mut rows: Vec<Vec<String>> = others.into_iter().map(row).collect();
-    let left = rows.len().saturating_sub(EVENTS_MAX);
-    rows.truncate(EVENTS_MAX);
-    if rows.is_empty() {
-        body.paragraph("None were recorded.");
-    } else {
-        let heads = ["session time (s)", "what"];
-        body.table("What was decided in the run", &heads, &rows);
-    }
-    if left > 0 {
-        body.paragraph(&format!("{left} more are in the log."));
-    }
-}
-
-fn afterwards(body: &mut Body, subject: &Subject, level: u8) {
-    body.heading(level, "What was said and made of it afterwards");
-    let edits = &subject.edits.all;
-    if edits.is_empty() {
-        body.paragraph("Nothing was said of it.");
-    } else {
-        let row = |edit: &palpate_sessions::Edit| {
-            vec![
-                said::at(&edit.at),
-                edit.by.clone(),
-                said::change(&edit.change),
-                edit.reason.clone(),
-            ]
-        };
-        let rows: Vec<Vec<String>> = edits.iter().map(row).collect();
-        let heads = ["when (UTC)", "by", "what", "why"];
-        body.table("Edits, in the order made", &heads, &rows);
-    }
-    let analyses = &subject.analyses;
-    let made = analyses.all.iter();
-    let made: Vec<_> = made
-        .filter(|one| one.what != Analysed::Withdrawal)
-        .collect();
-    if made.is_empty() {
-        body.paragraph("No analysis is kept beside it.");
-        return;
-    }
-    let rows: Vec<Vec<String>> = made
-        .iter()
-        .map(|one| {
-            let withdrawn = kept::withdrawn(analyses, &one.name);
-            vec![
-                one.name.clone(),
-                one.what.word().to_owned(),
-                said::at(&one.at),
-                one.by.clone(),
-                one.reason.clone(),
-                kept::deed(&one.what),
-                format!("palpate {}", one.software_version),
-                withdrawn.unwrap_or_else(|| "counts".to_owned()),
-            ]
-        })
-        .collect();
-    let heads = [
-        "name",
-        "kind",
-        "when (UTC)",
-        "by",
-        "why",
-        "what",
-        "made with",
-        "state",
-    ];
-    body.table("Analyses, in the order made", &heads, &rows);
-    for one in made {
-        let lines = kept::fit_lines(one);
-        if !lines.is_empty() {
-            body.paragraph(&format!("Fit '{}' found:", one.name));
-            body.pre(&lines.join("\n"));
-        }
-    }
-}
-
-fn made_with(body: &mut Body, subject: &Subject, level: u8) {
-    let manifest = &subject.manifest;
-    body.heading(level, "Rig and program");
-    let mut facts = vec![
-        (
-            "recorded by",
-            format!(
-                "palpate {}, engine {}, record {}",
-                manifest.software_version, manifest.engine_version, manifest.record_version
-            ),
-        ),
-        (
-            "read by",
-            format!(
-                "palpate {}, engine {}",
-                env!("CARGO_PKG_VERSION"),
-                palpate_protocols::engine::ENGINE_VERSION
-            ),
-        ),
-    ];
-    if let Some(rig) = &manifest.rig {
-        facts.push(("rig", format!("{}: {}", rig.name, rig.identity)));
-        let settings = rig.settings.iter();
-        facts.extend(settings.map(|(name, value)| (name.as_str(), value.clone())));
-    }
-    if let Some(limits) = &manifest.limits {
-        facts.push((
-            "interlocks",
-            format!(
-                "force {} to {}, signal {}, {} N/s, position {}",
-                limits.force_min,
-                limits.force_max,
-                limits.volts_max,
-                limits.force_rate_max,
-                limits.travel_max
-            ),
-        ));
-    }
-    let signal = manifest.signal.as_ref().map(said::signal);
-    facts.extend(signal.map(|lines| ("signal", lines.join("; "))));
-    let accepted = manifest.acknowledgements.iter();
-    facts.extend(accepted.map(|line| ("accepted before the start", line.clone())));
-    facts.extend(said::health(&subject.beside.health));
-    body.facts("With what it was measured and read", &facts);
 }
 
 fn files(body: &mut Body, subjects: &[Subject]) {

@@ -3,6 +3,7 @@
 
 mod compared;
 mod files;
+mod happened;
 mod html;
 
 pub use files::{Claim, Compared, claims, compare};

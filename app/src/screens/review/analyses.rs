@@ -7,12 +7,14 @@ mod said;
 
 use super::Looked;
 use crate::command::Commands;
+use crate::report::dossier::Wanted;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::Job;
-use crate::workers::analyses::{Deed, Done, Known, Who, login, own, read};
+use crate::workers::analyses::{Deed, Done, Known, Who, own, read};
+use crate::workers::edits::author;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Label, RichText, TextEdit, Ui};
 use form::Form;
@@ -73,7 +75,7 @@ impl AnalysesPanel {
             form: Form::default(),
             said: Said::default(),
             papers: Papers::default(),
-            by: login(),
+            by: author(None),
             reason: String::new(),
             made: None,
             changed: None,
@@ -91,7 +93,9 @@ impl AnalysesPanel {
             if let Some(Ok(done)) = self.work.answer() {
                 self.made.clone_from(&done.made);
                 if done.changed.is_some() {
-                    self.changed.clone_from(&done.changed);
+                    if done.is_edit {
+                        self.changed.clone_from(&done.changed);
+                    }
                     self.form.forget();
                     self.reason.clear();
                     self.read_again(ctx);
@@ -108,7 +112,7 @@ impl AnalysesPanel {
         }
     }
 
-    /// A session whose edits or analyses have changed since this was last asked.
+    /// A session whose edits have changed since this was last asked.
     pub fn take_changed(&mut self) -> Option<PathBuf> {
         self.changed.take()
     }
@@ -119,10 +123,15 @@ impl AnalysesPanel {
         self.shown.extend_from_slice(shown);
     }
 
+    /// Where the two cursors stand on the session, in s since its first sample, once both are set.
+    pub fn set_cursors(&mut self, cursors: Option<[f64; 2]>) {
+        self.form.cursors = cursors;
+        self.papers.span = cursors.map(|[a, b]| [a.min(b), a.max(b)]);
+    }
+
     /// Puts a stretch of time, in s since the first sample, into the form that leaves stretches out.
     pub fn propose_span(&mut self, from: f64, until: f64) {
         self.form.propose_span(from, until);
-        self.papers.propose_span(from, until);
     }
 
     fn read_again(&mut self, ctx: &Context) {
@@ -150,6 +159,7 @@ impl AnalysesPanel {
             self.asked = Some(looked.session.clone());
             self.known = None;
             self.made = None;
+            self.own = Task::default();
             self.read_again(ui.ctx());
         }
         section_ui(ui, "Analyses");
@@ -165,8 +175,10 @@ impl AnalysesPanel {
     }
 
     fn known_ui(&mut self, ui: &mut Ui, known: &Known, looked: &mut Looked) {
-        if let Some(made) = self.made.take() {
-            looked.analysis = known.analyses.get(&made).is_ok().then_some(made);
+        // What was made is chosen once it is among what is known.
+        let is_known = |made: &mut String| known.analyses.all.iter().any(|one| one.name == *made);
+        if let Some(made) = self.made.take_if(is_known) {
+            looked.analysis = Some(made);
         }
         let is_gone = |name: &String| known.analyses.get(name).is_err();
         if looked.analysis.as_ref().is_some_and(is_gone) {
@@ -177,9 +189,17 @@ impl AnalysesPanel {
         if list::list_ui(ui, known, looked, own) {
             self.fit_own(ui.ctx(), &known.session);
         }
-        self.own_ui(ui, own_of(&self.own, &known.session));
+        self.own_ui(ui);
         section_ui(ui, "Make another");
-        let name = self.form.ui(ui, known, looked.analysis.as_deref());
+        let others = self.shown.iter().filter(|one| one.session != known.session);
+        let others: Vec<Wanted> = others
+            .map(|one| Wanted {
+                session: one.session.clone(),
+                analysis: one.analysis.clone(),
+            })
+            .collect();
+        let read_by = looked.analysis.as_deref();
+        let name = self.form.ui(ui, known, read_by, &others);
         self.who_ui(ui);
         let verdict = self.free().and(name.clone().map(|_| ()));
         match task_ui(ui, "Make analysis", &self.work, &verdict) {
@@ -250,11 +270,11 @@ impl AnalysesPanel {
     }
 
     /// How far the session's own fit is, or why there is none.
-    fn own_ui(&self, ui: &mut Ui, refused: Option<&str>) {
+    fn own_ui(&self, ui: &mut Ui) {
         if let Some(standing) = self.own.standing() {
             quiet_ui(ui, &format!("the session's own fit: {}", standing.what));
-        } else if let Some(reason) = refused {
-            quiet_ui(ui, &format!("the session has no fit of its own: {reason}"));
+        } else if let Some(Err(reason)) = self.own.answer() {
+            quiet_ui(ui, &format!("no fit of its own was made: {reason}"));
         }
     }
 
@@ -267,11 +287,6 @@ impl AnalysesPanel {
             Some(Err(reason)) => wrong_ui(ui, reason),
         }
     }
-}
-
-/// Why the last try of a session's own fit failed.
-fn own_of<'a>(own: &'a Task<Own>, _session: &Path) -> Option<&'a str> {
-    own.answer()?.as_ref().err().map(String::as_str)
 }
 
 fn quiet_ui(ui: &mut Ui, text: &str) {

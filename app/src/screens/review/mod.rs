@@ -180,6 +180,13 @@ impl ReviewScreen {
     /// Fetches what threads have answered.
     pub fn poll(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
+        if let Some(changed) = self.analyses.take_changed() {
+            let is_it = |one: &&mut Subject| one.looked.session == changed;
+            if let Some(subject) = self.subjects.iter_mut().find(is_it) {
+                subject.fit = None;
+                subject.read_again();
+            }
+        }
         self.fits.poll();
         self.prediction.poll();
         self.take_fits();
@@ -277,12 +284,14 @@ impl ReviewScreen {
     /// Draws what is known of the session in front, and what can be made of it.
     pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         self.draw_right(ui);
-        let shown: Vec<Looked> = self
-            .subjects
-            .iter()
-            .map(|subject| subject.looked.clone())
-            .collect();
+        let shown: Vec<Looked> = self.subjects.iter().map(|one| one.looked.clone()).collect();
         self.analyses.set_shown(&shown);
+        let shift = self.front().map_or(0.0, |one| one.shift(self.leader));
+        let cursors = match self.cursors {
+            [Some(a), Some(b)] => Some([a + shift, b + shift]),
+            _ => None,
+        };
+        self.analyses.set_cursors(cursors);
         if let Some(front) = self.subjects.first_mut() {
             self.analyses.ui(ui, &mut front.looked, commands);
         }

@@ -1,5 +1,6 @@
 //! Records beside a session: each is added, none is ever written over.
 
+use super::super::edits::Subject;
 use super::super::task::Progress;
 use super::{Done, FitWanted, step};
 use crate::report::kept;
@@ -7,10 +8,9 @@ use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
 use palpate_protocols::analysed::{self, record};
 use palpate_protocols::edited;
-use palpate_protocols::runner::wall_now;
-use palpate_sessions::analyses::{Analysed, Analyses, add_analysis};
+use palpate_sessions::analyses::{Analysed, Analyses, Input, add_analysis, inputs_of};
 use palpate_sessions::calibrations::read_calibration;
-use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
+use palpate_sessions::edits::{Change, Verdict};
 use palpate_sessions::log::Summary;
 use std::path::{Path, PathBuf};
 
@@ -21,13 +21,6 @@ pub struct Who {
     pub by: String,
     /// In a few words; some deeds need it.
     pub reason: String,
-}
-
-/// The name of the login, or `somebody`.
-#[must_use]
-pub fn login() -> String {
-    let login = std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
-    login.unwrap_or_else(|_| "somebody".into())
 }
 
 /// What is done to a session.
@@ -97,13 +90,14 @@ impl Deed {
                 Ok(Done {
                     sentence: format!("analysis '{name}' does not count any more"),
                     changed: Some(session.to_path_buf()),
+                    is_edit: false,
                     made: None,
                 })
             }
             Self::Judge(verdict) => {
                 let change = Change::Verdict { verdict };
                 let sentence = format!("the session is {verdict}");
-                edit(session, &id_of(session)?, change, who, sentence)
+                edit(session, change, who, sentence)
             }
             Self::Correct { number, position } => correct(session, number, position, who),
         }
@@ -132,7 +126,7 @@ fn keep(
     session: &Path,
     id: &str,
     name: &str,
-    inputs: Vec<palpate_sessions::analyses::Input>,
+    inputs: Vec<Input>,
     what: Analysed,
     who: &Who,
 ) -> Result<(), String> {
@@ -144,6 +138,7 @@ fn made(session: &Path, name: &str, sentence: String) -> Done {
     Done {
         sentence: format!("kept as '{}': {sentence}", name.trim()),
         changed: Some(session.to_path_buf()),
+        is_edit: false,
         made: Some(name.trim().to_owned()),
     }
 }
@@ -160,7 +155,15 @@ fn fit(
     let based_on = how.based_on.as_deref();
     let opened = analysed::open(session, based_on).map_err(|err| err.to_string())?;
     let inputs = opened.inputs(session, based_on);
-    let inputs = inputs.map_err(|err| err.to_string())?;
+    let mut inputs = inputs.map_err(|err| err.to_string())?;
+    for one in &how.together_with {
+        let id = id_of(&one.session)?;
+        let theirs = inputs_of(&one.session).map_err(|err| err.to_string())?;
+        inputs.extend(theirs.into_iter().map(|file| Input {
+            what: format!("{id}/{}", file.what),
+            sha256: file.sha256,
+        }));
+    }
     let what = Analysed::Fit {
         based_on: how.based_on.clone(),
         settings: how.settings(),
@@ -219,23 +222,14 @@ fn mask(
     Ok(made(session, &name, sentence))
 }
 
-fn edit(
-    session: &Path,
-    id: &str,
-    change: Change,
-    who: &Who,
-    sentence: String,
-) -> Result<Done, String> {
-    let edit = Edit {
-        at: wall_now().into(),
-        by: who.by.clone(),
-        reason: who.reason.trim().to_owned(),
-        change,
-    };
-    add_edit(session, id, &edit).map_err(|err| err.to_string())?;
+fn edit(session: &Path, change: Change, who: &Who, sentence: String) -> Result<Done, String> {
+    let subject = Subject::read(session).map_err(|err| err.to_string())?;
+    let edit = subject.say(&who.by, &who.reason, change);
+    edit.map_err(|err| err.to_string())?;
     Ok(Done {
         sentence,
         changed: Some(session.to_path_buf()),
+        is_edit: true,
         made: None,
     })
 }
@@ -268,5 +262,5 @@ fn correct(session: &Path, number: u32, position: Position, who: &Who) -> Result
         "contact {number} at {:.3} mm instead of {:.3} mm; its depths change by {deeper:+.3} mm",
         position.0, was.position.0
     );
-    edit(session, &outline.manifest.session_id, change, who, sentence)
+    edit(session, change, who, sentence)
 }

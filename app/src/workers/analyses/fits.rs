@@ -3,15 +3,16 @@
 use super::super::fit::{Fitted, no_systematic};
 use super::super::task::Progress;
 use super::step;
+use crate::report::dossier::{Wanted, name_of};
 use crate::report::family::FittedRecord;
 use crate::report::family_json::{FamilyOutput, fitted, forces};
 use crate::report::kept;
 use palpate_model::families::by_key;
 use palpate_model::fit::{
-    FamilyOptions, FitOptions, FitSample, Fitted as ExactFitted, Parameter, fit_family,
-    systematic_family,
+    FamilyOptions, FitOptions, FitSample, Fitted as ExactFitted, Parameter, fit_family, fit_joint,
+    systematic_family, systematic_joint,
 };
-use palpate_protocols::analysis::{self, FitSource, Stretch, Wanted};
+use palpate_protocols::analysis::{self, FitSource, Stretch};
 use palpate_protocols::origin::Origin;
 use palpate_protocols::runner::Stopwatch;
 use serde_json::{Value, json};
@@ -31,7 +32,12 @@ pub struct FitWanted {
     pub with_profile: bool,
     /// The analysis that the session is read by.
     pub based_on: Option<String>,
+    /// Sessions fitted together with it, one body for all, for the modified Kelvin body.
+    pub together_with: Vec<Wanted>,
 }
+
+/// The parameters of the tissue: what sessions fitted together have in common.
+const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
 impl FitWanted {
     /// What is kept of the question, in the words of `palpate fit`.
@@ -41,17 +47,26 @@ impl FitWanted {
                 "family": key, "unload": self.with_unload, "systematic": true,
                 "include_rejected": true,
             }),
-            None => json!({
-                "fixed": [], "free": [], "systematic": true, "profile": self.with_profile,
-                "bootstrap": null, "seed": null, "compliance": null, "include_rejected": true,
-            }),
+            None => {
+                let mut settings = json!({
+                    "fixed": [], "free": [], "systematic": true, "profile": self.with_profile,
+                    "bootstrap": null, "seed": null, "compliance": null, "include_rejected": true,
+                });
+                if !self.together_with.is_empty() {
+                    let others = self.together_with.iter();
+                    let others: Vec<Value> = others
+                        .map(|one| json!({ "session": name_of(&one.session), "analysis": one.analysis }))
+                        .collect();
+                    settings["share"] = json!(BODY);
+                    settings["together_with"] = json!(others);
+                }
+                settings
+            }
         }
     }
 
-    /// Fits a session; what `palpate fit --json` prints.
-    pub(super) fn results(&self, session: &Path, progress: &Progress) -> Result<Value, String> {
-        step(progress, 0, 4, "reading the session")?;
-        let wanted = Wanted {
+    fn read(&self, session: &Path, based_on: Option<&str>) -> Result<FitSource, String> {
+        let wanted = analysis::Wanted {
             stretch: match self.with_unload {
                 true => Stretch::WithUnload,
                 false => Stretch::RampHold,
@@ -59,11 +74,27 @@ impl FitWanted {
             // Whoever works on a session knows what it is worth.
             is_rejected_included: true,
         };
-        let source = analysis::read_analysed(session, None, wanted, self.based_on.as_deref());
-        let source = source.map_err(|err| err.to_string())?;
+        let source = analysis::read_analysed(session, None, wanted, based_on);
+        source.map_err(|err| format!("{}: {err}", name_of(session)))
+    }
+
+    /// Fits a session; what `palpate fit --json` prints.
+    pub(super) fn results(&self, session: &Path, progress: &Progress) -> Result<Value, String> {
+        step(progress, 0, 4, "reading the session")?;
+        let source = self.read(session, self.based_on.as_deref())?;
         step(progress, 1, 4, "fitting")?;
         match &self.family {
             Some(key) => family(key, source, progress),
+            None if !self.together_with.is_empty() => {
+                let mut sources = vec![(name_of(session), source)];
+                for one in &self.together_with {
+                    let name = name_of(&one.session);
+                    step(progress, 1, 4, &format!("reading {name}"))?;
+                    let source = self.read(&one.session, one.analysis.as_deref())?;
+                    sources.push((name, source));
+                }
+                joint(&sources, progress)
+            }
             None => exact(source, self.with_profile, progress),
         }
     }
@@ -86,6 +117,46 @@ fn exact(source: FitSource, with_profile: bool, progress: &Progress) -> Result<V
         results["systematic"] = json!(systematic);
     }
     results["seconds"] = json!(fitted.seconds);
+    step(progress, 4, 4, "keeping it")?;
+    Ok(results)
+}
+
+/// The first of several sources, fitted with the others as one body.
+fn joint(sources: &[(String, FitSource)], progress: &Progress) -> Result<Value, String> {
+    let options = FitOptions::default();
+    let records: Vec<(&str, &[FitSample])> = sources
+        .iter()
+        .map(|(name, source)| (name.as_str(), source.samples.as_slice()))
+        .collect();
+    step(progress, 2, 4, "fitting all together")?;
+    let watch = Stopwatch::start();
+    let report = fit_joint(&records, &options, &BODY).map_err(|err| err.to_string())?;
+    let seconds = watch.seconds();
+    step(progress, 3, 4, "moving the calibrations by their errors")?;
+    let origins: Result<Vec<Origin>, _> = sources
+        .iter()
+        .map(|(_, source)| Origin::of(source.calibration.as_ref(), None))
+        .collect();
+    let origins = origins.map_err(|err| err.to_string())?;
+    let traced: Vec<_> = records
+        .iter()
+        .zip(&origins)
+        .map(|((name, samples), origin)| origin.traced(name, samples))
+        .collect();
+    let is_known = origins.iter().any(Origin::is_known);
+    let found = is_known.then(|| systematic_joint(&traced, &options, &BODY));
+    let found = found.transpose().map_err(|err| err.to_string())?;
+    let report = match &found {
+        Some(found) => report.with_systematic(found),
+        None => report,
+    };
+    let own = report.records.first().map(|one| &one.report);
+    let mut results = serde_json::to_value(own).map_err(|err| err.to_string())?;
+    if let Some(own) = found.as_ref().and_then(|found| found.first()) {
+        results["systematic"] = json!(own);
+    }
+    results["shared"] = json!(report.shared);
+    results["seconds"] = json!(seconds);
     step(progress, 4, 4, "keeping it")?;
     Ok(results)
 }
@@ -136,6 +207,7 @@ pub fn own(session: &Path, progress: &Progress) -> Result<(Vec<Parameter>, Vec<S
         with_unload: false,
         with_profile: false,
         based_on: None,
+        together_with: Vec::new(),
     };
     let results = wanted.results(session, progress)?;
     Ok((kept::parameters(&results), kept::sentences(&results)))

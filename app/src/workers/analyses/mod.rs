@@ -4,7 +4,7 @@ mod deeds;
 mod fits;
 mod papers;
 
-pub use deeds::{Deed, Who, login};
+pub use deeds::{Deed, Who};
 pub use fits::{FitWanted, OWN_MODEL, own};
 pub use papers::{Paper, paper};
 
@@ -60,8 +60,10 @@ pub fn read(session: &Path, library: Option<&Path>) -> Result<Known, String> {
 pub struct Done {
     /// One sentence.
     pub sentence: String,
-    /// The session that is not as it was, if one is.
+    /// The session beside which something was written, if it was.
     pub changed: Option<PathBuf>,
+    /// Whether that was an edit, so that all who show the session read it again.
+    pub is_edit: bool,
     /// The analysis that was made.
     pub made: Option<String>,
 }
@@ -71,6 +73,7 @@ impl Done {
         Self {
             sentence,
             changed: None,
+            is_edit: false,
             made: None,
         }
     }

@@ -1,9 +1,11 @@
 //! The analysis to be made, as typed.
 
 use super::text_ui;
+use crate::report::dossier::Wanted;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::widgets::reason_button::reason_button;
 use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::{ComboBox, Ui, vec2};
 use palpate_model::families;
 use std::path::PathBuf;
 
@@ -33,9 +35,12 @@ pub(super) struct Form {
     family: Option<String>,
     with_unload: bool,
     with_profile: bool,
+    is_together: bool,
     /// Id of one of the library.
     calibration: Option<String>,
     file: String,
+    /// Where the cursors stand in s, once both are set.
+    pub cursors: Option<[f64; 2]>,
     span: [QuantityField; 2],
 }
 
@@ -48,8 +53,10 @@ impl Default for Form {
             family: None,
             with_unload: false,
             with_profile: false,
+            is_together: false,
             calibration: None,
             file: String::new(),
+            cursors: None,
             span: [0.0, 0.0].map(QuantityField::new),
         }
     }
@@ -69,12 +76,13 @@ impl Form {
         self.span = [from.min(until), from.max(until)].map(field);
     }
 
-    /// Draws the form; what it asks for, or why it asks for nothing.
+    /// Draws the form; what it asks for, or why it asks for nothing. `others` are shown beside the session.
     pub fn ui(
         &mut self,
         ui: &mut Ui,
         known: &Known,
         read_by: Option<&str>,
+        others: &[Wanted],
     ) -> Result<Deed, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
@@ -83,9 +91,17 @@ impl Form {
         });
         text_ui(ui, "name", "of the new analysis", &mut self.name);
         match self.kind {
-            Kind::Fit => self.fit_ui(ui),
+            Kind::Fit => self.fit_ui(ui, others.len()),
             Kind::Recalibration => self.calibration_ui(ui, known),
             Kind::Mask => {
+                let verdict = self.cursors.map(|_| ());
+                let verdict = verdict.ok_or("set cursors A and B on the plot".to_owned());
+                let size = vec2(170.0, 26.0);
+                if reason_button(ui, "Between the cursors", size, &verdict)
+                    && let Some([a, b]) = self.cursors
+                {
+                    self.propose_span(a, b);
+                }
                 for (name, field) in ["from", "to"].into_iter().zip(&mut self.span) {
                     if quantity_ui(ui, name, "s since the first sample", field) {
                         field.check(|_| Ok(()));
@@ -93,10 +109,10 @@ impl Form {
                 }
             }
         }
-        self.deed(known, read_by)
+        self.deed(known, read_by, others)
     }
 
-    fn fit_ui(&mut self, ui: &mut Ui) {
+    fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
         ui.horizontal(|ui| {
             let label = form_label(ui, "model");
             let chosen = self.family.as_deref().unwrap_or(OWN_MODEL);
@@ -114,8 +130,18 @@ impl Form {
         });
         match self.family {
             Some(_) => ui.checkbox(&mut self.with_unload, "the way back too, where recorded"),
-            None => ui.checkbox(&mut self.with_profile, "profile intervals too"),
+            None if others == 0 || !self.is_together => {
+                ui.checkbox(&mut self.with_profile, "profile intervals too")
+            }
+            None => ui.label("without profile intervals"),
         };
+        if others > 0 && self.family.is_none() {
+            let words = match others {
+                1 => "one body for this and the other shown".to_owned(),
+                _ => format!("one body for this and the {others} others shown"),
+            };
+            ui.checkbox(&mut self.is_together, words);
+        }
     }
 
     fn calibration_ui(&mut self, ui: &mut Ui, known: &Known) {
@@ -142,7 +168,12 @@ impl Form {
         text_ui(ui, "or file", "a calibration's document", &mut self.file);
     }
 
-    fn deed(&self, known: &Known, read_by: Option<&str>) -> Result<Deed, String> {
+    fn deed(
+        &self,
+        known: &Known,
+        read_by: Option<&str>,
+        others: &[Wanted],
+    ) -> Result<Deed, String> {
         let name = self.name.trim().to_owned();
         if name.is_empty() {
             return Err("give the new analysis a name".to_owned());
@@ -152,14 +183,19 @@ impl Form {
                 "there is an analysis '{name}' already, and a name is never used twice; choose another"
             ));
         }
+        let is_together = self.is_together && self.family.is_none() && !others.is_empty();
         match self.kind {
             Kind::Fit => Ok(Deed::Fit {
                 name,
                 how: FitWanted {
                     family: self.family.clone(),
                     with_unload: self.with_unload && self.family.is_some(),
-                    with_profile: self.with_profile && self.family.is_none(),
+                    with_profile: self.with_profile && self.family.is_none() && !is_together,
                     based_on: read_by.map(str::to_owned),
+                    together_with: match is_together {
+                        true => others.to_vec(),
+                        false => Vec::new(),
+                    },
                 },
             }),
             Kind::Recalibration => self.recalibration(known, name),

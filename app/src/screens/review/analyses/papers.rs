@@ -27,8 +27,9 @@ pub(super) struct Papers {
     is_of_all: bool,
     figure: String,
     of: Figure,
-    /// A stretch of time in s, and whether the figure shows it alone.
-    span: Option<[f64; 2]>,
+    /// The stretch between the cursors in s, the earlier first.
+    pub span: Option<[f64; 2]>,
+    /// Whether the figure shows it alone.
     is_of_span: bool,
     dialog: SaveDialog,
     asked: Option<Field>,
@@ -49,11 +50,6 @@ impl Papers {
                 None => {}
             }
         }
-    }
-
-    /// A stretch that a figure may show alone.
-    pub fn propose_span(&mut self, from: f64, until: f64) {
-        self.span = Some([from.min(until), from.max(until)]);
     }
 
     /// Draws the form.
