@@ -21,7 +21,6 @@ pub fn change(change: &Change) -> String {
             let signs = added.chain(remove.iter().map(|tag| format!("-{tag}")));
             format!("tags {}", signs.collect::<Vec<_>>().join(" "))
         }
-        Change::Note => "note".to_owned(),
         Change::Review { decision, .. } => format!("review, {}", decision.word()),
         Change::Contact {
             number,

@@ -2,7 +2,6 @@
 //! the log, never over anything.
 
 use super::task::Progress;
-use crate::workers::analyses::login;
 use chrono::{DateTime, Utc};
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
@@ -16,7 +15,11 @@ use std::path::{Path, PathBuf};
 /// The name given, or that of the login.
 #[must_use]
 pub fn author(given: Option<&str>) -> String {
-    given.map_or_else(login, str::to_owned)
+    let login = || std::env::var("USER").or_else(|_| std::env::var("USERNAME"));
+    given.map_or_else(
+        || login().unwrap_or_else(|_| "somebody".into()),
+        str::to_owned,
+    )
 }
 
 /// Nothing was said of a session.
