@@ -135,7 +135,8 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
         .iter()
         .map(|one| one["what"].as_str().unwrap())
         .collect();
-    assert_eq!(kinds, ["session", "verdict", "tags", "review", "verdict"]);
+    let all = ["session", "verdict", "tags", "note", "review", "verdict"];
+    assert_eq!(kinds, all);
     let nobody = palpate(at, &["history", "rig", "nobody's"]);
     assert_eq!(nobody.status.code(), Some(2));
 
