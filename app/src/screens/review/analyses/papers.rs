@@ -150,7 +150,7 @@ fn path_verdict(path: &str, endings: &[&str]) -> Result<(), String> {
         let ending = format!(".{ending}");
         path.len() > ending.len() && path.to_ascii_lowercase().ends_with(&ending)
     };
-    match (path, endings.iter().any(|ending| is_known(ending))) {
+    match (path, endings.iter().any(is_known)) {
         ("", _) => Err("write the name of a new file, or choose one".to_owned()),
         (_, true) => Ok(()),
         (_, false) => Err(format!("let the name end in .{}", endings.join(" or ."))),
