@@ -203,6 +203,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.type_into("name", "simpler");
     panel.click("Make analysis");
     panel.wait_for("kept as 'simpler'");
+    panel.wait_for("Found by 'simpler'");
     let kept = panel.analyses();
     let Analysed::Fit {
         based_on, settings, ..
@@ -227,6 +228,7 @@ fn another_model_another_calibration_and_a_stretch_left_out() {
     panel.type_into("or file", &document.display().to_string());
     panel.click("Make analysis");
     panel.wait_for("kept as 'anew'");
+    panel.wait_for("Found by 'anew'");
     panel.wait_for("N rms and at most");
     assert_eq!(panel.analyses().counting().count(), 3);
     panel.type_into("reason", "only tried");

@@ -306,6 +306,8 @@ fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
         let label = form_label(ui, name);
         let width = ui.available_width() - 8.0;
         let input = TextEdit::singleline(text)
+            // Whatever the list above does, who types goes on typing.
+            .id_salt(("analyses", name))
             .desired_width(width)
             .char_limit(4096)
             .hint_text(hint);
