@@ -463,18 +463,26 @@ impl WorkbenchApp {
             paths.into_iter().partition(|path| ends(path, &["toml"]));
         let (tables, sessions): (Vec<_>, Vec<_>) = others
             .into_iter()
-            .partition(|path| ends(path, &["csv", "tsv", "txt"]));
+            .partition(|path| path.is_file() && !ends(path, &["mcap"]));
         if let Some(path) = protocols.first() {
             self.screen = Screen::Run;
             self.read_protocol(|chooser| chooser.read(path, ctx));
         }
-        if !tables.is_empty() {
-            self.screen = Screen::Models;
+        if !tables.is_empty() && self.screen == Screen::Models {
             tables.iter().for_each(|path| self.models.add(path));
+        } else if !tables.is_empty() {
+            self.screen = Screen::Library;
+            self.catalog.take_files(&tables);
         }
         if !sessions.is_empty() {
+            // A log that was dropped stands for its session.
+            let folder = |path: PathBuf| match (path.is_file(), path.parent()) {
+                (true, Some(folder)) => folder.to_owned(),
+                _ => path,
+            };
             self.screen = Screen::Review;
-            self.review.open(sessions, ctx);
+            self.review
+                .open(sessions.into_iter().map(folder).collect(), ctx);
         }
     }
 

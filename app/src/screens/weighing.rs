@@ -49,14 +49,14 @@ pub fn weighing_ui(
         .map(|planned| row(planned, run, next, &bench.curve))
         .collect();
     let columns = [
-        Column::numbers("pass", 40.0),
-        Column::words("masses go", 76.0),
-        Column::numbers("mass (g)", 70.0),
-        Column::numbers("expected (V)", 90.0),
-        Column::numbers("measured (V)", 90.0),
-        Column::numbers("apart (mV)", 80.0),
-        Column::numbers("apart (N)", 80.0),
-        Column::words("", 120.0),
+        Column::numbers("pass", 34.0),
+        Column::words("masses go", 66.0),
+        Column::numbers("mass (g)", 60.0),
+        Column::numbers("expected (V)", 82.0),
+        Column::numbers("measured (V)", 82.0),
+        Column::numbers("apart (mV)", 70.0),
+        Column::numbers("apart (N)", 66.0),
+        Column::words("", 44.0),
     ];
     ui.allocate_ui(vec2(ui.available_width(), TABLE_HEIGHT), |ui| {
         table_ui(ui, "readings", &columns, &rows);

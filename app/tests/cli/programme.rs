@@ -366,7 +366,7 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     let again = as_json();
     succeeded(&again);
     assert_eq!(predictions(&json(&again)), 0);
-    let words = "not compared: no session of task 'first' was fitted: first/01: rejected";
+    let words = "not compared: no session of task &apos;first&apos; was fitted: first/01: rejected";
     assert!(page().contains(words), "{}", page());
 
     // One is gone, and one is noise; what was said of it was said of something else.

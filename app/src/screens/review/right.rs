@@ -9,7 +9,7 @@ use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::uncertain::{interval, plain};
 use crate::workers::review::Facts;
 use crate::workers::review::fit::SessionFit;
-use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui};
+use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
 use palpate_sessions::edits::Verdict;
 
 /// Letters of a hash that tell it apart at a glance; the whole one is copied.
@@ -87,18 +87,15 @@ fn facts_ui(ui: &mut Ui, facts: &Facts) {
         fact_ui(ui, "calibration", format!("{}{taken}", calibration.name));
     }
     for hash in &facts.hashes {
-        ui.horizontal(|ui| {
-            let short: String = hash.sha256.chars().take(HASH_SHOWN).collect();
-            let words = RichText::new(format!("{} {short}", hash.what)).color(tokens.text_quiet);
-            ui.add(Label::new(words.small()).sense(Sense::empty()))
-                .on_hover_text(&hash.sha256);
-            if ui
-                .small_button(format!("copy SHA-256 of {}", hash.what))
-                .clicked()
-            {
-                ui.ctx().copy_text(hash.sha256.clone());
-            }
-        });
+        // Names of files may be long; the panel stays as wide as it is.
+        let short: String = hash.sha256.chars().take(HASH_SHOWN).collect();
+        let words = RichText::new(format!("{} {short}", hash.what)).color(tokens.text_quiet);
+        ui.add(Label::new(words.small()).truncate().sense(Sense::empty()))
+            .on_hover_text(&hash.sha256);
+        let name = format!("copy SHA-256 of {}", hash.what);
+        if ui.add(Button::new(name).small().truncate()).clicked() {
+            ui.ctx().copy_text(hash.sha256.clone());
+        }
     }
     for note in &facts.notes {
         quiet_ui(ui, note);
