@@ -67,14 +67,6 @@ fn one_session_is_looked_at_closely() {
     for words in ["t at A", "t at B", "dt +", "dF", "d signal", "signal at B"] {
         assert!(flow.says(words), "{words}");
     }
-    // A quarter of the picture on, behind contact.
-    for _ in 0..100 {
-        flow.window
-            .key_press_modifiers(Modifiers::ALT, Key::ArrowRight);
-        flow.window.step();
-    }
-    flow.window.run_steps(2);
-    assert!(flow.says("d depth"));
     flow.click("Copy readout");
     flow.click("No cursors");
     assert!(!flow.says("F at A"));

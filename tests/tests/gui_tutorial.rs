@@ -4,7 +4,7 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use eframe::egui::{Key, Modifiers};
-use egui_kittest::kittest::Queryable;
+use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_protocols::runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
 use palpate_tests::workspace;
@@ -136,7 +136,14 @@ fn carry_out(flow: &mut Flow, deed: &Deed) {
             flow.window.run_steps(3);
             assert!(flow.says(words), "{words}");
         }
-        Deed::Press(name) => flow.click(name),
+        Deed::Press(name) => {
+            // What is closed for the moment says why; a reader would wait too.
+            flow.wait(name, |window| {
+                let found = window.query_by_label(name);
+                found.is_some_and(|node| !node.accesskit_node().is_disabled())
+            });
+            flow.click(name);
+        }
         Deed::Type(text, name) => {
             // Files go where the test's files go.
             let text = match text.as_str() {

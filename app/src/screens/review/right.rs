@@ -25,7 +25,7 @@ impl ReviewScreen {
             return;
         };
         section_ui(ui, "Session in front");
-        fact_ui(ui, "name", front.name.as_str());
+        fact_ui(ui, "id", front.name.as_str());
         if let Some(head) = &front.recording.head {
             let samples = format!(
                 "{} over {:.1} s, begun {}",
