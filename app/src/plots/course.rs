@@ -51,7 +51,13 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint]) {
                     HoverPosition::Elsewhere { .. } => None,
                 })
                 .show(ui, |plot_ui| {
-                    plot_ui.line(Line::new(title, points).color(ink).width(1.6));
+                    // A plan has few points, and bands of those that share a column would be drawn as wedges.
+                    plot_ui.line(
+                        Line::new(title, points)
+                            .allow_band(false)
+                            .color(ink)
+                            .width(1.6),
+                    );
                 });
         });
     }
