@@ -67,6 +67,14 @@ fn one_session_is_looked_at_closely() {
     for words in ["t at A", "t at B", "dt +", "dF", "d signal", "signal at B"] {
         assert!(flow.says(words), "{words}");
     }
+    // From a third of the picture to behind contact, at 88.7 of 105 s.
+    for _ in 0..220 {
+        flow.window
+            .key_press_modifiers(Modifiers::ALT, Key::ArrowRight);
+        flow.window.step();
+    }
+    flow.window.run_steps(2);
+    assert!(flow.says("depth at A"));
     flow.click("Copy readout");
     flow.click("No cursors");
     assert!(!flow.says("F at A"));
