@@ -350,14 +350,14 @@ impl WorkbenchApp {
                     self.tour.end();
                     self.settings.now.is_tour_over = true;
                 }
-                Command::Note(text) => self.write_note(text),
                 Command::NoteTyped => {
-                    let text = std::mem::take(&mut self.note);
-                    let text = match text.trim() {
+                    let text = match self.note.trim() {
                         "" => "mark".to_owned(),
                         text => text.to_owned(),
                     };
-                    self.write_note(text);
+                    if self.write_note(text) {
+                        self.note.clear();
+                    }
                 }
                 Command::Aside(aside) => self.run_aside(&aside),
             }
@@ -400,12 +400,17 @@ impl WorkbenchApp {
         }
     }
 
-    /// Something is written down in the run in progress; without one there is nowhere to write it.
-    fn write_note(&mut self, text: String) {
-        if run_in_progress(&self.snapshot).is_some()
-            && let Err(err) = self.runner.request(Request::Note(text))
-        {
-            self.refusal = Some(err);
+    /// Something is written down in the run in progress; without one there is nowhere to write it, and false is returned.
+    fn write_note(&mut self, text: String) -> bool {
+        if run_in_progress(&self.snapshot).is_none() {
+            return false;
+        }
+        match self.runner.request(Request::Note(text)) {
+            Ok(()) => true,
+            Err(err) => {
+                self.refusal = Some(err);
+                false
+            }
         }
     }
 
@@ -440,6 +445,11 @@ impl WorkbenchApp {
         let now = &mut self.settings.now;
         now.is_dark = ctx.theme() == Theme::Dark;
         now.zoom = ctx.zoom_factor();
+    }
+
+    /// The rest of it, when the window closes.
+    fn remember_last(&mut self) {
+        let now = &mut self.settings.now;
         now.screen = self.screen.name().to_owned();
         now.operator = self.form.told_text("operator").to_owned();
         now.sessions.clone_from(&self.form.folder);
@@ -648,6 +658,7 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn on_exit(&mut self) {
+        self.remember_last();
         if let Err(err) = self.settings.store() {
             let _ =
                 std::io::Write::write_all(&mut std::io::stderr(), format!("{err}\n").as_bytes());

@@ -35,9 +35,7 @@ pub enum Command {
     TakeProtocol(&'static str),
     /// Read the protocol file whose path is typed.
     OpenProtocol,
-    /// Write something down in the run in progress.
-    Note(String),
-    /// Write down what stands in the field for notes; a mark if nothing does.
+    /// Write down in the run in progress what stands in the field for notes; a mark if nothing does.
     NoteTyped,
     /// Move by hand: a short run beside the protocol in the form.
     Aside(Aside),

@@ -153,6 +153,15 @@ pub enum Gate {
     Acknowledge(String),
 }
 
+/// Whether a plan may touch something, so that the rig's daily check has a say in it.
+#[must_use]
+pub fn is_gated(plan: &Plan) -> bool {
+    let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
+    let is_touching =
+        |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog { .. }));
+    plan.steps.iter().any(|planned| is_touching(&planned.step))
+}
+
 impl Gate {
     /// What to tell before the run of a plan on a rig. Plans that cannot touch tissue, such as a calibration or
     /// the check itself, are always open. Without a library nothing was ever checked.
@@ -163,10 +172,7 @@ impl Gate {
         is_virtual: bool,
         now: SystemTime,
     ) -> Result<Self, CheckFileError> {
-        let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
-        let is_touching =
-            |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog { .. }));
-        if !plan.steps.iter().any(|planned| is_touching(&planned.step)) {
+        if !is_gated(plan) {
             return Ok(Self::Open);
         }
         let checks = library.map_or(Ok(Vec::new()), |library| read_checks(library, rig))?;

@@ -137,6 +137,24 @@ fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
 }
 
 #[test]
+fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
+    let mut options = WindowOptions::open("sim", &SimSettings::default(), TimeScale::Max).unwrap();
+    options.to_acknowledge = vec!["the daily check failed: zero".into()];
+    let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
+    flow.window
+        .key_press_modifiers(Modifiers::COMMAND, Screen::Rig.key());
+    flow.window.run_steps(3);
+    flow.click("+5 mm");
+    flow.window.run_steps(10);
+    assert!(flow.says("the daily check failed: zero; make the daily check, or accept it"));
+    assert!(flow.run().is_none() && flow.sessions().is_empty());
+    // Away from everything it may go, to find home.
+    flow.click("Find home");
+    let run = flow.wait_for_end();
+    assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+}
+
+#[test]
 fn a_weight_that_was_read_wrongly_is_read_again_and_the_last_reading_counts() {
     let mut flow = Flow::open(TimeScale::Factor(20.0));
     by_name(&mut flow, "protocol load-cell-calibration");

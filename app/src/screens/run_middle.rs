@@ -62,11 +62,9 @@ pub fn is_offered(view: Middle, run: Option<&RunView>) -> bool {
     match view {
         Middle::Choose | Middle::Course | Middle::Measured => true,
         Middle::Weighing => run.is_some_and(|run| !run.to_weigh.is_empty()),
-        Middle::Approach => run.is_some_and(|run| {
-            run.approach.samples_per_bucket() > 1
-                || !run.touches.is_empty()
-                || run.phase == Phase::Contact
-        }),
+        Middle::Approach => {
+            run.is_some_and(|run| run.phase == Phase::Contact || !run.touches.is_empty())
+        }
     }
 }
 

@@ -7,6 +7,7 @@ pub use field::{ParamField, ToldField};
 use crate::command::Aside;
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
+use palpate_protocols::daily::is_gated;
 use palpate_protocols::file::{Problem, Protocol, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
@@ -221,6 +222,13 @@ impl ProtocolForm {
             &bench.curve,
             rig.is_homed,
         );
+        // What must be acknowledged is not acknowledged by a button that is pressed in passing.
+        if let (true, Some(reason)) = (is_gated(&plan), bench.to_acknowledge.first()) {
+            return Err(format!(
+                "{reason}; make the daily check, or accept it on the run screen with the protocol {}",
+                aside.protocol
+            ));
+        }
         preview.verdict(false)?;
         Ok(RunRequest {
             plan,
