@@ -11,4 +11,5 @@ pub mod state_badge;
 pub mod step_mark;
 pub mod table;
 pub mod task_bar;
+pub mod text_row;
 pub mod uncertain;

@@ -1,10 +1,10 @@
 //! Sessions chosen written as tables or into a lake.
 
-use super::form::text_ui;
 use super::say::sentence;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::text_row::text_row;
 use crate::workers::exports::{Destination, Exported, export_all};
 use crate::workers::path_dialog::FolderDialog;
 use crate::workers::task::Task;
@@ -90,7 +90,7 @@ impl FilesPanel {
                 .response
                 .labelled_by(label.id);
         });
-        text_ui(ui, "to folder", "made if there is none", &mut self.to);
+        text_row(ui, "to folder", "made if there is none", &mut self.to);
         let is_open = self.dialog.is_open();
         let button = eframe::egui::Button::new("Choose folder...");
         if ui.add_enabled(!is_open, button).clicked()

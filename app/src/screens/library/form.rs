@@ -2,9 +2,9 @@
 
 use crate::theme::Tokens;
 use crate::widgets::choice_box::choice_box_ui;
-use crate::widgets::quantity_input::form_label;
+use crate::widgets::text_row::text_row;
 use chrono::{DateTime, Utc};
-use eframe::egui::{Label, RichText, TextEdit, Ui};
+use eframe::egui::{Label, RichText, Ui};
 use palpate_sessions::catalog::{
     Choices, DayError, Order, Query, beginning, ending, words_and_conditions,
 };
@@ -98,7 +98,7 @@ impl SearchForm {
     pub fn ui(&mut self, ui: &mut Ui, choices: &Choices) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let words = |words: &[&str]| words.iter().map(ToString::to_string).collect::<Vec<_>>();
-        text_ui(ui, "find", "words, depth>=20mm", &mut self.line);
+        text_row(ui, "find", "words, depth>=20mm", &mut self.line);
         if let Err(err) = words_and_conditions(&self.line) {
             let text = RichText::new(err.to_string());
             ui.add(Label::new(text.color(tokens.alarm_text).small()).wrap());
@@ -109,8 +109,8 @@ impl SearchForm {
         self.tag.ui(ui, "tag is", &choices.tags);
         self.verdict.ui(ui, "verdict is", &words(&VERDICTS));
         self.review.ui(ui, "review is", &words(&REVIEWS));
-        text_ui(ui, "from", "2026-03-05", &mut self.since);
-        text_ui(ui, "until", "2026-03-31", &mut self.until);
+        text_row(ui, "from", "2026-03-05", &mut self.since);
+        text_row(ui, "until", "2026-03-31", &mut self.until);
         for (text, read) in [
             (&self.since, beginning as fn(&str) -> _),
             (&self.until, ending),
@@ -121,20 +121,6 @@ impl SearchForm {
             }
         }
     }
-}
-
-/// A field of one line behind its label; true when it was left with Enter.
-pub(super) fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) -> bool {
-    ui.horizontal(|ui| {
-        let label = form_label(ui, name);
-        let input = TextEdit::singleline(text)
-            .desired_width(ui.available_width() - 8.0)
-            .char_limit(4096)
-            .hint_text(hint);
-        let typed = ui.add(input).labelled_by(label.id);
-        typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter))
-    })
-    .inner
 }
 
 #[cfg(test)]

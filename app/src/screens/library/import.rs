@@ -1,9 +1,9 @@
 //! Files of other programs made into sessions of the library.
 
-use super::form::text_ui;
 use super::say::sentence;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::standing_ui;
+use crate::widgets::text_row::text_row;
 use crate::workers::imports::{Request, import_and_tell};
 use crate::workers::path_dialog::FilesDialog;
 use crate::workers::task::Task;
@@ -89,7 +89,7 @@ impl ImportPanel {
     pub fn ui(&mut self, ui: &mut Ui, library: &Path) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Import files of other programs");
-        text_ui(ui, "files", "paths, ; between them", &mut self.files);
+        text_row(ui, "files", "paths, ; between them", &mut self.files);
         let is_open = self.dialog.is_open();
         if ui
             .add_enabled(!is_open, Button::new("Choose files..."))
@@ -104,8 +104,8 @@ impl ImportPanel {
         if let Some(refusal) = &self.refusal {
             sentence(ui, refusal, true);
         }
-        text_ui(ui, "of what", "specimen", &mut self.specimen);
-        text_ui(ui, "who", "who measured", &mut self.operator);
+        text_row(ui, "of what", "specimen", &mut self.specimen);
+        text_row(ui, "who", "who measured", &mut self.operator);
         let verdict = self.verdict();
         let size = vec2(96.0, 26.0);
         let pressed = |ui: &mut Ui, text: &str| {

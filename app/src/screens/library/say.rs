@@ -1,11 +1,11 @@
 //! What is said of the sessions chosen: tags, notes, a verdict, a review; each an edit beside the log, and what of it can
 //! be taken back.
 
-use super::form::text_ui;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::standing_ui;
+use crate::widgets::text_row::text_row;
 use crate::workers::edits::{Act, Said, Saying, author, say, take_back};
 use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, Modifiers, Popup, RichText, Ui, vec2};
@@ -154,23 +154,23 @@ impl SayPanel {
     pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Say of them");
-        text_ui(ui, "by", "your name", &mut self.by);
+        text_row(ui, "by", "your name", &mut self.by);
         let may = self.may(sessions.len());
         let needs = |text: &str, what: &str| match text.trim() {
             "" => may.clone().and(Err(format!("write {what} first"))),
             _ => may.clone(),
         };
         let mut wanted = None;
-        text_ui(ui, "new tags", "+pilot -doubtful", &mut self.tags);
+        text_row(ui, "new tags", "+pilot -doubtful", &mut self.tags);
         if button(ui, "Change tags", &needs(&self.tags, "tags")) {
             let (add, remove) = tags(&self.tags);
             wanted = Some(Saying::Tags { add, remove });
         }
-        text_ui(ui, "note", "what is to be remembered", &mut self.note);
+        text_row(ui, "note", "what is to be remembered", &mut self.note);
         if button(ui, "Add note", &needs(&self.note, "the note")) {
             wanted = Some(Saying::Note(self.note.clone()));
         }
-        text_ui(ui, "reason", "of a verdict or a review", &mut self.reason);
+        text_row(ui, "reason", "of a verdict or a review", &mut self.reason);
         let needs_reason = needs(&self.reason, "the reason");
         ui.horizontal_wrapped(|ui| {
             for (name, verdict) in [

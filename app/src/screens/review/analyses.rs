@@ -10,13 +10,13 @@ use crate::command::Commands;
 use crate::report::dossier::Wanted;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::analyses::{Deed, Done, Known, Who, own, read};
 use crate::workers::edits::author;
 use crate::workers::task::Task;
-use eframe::egui::{Context, Label, RichText, TextEdit, Ui};
+use eframe::egui::{Context, Label, RichText, Ui};
 use form::Form;
 use palpate_model::fit::Parameter;
 use papers::Papers;
@@ -222,8 +222,8 @@ impl AnalysesPanel {
 
     /// By whom and why: one pair of fields for all that is done to a session.
     fn who_ui(&mut self, ui: &mut Ui) {
-        text_ui(ui, "reason", "why, in a few words", &mut self.reason);
-        text_ui(ui, "by", "your name", &mut self.by);
+        text_row(ui, "reason", "why, in a few words", &mut self.reason);
+        text_row(ui, "by", "your name", &mut self.by);
     }
 
     fn free(&self) -> Result<(), String> {
@@ -298,19 +298,4 @@ fn quiet_ui(ui: &mut Ui, text: &str) {
 fn wrong_ui(ui: &mut Ui, text: &str) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
-}
-
-/// A labelled line of text.
-fn text_ui(ui: &mut Ui, name: &str, hint: &str, text: &mut String) {
-    ui.horizontal(|ui| {
-        let label = form_label(ui, name);
-        let width = ui.available_width() - 8.0;
-        let input = TextEdit::singleline(text)
-            // Whatever the list above does, who types goes on typing.
-            .id_salt(("analyses", name))
-            .desired_width(width)
-            .char_limit(4096)
-            .hint_text(hint);
-        ui.add(input).labelled_by(label.id);
-    });
 }

@@ -5,6 +5,7 @@ use crate::command::{Command, Commands};
 use crate::shell::rail::Screen;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::review::{Leader, Quantity, Stage};
@@ -157,7 +158,7 @@ impl ReviewScreen {
         ui.horizontal(|ui| {
             let label = ui.label("session");
             let input = TextEdit::singleline(&mut self.path).desired_width(200.0);
-            ui.add(input).labelled_by(label.id);
+            ui.add(input).labelled_by(label.id).place("session");
         });
         let verdict = match self.path.trim() {
             "" => Err("type the path of a session's folder".to_owned()),

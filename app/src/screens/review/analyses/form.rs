@@ -1,9 +1,9 @@
 //! The analysis to be made, as typed.
 
-use super::text_ui;
 use crate::report::dossier::Wanted;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::text_row::text_row;
 use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
 use eframe::egui::{ComboBox, Ui, vec2};
 use palpate_model::families;
@@ -89,7 +89,7 @@ impl Form {
                 ui.selectable_value(&mut self.kind, kind, words);
             }
         });
-        text_ui(ui, "name", "of the new analysis", &mut self.name);
+        text_row(ui, "name", "of the new analysis", &mut self.name);
         match self.kind {
             Kind::Fit => self.fit_ui(ui, others.len()),
             Kind::Recalibration => self.calibration_ui(ui, known),
@@ -165,7 +165,7 @@ impl Form {
                 .response
                 .labelled_by(label.id);
         });
-        text_ui(ui, "or file", "a calibration's document", &mut self.file);
+        text_row(ui, "or file", "a calibration's document", &mut self.file);
     }
 
     fn deed(

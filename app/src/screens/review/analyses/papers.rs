@@ -1,12 +1,13 @@
 //! Report and figure of what is in front, as new files.
 
 use super::super::Looked;
-use super::{quiet_ui, text_ui, wrong_ui};
+use super::{quiet_ui, wrong_ui};
 use crate::report::dossier::{Figure, Wanted, name_of};
 use crate::report::figures::Window;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::text_row::text_row;
 use crate::workers::analyses::{Done, Paper, paper};
 use crate::workers::path_dialog::{SaveAs, SaveDialog};
 use crate::workers::task::Task;
@@ -59,7 +60,7 @@ impl Papers {
             analysis: one.analysis.clone(),
         };
         section_ui(ui, "Report");
-        text_ui(ui, "report file", "a new .html file", &mut self.report);
+        text_row(ui, "report file", "a new .html file", &mut self.report);
         self.choose_ui(ui, Field::Report, looked);
         if shown.len() > 1 {
             ui.checkbox(&mut self.is_of_all, format!("of all {} shown", shown.len()));
@@ -94,7 +95,7 @@ impl Papers {
                 .response
                 .labelled_by(label.id);
         });
-        text_ui(
+        text_row(
             ui,
             "figure file",
             "a new .svg or .png file",
