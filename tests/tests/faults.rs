@@ -100,7 +100,13 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
         .name("watcher".into())
         .spawn(move || {
             let rig = SimRig::new(SimSettings::default());
-            let (calibration, plan) = (rig.calibration(), params().plan());
+            // The hold outlasts the report of the panic, however long that takes to write.
+            let plan = RampHold {
+                hold: Seconds(3600.0),
+                ..params()
+            }
+            .plan();
+            let calibration = rig.calibration();
             let scale = TimeScale::Factor(50.0);
             let (runner, woken) = recorded::start(Box::new(rig), calibration, plan, scale, &place);
             let is_pressing = |runner: &Runner| {
