@@ -51,6 +51,12 @@ pub enum RigCommand {
 }
 
 impl RigCommand {
+    /// Whether it moves the axis.
+    #[must_use]
+    pub const fn is_motion(&self) -> bool {
+        matches!(self, Self::MoveTo(_) | Self::Oscillate(_))
+    }
+
     /// Whether a controller that acknowledges `set` does what this command asked. It counts speed and acceleration
     /// in quanta of its own, so 0.9 mm/s may come back as thirty times 0.03 mm/s, which is not the same float.
     #[must_use]

@@ -53,6 +53,8 @@ pub struct PathTracker {
     /// Speed at which the motion under way was cut short: what its place is uncertain by then stays so to the end.
     speed_at_stop: MmPerS,
     pending: Option<Pending>,
+    /// A stop was accepted behind the motion that has not begun.
+    is_pending_stopped: bool,
     motion: Motion,
 }
 
@@ -68,18 +70,34 @@ impl PathTracker {
             velocity: MmPerS(0.0),
             speed_at_stop: MmPerS(0.0),
             pending: None,
+            is_pending_stopped: false,
             motion: Motion::Rest,
         }
     }
 
     /// A move was sent; it starts when the axis reports motion.
     pub fn on_move(&mut self, command: MoveTo) {
-        self.pending = Some(Pending::Move(command));
+        self.await_motion(Pending::Move(command));
     }
 
     /// An oscillation was sent; it starts when the axis reports motion.
     pub fn on_oscillate(&mut self, command: Oscillation) {
-        self.pending = Some(Pending::Sine(command));
+        self.await_motion(Pending::Sine(command));
+    }
+
+    fn await_motion(&mut self, motion: Pending) {
+        self.pending = Some(motion);
+        self.is_pending_stopped = false;
+    }
+
+    /// The motion that was sent last will not begin.
+    pub fn on_not_begun(&mut self) {
+        self.pending = None;
+    }
+
+    /// A stop was accepted. Where the next sample shows no motion, the one sent before is over: it was shorter than a sample.
+    pub fn on_stop_accepted(&mut self) {
+        self.is_pending_stopped = true;
     }
 
     /// The present position was given a new count.
@@ -117,7 +135,9 @@ impl PathTracker {
                 is_stopping: false,
             };
         }
+        let is_over = !is_moving && self.is_pending_stopped;
         let position = match &mut self.motion {
+            Motion::Rest if is_over && self.pending.take().is_some() => reported,
             Motion::Rest => at_rest,
             Motion::Moving {
                 course,

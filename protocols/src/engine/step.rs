@@ -305,8 +305,15 @@ fn on_ack(cx: &mut Context<'_>, ack: Ack) {
             cx.state.pulses = pulses;
         }
         RigCommand::EnableMotor => stop::on_motor_enabled(cx),
+        // A motion that waits behind the stop is not the one that was stopped.
+        RigCommand::Stop if !is_motion_waiting(cx.state) => cx.state.path.on_stop_accepted(),
         _ => {}
     }
+}
+
+fn is_motion_waiting(state: &State) -> bool {
+    let mut waiting = state.unacknowledged.iter();
+    waiting.any(|(_, command)| command.is_motion())
 }
 
 fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
@@ -332,6 +339,14 @@ fn on_fault(cx: &mut Context<'_>, fault: &Fault) {
             },
         ),
         Fault::CommandRefused { .. } => {
+            // A stop that the plan itself sent came first: the axis rests, as it should.
+            let mut waiting = cx.state.unacknowledged.iter().map(|(_, command)| command);
+            let is_motion = waiting.next().is_some_and(RigCommand::is_motion);
+            if is_motion && waiting.any(|command| *command == RigCommand::Stop) {
+                cx.state.unacknowledged.pop_front();
+                cx.state.path.on_not_begun();
+                return;
+            }
             cx.state.unacknowledged.clear();
             // A refused stop is not repeated for ever: braking has its time limit, then the halt.
             if stop::is_braking(cx.state) {

@@ -3,13 +3,13 @@
 mod hold;
 
 use super::*;
-use crate::plans::{HoldUntil, Plan, Step};
+use crate::plans::{HoldUntil, LoadTo, Plan, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
     Ack, AdcDescription, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
 };
-use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
+use palpate_model::units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use std::sync::Arc;
 
 /// A rig of straight lines: 0.15 V/N from 1.28 V, one sample a millisecond.
@@ -575,6 +575,93 @@ fn an_axis_that_moves_after_a_stop_is_cut() {
     assert_eq!(tripped(&effects), Some(Interlock::Path));
     assert_eq!(commands(&effects), [RigCommand::Halt]);
     assert!(!bench.state().is_homed());
+}
+
+/// Loading to 1 N, which the first sample of the load has already: the move and the stop behind it are sent. With a brake
+/// the approach begins fast and goes on slower.
+fn reached_at_once(brake: Option<Newtons>) -> Bench {
+    let hold = |secs: f64| Step::Hold {
+        duration: Seconds(secs),
+        until: None,
+        rate: None,
+    };
+    let load = LoadTo {
+        force: Newtons(1.0),
+        speed: MmPerS(0.75),
+        depth_max: Depth(35.0),
+        brake,
+    };
+    let (check, tare) = (Seconds(0.1), Seconds(0.1));
+    let mut bench = Bench::new(vec![
+        Step::SelfTest { duration: check },
+        Step::Tare { duration: tare },
+        hold(0.1),
+        Step::LoadTo(load),
+        hold(10.0),
+    ]);
+    bench.start();
+    let (mut sent, mut force) = (Vec::new(), 0.0_f64);
+    for _ in 0..1000 {
+        if bench.state().phase() == Phase::Hold {
+            bench.state.as_mut().unwrap().contact = Some(Contact {
+                position: Position(0.0),
+                std_error_mm: 0.01,
+            });
+            // 20 N/s, as no interlock minds.
+            force = (force + 0.02).min(1.1);
+        }
+        sent.extend(commands(&bench.sample(volts(force))));
+        if sent.last() == Some(&RigCommand::Stop) {
+            assert!(sent[0].is_motion(), "{sent:?}");
+            return bench;
+        }
+    }
+    panic!("no load: {:?}", bench.state());
+}
+
+#[test]
+fn a_stop_of_the_plan_may_come_before_the_move_that_it_ends() {
+    // A driver drops the move, which waits in its queue, and says so; or the move is over between two samples.
+    let dropped = Input::Fault(Fault::CommandRefused {
+        detail: "a stop came first".into(),
+    });
+    let (_, command) = reached_at_once(None).state().unacknowledged[0];
+    for answer in [dropped, Input::Ack(Ack { command })] {
+        let mut bench = reached_at_once(None);
+        bench.give(answer.clone());
+        let command = RigCommand::Stop;
+        bench.give(Input::Ack(Ack { command }));
+        let effects = bench.sample(volts(1.1));
+        let is_reached =
+            |effect: &Effect| matches!(effect, Effect::Record(Record::ForceReached { .. }));
+        assert!(effects.iter().any(is_reached), "{answer:?} {effects:?}");
+        bench.sample(volts(1.1));
+        assert_eq!(bench.state().phase(), Phase::Hold, "{answer:?}");
+        assert_eq!(bench.state().holding(), None);
+        assert!(bench.state().unacknowledged.is_empty());
+    }
+}
+
+#[test]
+fn a_stop_that_is_accepted_late_does_not_end_the_next_move() {
+    let mut bench = reached_at_once(Some(Newtons(0.5)));
+    let detail = "a stop came first".into();
+    bench.give(Input::Fault(Fault::CommandRefused { detail }));
+    // At rest the slower approach begins, before the stop of the first one is accepted.
+    let sent = commands(&bench.sample(volts(0.6)));
+    assert!(sent[0].is_motion(), "{sent:?}");
+    let command = RigCommand::Stop;
+    bench.give(Input::Ack(Ack { command }));
+    bench.sample(volts(0.6));
+    assert!(!bench.state().is_at_rest(), "the move is still to come");
+}
+
+#[test]
+fn a_move_that_is_refused_without_a_stop_ends_the_run() {
+    let mut bench = jogging();
+    let detail = "speed".into();
+    let effects = bench.give(Input::Fault(Fault::CommandRefused { detail }));
+    assert_eq!(commands(&effects), [RigCommand::Stop]);
 }
 
 #[test]

@@ -17,9 +17,8 @@ pub(crate) const FORCE_FLOOR: f64 = 0.05;
 const SINE_SHARE: f64 = 0.02;
 /// and over so many samples at most, which hide any noise.
 const SINE_SAMPLES_MAX: f64 = 1000.0;
-/// A duration may be off by so many milliseconds: a sample at each end of a rig that takes one in each, and the answer
-/// of the axis.
-const DURATION_MS: f64 = 5.0;
+/// A duration may be off by so many seconds beside a sample at each end: the answer of the axis.
+const ANSWER_SECS: f64 = 0.003;
 /// Fewer milliseconds of cruise tell no speed: the pulses are too coarse.
 const CRUISE_MS_MIN: u64 = 20;
 /// Until this share of its force target an indentation surely goes at full speed.
@@ -62,6 +61,8 @@ pub(super) struct Measuring {
     planned: PlannedStep,
     mm_per_pulse: f64,
     tick_secs: f64,
+    /// From sample to sample, in s.
+    sample_secs: f64,
     per_ms: u32,
     acceleration: f64,
     first: Option<Row>,
@@ -92,6 +93,7 @@ impl Measuring {
             planned: planned.clone(),
             mm_per_pulse: rig.mm_per_pulse,
             tick_secs: rig.tick().0,
+            sample_secs: rig.tick().0 * rig.ticks_per_sample.max(1.0),
             per_ms: rig.samples_per_ms(),
             acceleration: rig.acceleration.0,
             first: None,
@@ -204,7 +206,7 @@ impl Measuring {
     pub fn finish(self, last: &Row, targets: &mut Vec<Achieved>) -> Option<String> {
         let first = self.first?;
         let remark = self.remark();
-        let took = self.since(&first, last) + self.tick_secs;
+        let took = self.since(&first, last) + self.sample_secs;
         let mut add = |quantity, unit, target: f64, achieved: Option<f64>, allowed: f64| {
             let Some(achieved) = achieved else { return };
             let error = achieved - target;
@@ -232,19 +234,21 @@ impl Measuring {
             }
         };
         let of_force = |target: f64| (FORCE_SHARE * target.abs()).max(FORCE_FLOOR);
-        let of_duration = DURATION_MS * f64::from(self.per_ms) * self.tick_secs;
+        let of_duration = ANSWER_SECS + 2.0 * self.sample_secs.max(0.001);
+        // The last sample of a move may be one before its end.
+        let of_depth = |speed: f64| self.mm_per_pulse + speed * self.sample_secs;
         let duration = self.has_duration.then_some(took);
         match self.planned.step {
             Step::Ramp { speed: v, depth } => {
                 speed(v.0);
-                add("depth", "mm", depth.0, last.depth, self.mm_per_pulse);
+                add("depth", "mm", depth.0, last.depth, of_depth(v.0));
             }
             Step::Unload {
                 speed: v,
                 clearance_mm,
             } => {
                 speed(v.0);
-                add("depth", "mm", -clearance_mm, last.depth, self.mm_per_pulse);
+                add("depth", "mm", -clearance_mm, last.depth, of_depth(v.0));
             }
             Step::LoadTo(load) => {
                 speed(load.speed.0);

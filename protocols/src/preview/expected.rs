@@ -32,8 +32,21 @@ pub struct OutlinePoint {
     pub depth: Depth,
     /// Force of the thesis body.
     pub force: Newtons,
+    /// Whether the plan or a base sets the force, and not the specimen.
+    pub is_force_set: bool,
     /// Phase.
     pub phase: Phase,
+}
+
+impl OutlinePoint {
+    /// Force of the softest and the stiffest specimen expected.
+    #[must_use]
+    pub fn force_band(&self) -> [Newtons; 2] {
+        match self.is_force_set {
+            true => [self.force; 2],
+            false => STIFFNESS_BAND.map(|factor| Newtons(factor * self.force.0)),
+        }
+    }
 }
 
 /// The expected specimen on its way through the plan.
@@ -103,6 +116,7 @@ impl Expected {
                 t: Seconds(self.t),
                 depth: Depth(depth),
                 force: Newtons(self.force),
+                is_force_set: self.is_base,
                 phase,
             });
         }
@@ -133,6 +147,7 @@ impl Expected {
         self.stay(phase, secs);
         for point in self.outline.iter_mut().rev().take(WAIT_POINTS as usize) {
             point.force = Newtons(force);
+            point.is_force_set = true;
         }
         self.force = force;
     }
@@ -140,10 +155,13 @@ impl Expected {
     /// Indents until the force is reached; the time it takes, in s.
     pub fn load(&mut self, phase: Phase, load: &LoadTo) -> f64 {
         self.peak_of_force = self.peak_of_force.max(load.force.0);
-        let (begun, from) = (self.t, self.depth);
+        let (begun, from, first) = (self.t, self.depth, self.outline.len());
         let piece = (load.depth_max.0 - from) / f64::from(4 * MOVE_POINTS);
         while self.force < load.force.0 && self.depth + piece <= load.depth_max.0 && piece > 0.0 {
             self.advance(phase, self.depth + piece, piece / load.speed.0);
+        }
+        for point in &mut self.outline[first..] {
+            point.is_force_set = true;
         }
         self.t - begun
     }

@@ -249,7 +249,10 @@ impl Work<'_> {
                 .map_err(|err| refused(err.to_string()))?,
             is_acknowledged: programme.is_acknowledged,
             to_acknowledge,
-            after_stop: AfterStop::Close,
+            after_stop: match self.laboratory.answers {
+                Answers::Operator => AfterStop::Ask,
+                Answers::Confirm => AfterStop::Close,
+            },
             answers: self.laboratory.answers,
         };
         let later = self.time_after(&place).map_err(refused)?;

@@ -193,7 +193,7 @@ impl ActiveRun {
             let choice = Operator::Close;
             self.feed(now, Input::Operator { choice }, send);
         }
-        if self.after_stop == AfterStop::Close && self.is_left_alone(now) {
+        if self.after_stop != AfterStop::Wait && self.is_left_alone(now) {
             let choice = Operator::Leave;
             self.feed(now, Input::Operator { choice }, send);
         }

@@ -194,6 +194,32 @@ pub fn driver_clock() -> palpate_drivers::wire::HostClock {
     Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
 }
 
+/// Time since a loop began, and waits until a part of it.
+#[derive(Debug)]
+pub struct Metronome(Instant);
+
+impl Metronome {
+    /// Begins now.
+    #[must_use]
+    pub fn start() -> Self {
+        Self(Instant::now())
+    }
+
+    /// Nanoseconds since it began.
+    #[must_use]
+    pub fn now(&self) -> u64 {
+        self.0.elapsed().as_nanos() as u64
+    }
+
+    /// Sleeps until so many nanoseconds since it began; not at all where they have passed.
+    pub fn wait(&self, until: u64) {
+        let left = until.saturating_sub(self.now());
+        if left > 0 {
+            std::thread::sleep(Duration::from_nanos(left));
+        }
+    }
+}
+
 /// Measures how long something took; decides nothing.
 pub struct Stopwatch(Instant);
 

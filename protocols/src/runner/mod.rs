@@ -17,7 +17,7 @@ mod watch;
 
 pub(crate) use active_run::to_json;
 pub(crate) use board::{Board, LogState};
-pub use clock::{Stopwatch, TimeScale, driver_clock, wall_now};
+pub use clock::{Metronome, Stopwatch, TimeScale, driver_clock, wall_now};
 pub(crate) use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;

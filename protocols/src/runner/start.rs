@@ -24,6 +24,8 @@ pub enum AfterStop {
     Close,
     /// Wait for the operator to retract or close.
     Wait,
+    /// The same, but nobody would resume a pause: the operator is only asked.
+    Ask,
 }
 
 /// Who answers the plan's prompts.

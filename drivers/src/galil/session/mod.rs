@@ -30,11 +30,6 @@ const OVERTAKEN: &str = "a stop came first, so it was not begun";
 /// Why nothing is done any more.
 const RESET: &str = "the controller was reset; open the rig again";
 
-/// Whether a command moves the axis.
-const fn is_motion(command: &RigCommand) -> bool {
-    matches!(command, RigCommand::MoveTo(_) | RigCommand::Oscillate(_))
-}
-
 /// A stop that is sent until the controller has accepted it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Halting {

@@ -1,6 +1,6 @@
 //! What is written next: stops before everything, then the watchdog, increments of a sine, commands, questions.
 
-use super::{Asked, Halting, OVERTAKEN, Outgoing, Session, is_motion};
+use super::{Asked, Halting, OVERTAKEN, Outgoing, Session};
 use crate::galil::order::{Next, Order};
 use crate::galil::protocol::packed;
 use crate::galil::recording::Recording;
@@ -48,14 +48,14 @@ impl Session {
     fn drop_motions(&mut self, now: Nanos, why: &str) {
         let mut ended = Vec::new();
         self.orders.retain(|(number, order)| {
-            let stays = !is_motion(order);
+            let stays = !order.is_motion();
             if !stays {
                 ended.push(*number);
             }
             stays
         });
         // A motion that is being set ends here; its answers are taken and thrown away.
-        let is_ended = |(_, order): &mut (u64, Order)| is_motion(&order.command) && !order.is_begun;
+        let is_ended = |(_, order): &mut (u64, Order)| order.command.is_motion() && !order.is_begun;
         if let Some((number, _)) = self.order.take_if(is_ended) {
             self.lines.clear();
             self.beginning = None;
@@ -86,7 +86,7 @@ impl Session {
     fn may_move(&self) -> bool {
         let orders = self.order.iter().map(|(_, order)| &order.command);
         let mut orders = orders.chain(self.orders.iter().map(|(_, command)| command));
-        self.sine.is_some() || self.sampler.is_moving() || orders.any(is_motion)
+        self.sine.is_some() || self.sampler.is_moving() || orders.any(RigCommand::is_motion)
     }
 
     pub(super) fn urge(&mut self, command: RigCommand, asked: Asked) {
@@ -112,7 +112,7 @@ impl Session {
             }
             Next::SendAndSample(commands) => {
                 let order = self.order.as_ref();
-                let begins = order.is_some_and(|(_, order)| is_motion(&order.command));
+                let begins = order.is_some_and(|(_, order)| order.command.is_motion());
                 let line = self.with_sample(&commands, begins, Asked::Part);
                 // The sample behind the begin is to be a new one, so that the motion begins at its tick: two samples
                 // of the controller after the last one that was asked for.
