@@ -15,6 +15,7 @@ pub mod edited;
 pub mod engine;
 pub mod fidelity;
 pub mod file;
+pub mod haptics;
 pub mod origin;
 pub mod plans;
 pub mod preview;

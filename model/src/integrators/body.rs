@@ -2,6 +2,7 @@
 
 use crate::families::{Drive, POWER_MAX, Relaxation};
 use crate::viscoelastic::{BodyError, ModifiedKelvin};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// `F + tau_eps F' = mu1 x + .. + muN x^N + tau_sig x x'`, `N` from 1 to 5.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -43,6 +44,19 @@ impl<const N: usize> SeriesBody<N> {
         }
     }
 
+    /// The same body with as many terms as there may be, those it has not as zeros: its steps give the
+    /// same bits.
+    #[must_use]
+    pub fn padded(&self) -> SeriesBody<POWER_MAX> {
+        let mut mu = [0.0; POWER_MAX];
+        mu[..N].copy_from_slice(&self.mu);
+        SeriesBody {
+            tau_eps: self.tau_eps,
+            mu,
+            tau_sig: self.tau_sig,
+        }
+    }
+
     /// As the one relaxation term it is.
     #[must_use]
     pub fn term(&self) -> Relaxation {
@@ -54,5 +68,44 @@ impl<const N: usize> SeriesBody<N> {
             // x x' is the rate of x^2 / 2.
             rate: Drive::power(2, 0.5 * self.tau_sig),
         }
+    }
+}
+
+/// A padded body as it is stored; arrays of a generic length are not.
+#[derive(Serialize, Deserialize)]
+struct Stored {
+    tau_eps: f64,
+    mu: [f64; POWER_MAX],
+    tau_sig: f64,
+}
+
+impl Serialize for SeriesBody<POWER_MAX> {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let Self {
+            tau_eps,
+            mu,
+            tau_sig,
+        } = *self;
+        Stored {
+            tau_eps,
+            mu,
+            tau_sig,
+        }
+        .serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for SeriesBody<POWER_MAX> {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        let Stored {
+            tau_eps,
+            mu,
+            tau_sig,
+        } = Stored::deserialize(deserializer)?;
+        Ok(Self {
+            tau_eps,
+            mu,
+            tau_sig,
+        })
     }
 }

@@ -191,6 +191,20 @@ impl Scheme {
         }
     }
 
+    /// What a step of `h` relaxation times makes of the force and of the forcing at its start, middle and
+    /// end. The exact step of a linear forcing is the exponential one with the forcing straight.
+    #[must_use]
+    pub fn weights(self, h: f64) -> Weights {
+        match self {
+            Self::ExplicitEuler => ExplicitEuler::weights(h),
+            Self::ImplicitEuler => ImplicitEuler::weights(h),
+            Self::Trapezoid => Trapezoid::weights(h),
+            Self::ExponentialLeft => ExponentialLeft::weights(h),
+            Self::ExponentialFirstOrder | Self::Exact => ExponentialFirstOrder::weights(h),
+            Self::RungeKutta => RungeKutta::weights(h),
+        }
+    }
+
     /// Whether a body can be stepped `dt` seconds at a time.
     pub fn check<const N: usize>(
         self,

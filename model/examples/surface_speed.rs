@@ -1,0 +1,213 @@
+//! What a tick of the deformable surface takes: recovery and poke of whatever is displaced, by the three
+//! methods and by a naive chain, in one run.
+//!
+//! `cargo run --release -p palpate-model --example surface_speed -- [TICKS [fast]]`; `fast`: the closed form alone
+//!
+//! Three cases each. `lasting`: a tool that stays at a depth whose reach is half the mesh along each axis,
+//! so that every tick recovers and pushes back the diamond between the middles of the edges, half of
+//! all nodes. `whole`: twice that depth, which moves every node, the worst there is. `moving`: the tool
+//! circles at a tenth of the first depth and what it leaves behind recovers.
+//! The longest ticks are mostly the machine's: the first line says what it does to work that is always
+//! the same.
+//!
+//! A naive tick recovers the whole grid, pushes with a queue and a set that allocate, and renews all
+//! normals; the others renew them where something changed, timed apart, since they belong to the
+//! thread of the graphics.
+
+#![expect(clippy::print_stdout, reason = "an example that prints figures")]
+#![expect(clippy::disallowed_methods, reason = "it measures time")]
+
+#[path = "../tests/support/naive_surface.rs"]
+mod naive;
+
+use palpate_model::Seconds;
+use palpate_model::surface::{
+    Contact, Cut, Grid, HeightField, Method, Node, Normals, Recovery, Rect, Shear, Side, Surface,
+};
+use std::hint::black_box;
+use std::time::Instant;
+
+/// A tick at 1 kHz.
+const TICK: f64 = 1e-3;
+/// Relaxation time of the thesis body in s.
+const TAU: f64 = 1.023;
+/// Of neighbours, in mm.
+const SHEAR: f64 = 0.05;
+/// Products one after the other that take some 15 microseconds.
+const ROUNDS: usize = 10_000;
+/// Naive ticks: a hundredth of the others, since each takes up to a second.
+const NAIVE_SHARE: usize = 100;
+
+#[derive(Clone, Copy)]
+enum Case {
+    Lasting,
+    Whole,
+    Moving,
+}
+
+impl Case {
+    fn name(self) -> &'static str {
+        match self {
+            Self::Lasting => "lasting",
+            Self::Whole => "whole",
+            Self::Moving => "moving",
+        }
+    }
+
+    /// Where the tool is at a tick.
+    fn tool(self, n: usize, tick: usize) -> (Node, f64) {
+        let middle = (n / 2) as f64;
+        let depth = SHEAR * middle;
+        let node = |column: f64, row: f64| Node {
+            column: column as u16,
+            row: row as u16,
+        };
+        match self {
+            Self::Lasting => (node(middle, middle), -depth),
+            Self::Whole => (node(middle, middle), -2.0 * depth),
+            Self::Moving => {
+                let (sin, cos) = (TAU * tick as f64 * TICK * 2.0).sin_cos();
+                let radius = 0.5 * middle;
+                (
+                    node(middle + radius * cos, middle + radius * sin),
+                    -0.1 * depth,
+                )
+            }
+        }
+    }
+}
+
+/// Percentiles of times in microseconds.
+fn percentiles(times: &mut [f64]) -> [f64; 4] {
+    times.sort_by(f64::total_cmp);
+    let at = |share: f64| times[((share * times.len() as f64) as usize).min(times.len() - 1)];
+    [at(0.5), at(0.99), at(0.999), at(1.0)]
+}
+
+fn line(name: &str, times: &mut [f64], nodes_per_tick: f64) -> f64 {
+    let total: f64 = times.iter().sum();
+    let rate = nodes_per_tick * times.len() as f64 / total * 1e3;
+    let [p50, p99, p999, max] = percentiles(times);
+    println!(
+        "  {name:<24}{p50:>10.1}{p99:>10.1}{p999:>10.1}{max:>11.1}{nodes_per_tick:>12.0}{rate:>12.0}"
+    );
+    rate
+}
+
+fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
+    let grid = Grid::new(n, n, 0.5).expect("a grid");
+    let shear = match method {
+        // The same limit, but as many as there are nodes: what this method is for.
+        Method::Sorted => Shear::PerNode(vec![SHEAR; grid.nodes()].into()),
+        _ => Shear::Uniform(SHEAR),
+    };
+    let field = HeightField::new(grid, vec![0.0; grid.nodes()], shear).expect("a field");
+    let recovery = Recovery::new(Seconds(TAU), Seconds(TICK)).expect("a recovery");
+    let mut surface = Surface::new(field, method, recovery, Cut::NONE).expect("a surface");
+    let mut times = Vec::with_capacity(ticks);
+    let (mut moved, mut dirty) = (0, Rect::EMPTY);
+    // The first tenth is not counted: memory comes to the cache, and the trail of the tool appears.
+    for tick in 0..ticks + ticks / 10 {
+        let (node, z) = case.tool(n, tick);
+        let contact = [Contact::at(&grid, node, z, Side::Push)];
+        let start = Instant::now();
+        let told = black_box(surface.tick(black_box(&contact)));
+        let taken = start.elapsed().as_secs_f64();
+        dirty = told.dirty;
+        if tick >= ticks / 10 {
+            times.push(taken * 1e6);
+            moved += told.moved.moved;
+        }
+    }
+    let rate = line(method.name(), &mut times, moved as f64 / ticks as f64);
+    if method == Method::Envelope {
+        let mut normals = Normals::new(surface.field().as_it_is());
+        let mut drawn = Vec::new();
+        for _ in 0..(ticks / 20).clamp(1, 200) {
+            let start = Instant::now();
+            black_box(normals.update(surface.field().as_it_is(), black_box(dirty)));
+            drawn.push(start.elapsed().as_secs_f64() * 1e6);
+        }
+        let [p50, p99, _, _] = percentiles(&mut drawn);
+        println!("  its normals, where dirty{p50:>10.1}{p99:>10.1}");
+    }
+    rate
+}
+
+/// Nodes per ms of the naive tick without and with its normals.
+fn measure_naive(n: usize, case: Case, ticks: usize) -> [f64; 2] {
+    let (rest, mut now) = (vec![0.0; n * n], vec![0.0; n * n]);
+    let keep = (-TICK / TAU).exp();
+    let (mut chain, mut whole, mut moved) = (Vec::new(), Vec::new(), 0);
+    for tick in 0..ticks {
+        let (node, z) = case.tool(n, tick);
+        let seed = usize::from(node.row) * n + usize::from(node.column);
+        let start = Instant::now();
+        for (now, rest) in now.iter_mut().zip(&rest) {
+            *now = rest + (*now - rest) * keep;
+        }
+        moved += naive::push(&mut now, n, |_, _| SHEAR, (seed, z), naive::Order::First);
+        chain.push(start.elapsed().as_secs_f64() * 1e6);
+        black_box(naive::normals(black_box(&now), n, 0.5));
+        whole.push(start.elapsed().as_secs_f64() * 1e6);
+    }
+    let moved = moved as f64 / ticks as f64;
+    [
+        line("naive", &mut chain, moved),
+        line("naive, with its normals", &mut whole, moved),
+    ]
+}
+
+/// What the machine alone adds: the same few instructions each time, without memory.
+fn measure_machine(ticks: usize) {
+    let mut times: Vec<f64> = Vec::with_capacity(ticks);
+    for _ in 0..ticks {
+        let start = Instant::now();
+        let mut state = black_box(1u64);
+        for _ in 0..ROUNDS {
+            state = state.wrapping_mul(0x9E37_79B9_7F4A_7C15).rotate_left(17);
+        }
+        black_box(state);
+        times.push(start.elapsed().as_secs_f64() * 1e6);
+    }
+    let [p50, p99, p999, max] = percentiles(&mut times);
+    println!("the machine alone, {ROUNDS} products: {p50:.1}, {p99:.1}, {p999:.1}, {max:.1}");
+}
+
+fn main() {
+    let ticks = std::env::args().nth(1).and_then(|text| text.parse().ok());
+    let ticks: usize = ticks.unwrap_or(10_000);
+    let is_fast = std::env::args().nth(2).is_some_and(|word| word == "fast");
+    println!("us per tick; {ticks} ticks, chains at 1001 nodes a tenth of that");
+    measure_machine(ticks);
+    for n in [201, 1001] {
+        for case in [Case::Lasting, Case::Whole, Case::Moving] {
+            println!(
+                "{n} x {n}, {:<16}{:>10}{:>10}{:>10}{:>11}{:>12}{:>12}",
+                case.name(),
+                "p50",
+                "p99",
+                "p99.9",
+                "max",
+                "nodes/tick",
+                "nodes/ms"
+            );
+            let few = if n > 500 { ticks / 10 } else { ticks };
+            if is_fast {
+                measure(n, case, Method::Envelope, ticks);
+                continue;
+            }
+            let naive = measure_naive(n, case, (few / NAIVE_SHARE).max(5));
+            for method in Method::ALL {
+                let ticks = if method == Method::Envelope {
+                    ticks
+                } else {
+                    few
+                };
+                let rate = measure(n, case, method, ticks.max(10));
+                let [chain, whole] = naive.map(|naive| rate / naive);
+                println!("    {chain:.0} times naive, {whole:.0} with its normals");
+            }
+        }
+    }
+}

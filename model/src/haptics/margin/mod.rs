@@ -1,0 +1,292 @@
+//! How much damping a device must have to render a body calmly, known before play and watched during it.
+//!
+//! With `k0 = g'(x0)`, `c0 = tau_sig x0`, `k_inf = c0 / tau_eps`, tick `T` and a delay of `d` ticks, the body about depth
+//! `x0`, stepped exactly, needs `b >= max(k0 (T/2 + d T + tau_eps) - c0, k_inf (T/2 + d T))` (from the criterion in
+//! [`criterion`], which the tests hold beside it). The first term has a part without `T`, `k0 tau_eps - c0`: where it is
+//! above zero the lag of the body itself returns energy, and no faster loop mends that.
+//!
+//! An encoder of step `D` lets a wall of stiffness `K` return `K D^2 / 2` unseen with every count, and Coulomb friction
+//! `f` takes `f D`: no buzz if `K <= 2 f / D` (Abbott & Okamura, IEEE Trans. Robotics 21 (2005) 952-964, who have
+//! `K <= min(2 b / T, 2 f / D)` for a spring; here `K` is the larger stiffness of slow and of sudden moves).
+
+mod bands;
+pub mod criterion;
+mod linear;
+
+pub use bands::{DepthBand, active_cycles, active_pokes};
+pub use linear::{Linear, Sampled};
+
+use super::Period;
+use crate::families::POWER_MAX;
+use crate::integrators::{Scheme, SeriesBody};
+use crate::units::{Depth, MmPerS, Newtons};
+use serde::{Deserialize, Serialize};
+
+/// What a device brings to the loop.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Device {
+    /// Its own damping in N s/mm; a voltage drive adds its motor's.
+    pub damping: f64,
+    /// Its Coulomb friction.
+    pub friction: Newtons,
+    /// Step of its encoder at the handle, in mm.
+    pub count_mm: f64,
+    /// Ticks from a count to the force made of it, beside the half tick that holding costs.
+    pub delay_ticks: f64,
+}
+
+/// Depths looked at before play: 0.03 mm apart on the 30 mm stroke, as the shallow bands are below 1 mm.
+const DEPTHS: u32 = 1000;
+
+/// Everything the margin depends on.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Watch {
+    /// The body rendered.
+    pub body: SeriesBody<POWER_MAX>,
+    /// How it is stepped.
+    pub scheme: Scheme,
+    /// The loop's tick.
+    pub period: Period,
+    /// The device.
+    pub device: Device,
+}
+
+/// What asks for the most damping.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Cause {
+    /// The body's own lag: it needs this much at any tick.
+    Lag,
+    /// Tick and delay, in slow motion.
+    Tick,
+    /// Tick and delay, in sudden motion, which feels the stiffness `k_inf`.
+    Sudden,
+}
+
+/// The margin at one depth.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Margin {
+    /// Where.
+    pub depth: Depth,
+    /// Damping needed there in N s/mm; zero or less where the body brings its own.
+    pub needed: f64,
+    /// Damping the device has, in N s/mm.
+    pub has: f64,
+    /// Why so much.
+    pub cause: Cause,
+    /// Friction needed against a buzz of a count or so.
+    pub friction_needed: Newtons,
+    /// Friction there is.
+    pub friction: Newtons,
+}
+
+impl Margin {
+    /// Damping there is over damping needed; `None` where none is needed.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        (self.needed > 0.0).then(|| self.has / self.needed)
+    }
+
+    /// Whether the device has the damping needed.
+    #[must_use]
+    pub fn is_enough(&self) -> bool {
+        self.needed <= self.has
+    }
+
+    /// Whether friction is enough that single counts do not swing by themselves.
+    #[must_use]
+    pub fn is_quiet(&self) -> bool {
+        self.friction_needed <= self.friction
+    }
+}
+
+impl Watch {
+    /// The margin at a depth and speed; for every tick.
+    #[must_use]
+    pub fn at(&self, depth: Depth, speed: MmPerS) -> Margin {
+        let tick = self.period.seconds().0;
+        let linear = Linear::of(&self.body, depth);
+        let sampled = Sampled::of(&linear, self.scheme, tick);
+        let delay = self.device.delay_ticks.max(0.0);
+        let moving = self.moving(speed);
+        let slow = sampled.slow() + linear.stiffness * delay * tick + moving;
+        let sudden = sampled.fast() * (1.0 + 2.0 * delay);
+        let lag = linear.lag();
+        let cause = if sudden > slow {
+            Cause::Sudden
+        } else if lag > 0.5 * slow {
+            Cause::Lag
+        } else {
+            Cause::Tick
+        };
+        let half_count = 0.5 * self.device.count_mm;
+        Margin {
+            depth,
+            needed: slow.max(sudden),
+            has: self.device.damping,
+            cause,
+            friction_needed: Newtons(sampled.per_count() * half_count),
+            friction: self.device.friction,
+        }
+    }
+
+    /// The same with the whole criterion instead of its two ends, which with a delay are up to a few times too
+    /// careful. For before play: it looks at some hundreds of frequencies.
+    #[must_use]
+    pub fn exactly_at(&self, depth: Depth, speed: MmPerS) -> Margin {
+        if self.device.delay_ticks <= 0.0 {
+            return self.at(depth, speed);
+        }
+        let linear = Linear::of(&self.body, depth);
+        let sampled = Sampled::of(&linear, self.scheme, self.period.seconds().0);
+        let (needed, _) = criterion::needed(&sampled, self.device.delay_ticks.max(0.0));
+        Margin {
+            needed: needed + self.moving(speed),
+            ..self.at(depth, speed)
+        }
+    }
+
+    /// Damping that tick and delay ask for where the probe moves in, in N s/mm: the viscous term `tau_sig x x'` then
+    /// has a stiffness of `tau_sig v` beside its damping. It counts for the tick alone; over a relaxation time the
+    /// probe is elsewhere, and the term is the rate of `tau_sig x^2 / 2`, which no loop lives on.
+    fn moving(&self, speed: MmPerS) -> f64 {
+        let inwards = speed.0.max(0.0) * self.body.tau_sig.max(0.0);
+        let late = 0.5 + self.device.delay_ticks.max(0.0);
+        inwards * late * self.period.seconds().0
+    }
+
+    /// Margins over a stroke, from the surface to `deepest`, at a speed.
+    fn over(&self, deepest: Depth, speed: MmPerS) -> impl Iterator<Item = Margin> {
+        let at = move |i: u32| Depth(deepest.0 * f64::from(i) / f64::from(DEPTHS));
+        (0..=DEPTHS).map(move |i| self.exactly_at(at(i), speed))
+    }
+
+    /// What can be said before play of a stroke to `deepest`, entered at up to `speed`.
+    #[must_use]
+    pub fn before_play(&self, deepest: Depth, speed: MmPerS) -> Verdict {
+        let all = || {
+            self.over(deepest, speed)
+                .chain(self.over(deepest, MmPerS(0.0)))
+        };
+        let worst = |more: fn(&Margin, &Margin) -> bool| {
+            all().fold(self.at(Depth(0.0), MmPerS(0.0)), |worst, one| {
+                if more(&one, &worst) { one } else { worst }
+            })
+        };
+        Verdict {
+            worst: worst(|one, worst| one.needed > worst.needed),
+            loudest: worst(|one, worst| one.friction_needed > worst.friction_needed),
+            bands: bands::where_above(deepest, DEPTHS, |depth| {
+                self.exactly_at(depth, speed).needed - self.device.damping
+            }),
+            cycles: active_cycles(&self.body, deepest),
+            pokes: active_pokes(&self.body, deepest),
+            deepest,
+        }
+    }
+}
+
+/// The margin before play.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Verdict {
+    /// Where the most damping is needed.
+    pub worst: Margin,
+    /// Where the most friction is needed.
+    pub loudest: Margin,
+    /// Depths at which the device has less damping than needed.
+    pub bands: Vec<DepthBand>,
+    /// Depths around which small slow cycles of the body return energy.
+    pub cycles: Vec<DepthBand>,
+    /// Depths to which slow pokes return energy.
+    pub pokes: Vec<DepthBand>,
+    /// End of the stroke looked at.
+    pub deepest: Depth,
+}
+
+impl Verdict {
+    /// Damping there is over damping needed, at the worst depth; `None` where none is needed.
+    #[must_use]
+    pub fn ratio(&self) -> Option<f64> {
+        self.worst.ratio()
+    }
+
+    /// Whether nothing on the stroke can return energy that the device does not take.
+    #[must_use]
+    pub fn is_calm(&self) -> bool {
+        self.worst.is_enough() && self.loudest.is_quiet()
+    }
+
+    /// In words, the most important first.
+    #[must_use]
+    pub fn sentences(&self) -> Vec<String> {
+        let mut all = vec![self.damping_sentence()];
+        if !self.bands.is_empty() {
+            all.push(format!(
+                "The damping is too little {}; there the guard adds it.",
+                bands::words(&self.bands, self.deepest)
+            ));
+        }
+        let Margin {
+            depth,
+            friction_needed,
+            friction,
+            ..
+        } = self.loudest;
+        all.push(if self.loudest.is_quiet() {
+            format!("Friction of {friction:.3} keeps single encoder counts quiet.")
+        } else {
+            format!(
+                "A buzz of an encoder count or two is possible: at {depth:.1} single counts stay quiet from {friction_needed:.3} of friction on, the device has {friction:.3}. A finer encoder needs less."
+            )
+        });
+        if !self.cycles.is_empty() {
+            all.push(format!(
+                "{} the model itself returns energy in small slow cycles.",
+                sentence_case(&bands::words(&self.cycles, self.deepest))
+            ));
+        }
+        if !self.pokes.is_empty() {
+            all.push(format!(
+                "A slow poke to depths {} returns energy.",
+                bands::words(&self.pokes, self.deepest)
+            ));
+        }
+        all
+    }
+
+    fn damping_sentence(&self) -> String {
+        let Margin {
+            depth,
+            needed,
+            has,
+            cause,
+            ..
+        } = self.worst;
+        // N s/mm as N s/m, which is what catalogues have.
+        let (needed_si, has_si) = (needed * 1e3, has * 1e3);
+        let Some(ratio) = self.ratio() else {
+            return "The body brings all the damping it needs.".into();
+        };
+        let why = match cause {
+            Cause::Lag => "the body's own lag asks for it, and a faster loop does not help",
+            Cause::Tick => "tick and delay ask for it, so a faster loop helps",
+            Cause::Sudden => "sudden moves ask for it, so a faster loop or less delay helps",
+        };
+        if self.worst.is_enough() {
+            format!(
+                "The device has {ratio:.2} times the damping needed: {has_si:.2} N s/m, and {needed_si:.2} at {depth:.1}."
+            )
+        } else {
+            format!(
+                "The device has {ratio:.2} of the damping needed: {has_si:.2} N s/m, and {needed_si:.2} at {depth:.1}; {why}."
+            )
+        }
+    }
+}
+
+fn sentence_case(text: &str) -> String {
+    let mut letters = text.chars();
+    letters.next().map_or_else(String::new, |first| {
+        first.to_uppercase().collect::<String>() + letters.as_str()
+    })
+}

@@ -1,0 +1,16 @@
+//! The master-slave rig of the source (chapter 5): a motor that drives a rack through a pinion, its encoder, the
+//! gear to the slave's pulses, and a hand for simulation.
+
+mod encoder;
+mod gear;
+mod hand;
+mod motor;
+mod rack;
+mod thermal;
+
+pub use encoder::{Encoder, EncoderCounter, EncoderError, Quadrature};
+pub use gear::{Gear, GearError, GearRatio, GearTick, SlaveDrive};
+pub use hand::{Hand, HandPath};
+pub use motor::{Drive, Motor, MotorError, MotorOrigin, MotorState};
+pub use rack::{Pinion, Rack, RackEnergies, RackForces};
+pub use thermal::{Thermal, ThermalState};

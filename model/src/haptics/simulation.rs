@@ -1,0 +1,224 @@
+//! The whole system on a simulated device: master, hand, slave and the specimen under it.
+
+use super::closed_loop::{Command, Plant, PlantSettings, Sensed};
+use super::force::{ForceLaw, LawSettings, Pull};
+use super::master_slave::{
+    Input, MasterSlave, MasterSlaveError, MasterSlaveSettings, Output, Snapshot,
+};
+use super::rig::{Hand, HandPath};
+use super::torque::{DriveKind, TorqueSettings};
+use super::{GuardSettings, Period};
+use crate::units::{Depth, MmPerS, Newtons, Seconds};
+use crate::viscoelastic::ModifiedKelvin;
+
+/// What is simulated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SimulationSettings {
+    /// The system.
+    pub system: MasterSlaveSettings,
+    /// The device and the hand.
+    pub plant: PlantSettings,
+    /// The specimen that the slave presses.
+    pub specimen: ModifiedKelvin,
+}
+
+impl SimulationSettings {
+    /// The source's system on the source's rack, with a hand; the specimen is the body that is rendered.
+    #[must_use]
+    pub fn of(body: ModifiedKelvin, period: Period, hand: Hand) -> Self {
+        let system = MasterSlaveSettings::of(LawSettings::of::<3>(body, period));
+        let torque = &system.torque;
+        let friction = torque.friction().0;
+        let plant = PlantSettings {
+            count_mm: system.count_mm(),
+            motor: Some((torque.motor, torque.pinion)),
+            friction: [friction; 2],
+            hand,
+            ..PlantSettings::bare(period)
+        };
+        Self {
+            system,
+            plant,
+            specimen: body,
+        }
+    }
+
+    /// The thesis body as it buzzes, or not: pressed to 25 mm by a firm grip that wants to 30, on a current drive without
+    /// friction, with an encoder of 15 um, forces two ticks of a millisecond late, and 0.5 N s/m of damping where 3.5 are
+    /// needed. Unguarded, the force is bounded by nothing but the drive and there is no controller. With the source's
+    /// voltage drive, which brings 17.6 N s/m and 0.8 N of friction, it is calm at that depth by itself.
+    #[must_use]
+    pub fn buzz(is_guarded: bool) -> Self {
+        let path = HandPath::RampHold {
+            from: 0.0,
+            to: 30.0,
+            speed: 50.0,
+        };
+        // Less damping than a firm grip has when it is asked to calm something.
+        let hand = Hand {
+            damping: 0.002,
+            ..Hand::firm(path)
+        };
+        let mut all = Self::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
+        let (delay, damping) = (2, 0.5e-3);
+        all.plant.friction = [0.0; 2];
+        all.plant.damping = damping;
+        all.plant.delay = delay;
+        all.system.damping = damping;
+        all.system.delay_ticks = delay as f64;
+        all.system.torque = TorqueSettings {
+            drive: DriveKind::Current { amps_per_volt: 1.0 },
+            ..all.system.torque
+        };
+        all.system.torque.motor.friction = 0.0;
+        if let Some((motor, _)) = &mut all.plant.motor {
+            motor.friction = 0.0;
+        }
+        if is_guarded { all } else { all.unguarded() }
+    }
+
+    /// The same without guard and controller: the force is bounded by nothing but the drive.
+    #[must_use]
+    pub fn unguarded(mut self) -> Self {
+        self.system.controller = None;
+        self.system.guard = GuardSettings::OPEN;
+        self.system.law.force_max = Newtons(1e3);
+        self
+    }
+}
+
+/// One tick of a simulation.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SimulationTick {
+    /// Time at its end.
+    pub t: Seconds,
+    /// True place of the master in mm.
+    pub x: f64,
+    /// True speed of the master.
+    pub v: MmPerS,
+    /// Force of the hand on the master.
+    pub hand: Newtons,
+    /// Force of the motor at the rack, against motion into the tissue.
+    pub motor: Newtons,
+    /// Temperature of the winding in degrees Celsius.
+    pub winding_c: f64,
+    /// What the system was told.
+    pub input: Input,
+    /// What it answered.
+    pub output: Output,
+    /// Its state.
+    pub snapshot: Snapshot,
+}
+
+/// A simulation with its state; the same settings give the same ticks, bit by bit.
+#[derive(Clone, Copy, Debug)]
+pub struct Simulation {
+    torque: TorqueSettings,
+    period: Period,
+    plant: Plant,
+    system: MasterSlave,
+    specimen: ForceLaw,
+    cell: Newtons,
+    command: Command,
+    away: u64,
+    tick: u64,
+    last: Output,
+}
+
+impl Simulation {
+    /// At the start, nothing touched.
+    pub fn new(settings: &SimulationSettings) -> Result<Self, MasterSlaveError> {
+        let period = settings.system.law.period;
+        let surface = Depth(-settings.system.surface_mm);
+        let specimen = LawSettings {
+            pull: Pull::Never,
+            force_max: Newtons(1e3),
+            speed_max: MmPerS(1e6),
+            ..LawSettings::of::<3>(settings.specimen, period)
+        };
+        let system = MasterSlave::new(&settings.system)?;
+        let snapshot = system.snapshot();
+        Ok(Self {
+            torque: settings.system.torque,
+            period,
+            plant: Plant::new(&settings.plant),
+            system,
+            specimen: ForceLaw::new(specimen, surface)?,
+            cell: Newtons(0.0),
+            command: Command::Drive(settings.system.torque.drive(snapshot.bias)),
+            away: 0,
+            tick: 0,
+            last: Output {
+                pulses: 0,
+                bias: snapshot.bias,
+                force: Newtons(0.0),
+                flags: snapshot.flags,
+            },
+        })
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.plant
+    }
+
+    /// The system.
+    #[must_use]
+    pub fn system(&self) -> &MasterSlave {
+        &self.system
+    }
+
+    /// One tick of everything.
+    pub fn tick(&mut self) -> SimulationTick {
+        let Sensed { counts, .. } = self.plant.sense();
+        let input = Input {
+            counts,
+            elapsed: self.away + 1,
+            cell: self.cell,
+            slave_pulses: None,
+            is_on: true,
+        };
+        let output = self.system.tick(&input);
+        self.away = 0;
+        self.last = output;
+        // The slave is where it was sent by the end of the tick, and its cell feels the specimen there.
+        let depth = self.system.snapshot().depth;
+        self.cell = self.specimen.tick(depth).force;
+        self.command = Command::Drive(self.torque.drive(output.bias));
+        self.moved(input)
+    }
+
+    /// A tick in which the loop is away: the drive holds, the hand goes on.
+    pub fn stalled(&mut self) -> SimulationTick {
+        self.away += 1;
+        let depth = self.system.snapshot().depth;
+        self.cell = self.specimen.tick(depth).force;
+        let input = Input {
+            counts: self.plant.sense().counts,
+            elapsed: 0,
+            cell: self.cell,
+            slave_pulses: None,
+            is_on: true,
+        };
+        self.moved(input)
+    }
+
+    fn moved(&mut self, input: Input) -> SimulationTick {
+        self.plant.tick(self.command);
+        self.tick += 1;
+        let [x, v] = self.plant.motion();
+        let [hand, motor] = self.plant.forces();
+        SimulationTick {
+            t: self.period.time_of(self.tick).seconds(),
+            x,
+            v: MmPerS(v),
+            hand: Newtons(hand),
+            motor: Newtons(-motor),
+            winding_c: self.plant.thermal().winding_c,
+            input,
+            output: self.last,
+            snapshot: self.system.snapshot(),
+        }
+    }
+}

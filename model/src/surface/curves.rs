@@ -1,0 +1,148 @@
+//! What was measured of a scene: points of error and cost.
+
+use crate::integrators::Scheme;
+use serde::{Deserialize, Serialize};
+
+/// A measured mesh.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct MeshPoint {
+    /// Nodes along a side.
+    pub nodes: u32,
+    /// Error of shape in mm.
+    pub error_mm: f64,
+    /// Time of a tick without a cut in microseconds.
+    pub cost_us: f64,
+}
+
+/// A measured cut.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct CutPoint {
+    /// Most steps from a contact; null for none.
+    pub range: Option<u32>,
+    /// Least movement in mm.
+    pub threshold_mm: f64,
+    /// Error of shape in mm.
+    pub error_mm: f64,
+    /// What is left of a mesh's time, as a share.
+    pub cost_share: f64,
+}
+
+/// A measured integrator at a step.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct StepPoint {
+    /// Which.
+    pub scheme: Scheme,
+    /// Step in s.
+    pub step_s: f64,
+    /// Error of force in N.
+    pub error_n: f64,
+    /// Time of a tick in microseconds.
+    pub cost_us: f64,
+}
+
+/// A measured family.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FamilyPoint {
+    /// Its key.
+    pub family: String,
+    /// Error of its fit in N.
+    pub error_n: f64,
+    /// What it adds to a tick in microseconds.
+    pub cost_us: f64,
+}
+
+/// Everything measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SceneCurves {
+    /// Meshes.
+    pub meshes: Vec<MeshPoint>,
+    /// Cuts, the absence of one among them.
+    pub cuts: Vec<CutPoint>,
+    /// Integrators and steps.
+    pub steps: Vec<StepPoint>,
+    /// Families.
+    pub families: Vec<FamilyPoint>,
+}
+
+/// Two points, their error together and their cost.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Pair {
+    pub indices: [usize; 2],
+    pub error: f64,
+    pub cost: f64,
+}
+
+impl SceneCurves {
+    /// Why nothing can be planned from them, if so.
+    pub(super) fn checked(&self) -> Result<(), String> {
+        let meshes = self.meshes.iter().map(|p| (p.error_mm, p.cost_us));
+        let cuts = self.cuts.iter().map(|p| (p.error_mm, p.cost_share));
+        let steps = self.steps.iter().map(|p| (p.error_n, p.cost_us));
+        let families = self.families.iter().map(|p| (p.error_n, p.cost_us));
+        let curves: [(&str, Vec<(f64, f64)>); 4] = [
+            ("mesh", meshes.collect()),
+            ("cut", cuts.collect()),
+            ("integrator", steps.collect()),
+            ("family", families.collect()),
+        ];
+        for (what, points) in curves {
+            if points.is_empty() {
+                return Err(format!("no {what} was measured; measure the scene first"));
+            }
+            let good = |value: f64| value >= 0.0 && value.is_finite();
+            if let Some((error, cost)) = points.iter().find(|(e, c)| !(good(*e) && good(*c))) {
+                return Err(format!(
+                    "a measured {what} with an error of {error} and a cost of {cost} is not possible; measure the scene again"
+                ));
+            }
+        }
+        Ok(())
+    }
+
+    /// Every mesh with every cut.
+    pub(super) fn shapes(&self, slower: f64) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        for (i, mesh) in self.meshes.iter().enumerate() {
+            for (j, cut) in self.cuts.iter().enumerate() {
+                pairs.push(Pair {
+                    indices: [i, j],
+                    error: mesh.error_mm + cut.error_mm,
+                    cost: slower * (mesh.cost_us * cut.cost_share),
+                });
+            }
+        }
+        pairs
+    }
+
+    /// Every step with every family.
+    pub(super) fn forces(&self, slower: f64) -> Vec<Pair> {
+        let mut pairs = Vec::new();
+        for (i, step) in self.steps.iter().enumerate() {
+            for (j, family) in self.families.iter().enumerate() {
+                pairs.push(Pair {
+                    indices: [i, j],
+                    error: step.error_n + family.error_n,
+                    cost: slower * (step.cost_us + family.cost_us),
+                });
+            }
+        }
+        pairs
+    }
+}
+
+impl CutPoint {
+    /// Where it cuts, in words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match (self.range, self.threshold_mm > 0.0) {
+            (Some(range), true) => {
+                format!(
+                    "{range} nodes or below {} mm of movement",
+                    self.threshold_mm
+                )
+            }
+            (Some(range), false) => format!("{range} nodes"),
+            (None, _) => format!("where nodes move {} mm", self.threshold_mm),
+        }
+    }
+}

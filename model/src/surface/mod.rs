@@ -1,0 +1,231 @@
+//! A deformable surface: heights over a grid, moved by what touches them.
+//!
+//! Nodes move along z alone. A contact takes the node nearest to it along; neighbours further apart in
+//! height than MaxShear follow. Between contacts everything displaced returns to rest with a time
+//! constant. [`Surface::tick`] does both; it allocates nothing, locks nothing, and gives the same bits
+//! for the same contacts.
+//!
+//! Three ways give the shape. [`Method::Chain`] is ChainMail as published; [`Method::Envelope`] is its
+//! closed form, many times faster; both need one MaxShear for all. [`Method::Sorted`] takes a MaxShear
+//! for each node.
+
+mod chain;
+mod contact;
+mod curves;
+mod envelope;
+mod grid;
+mod heights;
+mod mesh;
+mod mesh_error;
+mod normals;
+mod plan;
+mod proxy;
+mod recover;
+mod sorted;
+mod trade;
+
+pub use contact::{Contact, Cut, CutError, Moved, Side};
+pub use curves::{CutPoint, FamilyPoint, MeshPoint, SceneCurves, StepPoint};
+pub use grid::{Grid, MOST_NODES, Node, Rect};
+pub use heights::Heights;
+pub use mesh::{Distances, HIGHEST_MM, HeightField, INERT, Pins, Shear};
+pub use mesh_error::MeshError;
+pub use normals::Normals;
+pub use plan::{Dropped, Needs, NoPlan, ScenePlan, plan, slower};
+pub use proxy::{Proxy, ProxyError, Touch, TouchState};
+pub use recover::{Recovery, RecoveryError, SETTLED_MM};
+pub use trade::{HandPoke, PokeScene, REFERENCE_NODES, ShapeError};
+
+use chain::Chain;
+use contact::Poke;
+use envelope::Envelope;
+use sorted::Sorted;
+use thiserror::Error;
+
+/// How the shape is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Method {
+    /// The closed form: the fast one.
+    Envelope,
+    /// First moved first processed.
+    Chain,
+    /// Largest violation first.
+    Sorted,
+}
+
+impl Method {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::Envelope, Self::Chain, Self::Sorted];
+
+    /// Its name in words.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Envelope => "closed form",
+            Self::Chain => "first moved first",
+            Self::Sorted => "largest violation first",
+        }
+    }
+
+    /// The fastest that is right for a field.
+    #[must_use]
+    pub fn fastest(field: &HeightField) -> Self {
+        match (field.shear(), field.pins()) {
+            (Shear::PerNode(_), _) => Self::Sorted,
+            (Shear::Uniform(_), Pins::Nodes(_)) => Self::Chain,
+            (Shear::Uniform(_), _) => Self::Envelope,
+        }
+    }
+}
+
+/// A method that would be wrong on a field.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+pub enum MethodError {
+    /// Limits differ.
+    #[error(
+        "'{}' needs one MaxShear for all, and this mesh has one for each node; use '{}'",
+        .0.name(),
+        Method::Sorted.name()
+    )]
+    Shear(Method),
+    /// Ways around pinned nodes have no closed form.
+    #[error(
+        "'{}' does not go around single pinned nodes; pin the border only or use '{}'",
+        Method::Envelope.name(),
+        Method::Chain.name()
+    )]
+    Pins,
+}
+
+/// A method with its storage.
+#[derive(Clone, Debug)]
+enum Solver {
+    Envelope(Envelope),
+    Chain { shear: f64, chain: Chain },
+    Sorted(Sorted),
+}
+
+/// A height field, how it is moved and how it returns.
+#[derive(Clone, Debug)]
+pub struct Surface {
+    field: HeightField,
+    solver: Solver,
+    recovery: Recovery,
+    cut: Cut,
+}
+
+/// What a tick did.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Tick {
+    /// Work and effect of the contacts.
+    pub moved: Moved,
+    /// Every node that may be at another height than before.
+    pub dirty: Rect,
+    /// Contacts outside the mesh or with a number that is none: they had no effect.
+    pub ignored: usize,
+    /// Contacts beyond [`HIGHEST_MM`], which were taken to be there.
+    pub clamped: usize,
+}
+
+impl Surface {
+    /// With everything a tick needs allocated.
+    pub fn new(
+        field: HeightField,
+        method: Method,
+        recovery: Recovery,
+        cut: Cut,
+    ) -> Result<Self, MethodError> {
+        let uniform = match field.shear() {
+            Shear::Uniform(shear) => Ok(*shear),
+            Shear::PerNode(_) => Err(MethodError::Shear(method)),
+        };
+        let solver = match method {
+            Method::Envelope if matches!(field.pins(), Pins::Nodes(_)) => {
+                return Err(MethodError::Pins);
+            }
+            Method::Envelope => Solver::Envelope(Envelope::new(field.grid(), uniform?)),
+            Method::Chain => Solver::Chain {
+                shear: uniform?,
+                chain: Chain::new(field.grid()),
+            },
+            Method::Sorted => Solver::Sorted(Sorted::new(field.grid())),
+        };
+        Ok(Self {
+            field,
+            solver,
+            recovery,
+            cut,
+        })
+    }
+
+    /// The field.
+    #[must_use]
+    pub fn field(&self) -> &HeightField {
+        &self.field
+    }
+
+    /// Heights now in mm, row by row.
+    #[must_use]
+    pub fn heights(&self) -> &[f64] {
+        self.field.heights()
+    }
+
+    /// Forgets every displacement.
+    pub fn reset(&mut self) {
+        self.field.reset();
+    }
+
+    /// One tick of recovery, then the contacts one after the other.
+    pub fn tick(&mut self, contacts: &[Contact]) -> Tick {
+        let mut told = Tick {
+            dirty: self.field.displaced.bounds(),
+            ..Tick::default()
+        };
+        let mut recovery = self.recovery;
+        let mut rest = contacts;
+        loop {
+            let (some, others) = rest.split_at(rest.len().min(envelope::TOGETHER));
+            let mut pokes = [Poke::NOWHERE; envelope::TOGETHER];
+            let mut count = 0;
+            for contact in some {
+                match contact.poke(self.field.grid()) {
+                    Some((poke, clamped)) => {
+                        pokes[count] = poke;
+                        count += 1;
+                        told.clamped += usize::from(clamped);
+                    }
+                    None => told.ignored += 1,
+                }
+            }
+            told.moved.add(self.solve(recovery, &pokes[..count]));
+            told.dirty = told.dirty.union(self.field.displaced.bounds());
+            recovery = Recovery::NONE;
+            rest = others;
+            if rest.is_empty() {
+                return told;
+            }
+        }
+    }
+
+    fn solve(&mut self, recovery: Recovery, pokes: &[Poke]) -> Moved {
+        let Self {
+            field, solver, cut, ..
+        } = self;
+        if let Solver::Envelope(shape) = solver {
+            return envelope::tick(field, shape, recovery, *cut, pokes);
+        }
+        recovery.step_field(field);
+        let mut moved = Moved::default();
+        for &poke in pokes {
+            moved.add(match solver {
+                Solver::Chain { shear, chain } => chain.poke(field, *shear, *cut, poke),
+                Solver::Sorted(sorted) => sorted.poke(field, *cut, poke),
+                Solver::Envelope(_) => Moved::default(),
+            });
+        }
+        moved
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,285 @@
+//! Model only what a scene requires: from what it tolerates and what was measured, the cheapest way.
+//!
+//! A plan takes one point of each measured curve: mesh, cut, integrator with its step, family. Errors
+//! of shape add (mesh and cut), errors of force add (step and family), which is the most they can be.
+//! A mesh costs its time multiplied by the share that the cut leaves; times add. So the cheapest pair for
+//! the shape and the cheapest pair for the force are the cheapest of all.
+
+use super::curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
+use super::mesh::INERT;
+use crate::tolerance::Tolerance;
+use crate::units::Newtons;
+use serde::Serialize;
+
+/// What a scene tolerates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Needs {
+    /// Error of force, such as so many percent of what a hand notices
+    /// ([`THRESHOLD_SHARE`](crate::tolerance::THRESHOLD_SHARE)).
+    pub force: Tolerance,
+    /// The force at which that is meant.
+    pub peak: Newtons,
+    /// Error of shape in mm.
+    pub shape_mm: f64,
+    /// Time of a tick's own work in microseconds.
+    pub budget_us: f64,
+}
+
+/// What a plan leaves out, beside the most exact that was measured.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Dropped {
+    /// What, in words.
+    pub what: String,
+    /// The error of that part with it left out.
+    pub error: f64,
+    /// `mm` or `N`.
+    pub unit: &'static str,
+    /// Time saved in microseconds.
+    pub saved_us: f64,
+}
+
+/// One of each.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ScenePlan {
+    /// The mesh.
+    pub mesh: MeshPoint,
+    /// The cut.
+    pub cut: CutPoint,
+    /// Integrator and step.
+    pub step: StepPoint,
+    /// The family.
+    pub family: FamilyPoint,
+    /// Most that the shape is off, in mm.
+    pub shape_error_mm: f64,
+    /// Most that the force is off, in N.
+    pub force_error_n: f64,
+    /// Expected time of a tick in microseconds.
+    pub cost_us: f64,
+    /// What was left out.
+    pub dropped: Vec<Dropped>,
+    /// Parts without effect, and why.
+    pub inert: [(&'static str, &'static str); 2],
+}
+
+/// Nothing holds everything.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct NoPlan {
+    /// Why, in a sentence.
+    pub why: String,
+    /// What keeps to the budget and is beyond the tolerances by the least factor.
+    pub nearest: Option<Box<ScenePlan>>,
+}
+
+/// The cheapest plan that holds every tolerance and the budget, with `slower` times the measured
+/// costs: 1 at first, after a miss [`slower`].
+pub fn plan(needs: &Needs, curves: &SceneCurves, slower: f64) -> Result<ScenePlan, NoPlan> {
+    let refuse = |why: String| NoPlan { why, nearest: None };
+    let force_n = needs.force.in_newtons(needs.peak).0;
+    for (what, value) in [
+        ("tolerance of force", force_n),
+        ("tolerance of shape", needs.shape_mm),
+        ("budget of a tick", needs.budget_us),
+        ("factor of cost", slower),
+    ] {
+        if !(value > 0.0 && value.is_finite()) {
+            return Err(refuse(format!(
+                "a {what} of {value} is not possible; it is a finite number above zero"
+            )));
+        }
+    }
+    curves.checked().map_err(refuse)?;
+    let shapes = curves.shapes(slower);
+    let forces = curves.forces(slower);
+    let shape = cheapest(&shapes, needs.shape_mm);
+    let force = cheapest(&forces, force_n);
+    let why = match (shape, force) {
+        (Some(shape), Some(force)) if shape.cost + force.cost <= needs.budget_us => {
+            return Ok(curves.planned(shape, force, slower));
+        }
+        (Some(shape), Some(force)) => format!(
+            "the cheapest that holds {} mm and {force_n:.3} N takes {:.1} us a tick, and the budget is {} us",
+            needs.shape_mm,
+            shape.cost + force.cost,
+            needs.budget_us
+        ),
+        (None, _) => format!(
+            "nothing measured holds a shape to {} mm; the most exact is off by {} mm",
+            needs.shape_mm,
+            least(&shapes)
+        ),
+        (_, None) => format!(
+            "nothing measured holds a force to {force_n:.3} N; the most exact is off by {:.3} N",
+            least(&forces)
+        ),
+    };
+    let nearest = nearest(
+        [&shapes, &forces],
+        [needs.shape_mm, force_n],
+        needs.budget_us,
+    )
+    .map(|[shape, force]| curves.planned(shape, force, slower));
+    let advice = match &nearest {
+        Some(plan) => format!(
+            "; within the budget, {} nodes a side and the family {} are off by {:.3} mm and {:.3} N",
+            plan.mesh.nodes, plan.family.family, plan.shape_error_mm, plan.force_error_n
+        ),
+        None => "; nothing measured keeps to the budget: allow a tick more time".to_owned(),
+    };
+    Err(NoPlan {
+        why: why + &advice,
+        nearest: nearest.map(Box::new),
+    })
+}
+
+/// The factor of cost after a tick of `plan`, made with the factor `slower`, took `measured_us`: with
+/// it the plan costs what it was seen to. A tick faster than expected leaves the factor.
+#[must_use]
+pub fn slower(plan: &ScenePlan, slower: f64, measured_us: f64) -> f64 {
+    let ratio = measured_us / plan.cost_us;
+    if ratio > 1.0 && ratio.is_finite() {
+        slower * ratio
+    } else {
+        slower
+    }
+}
+
+/// The cheapest within a tolerance; of equal ones the most exact.
+fn cheapest(pairs: &[Pair], tolerance: f64) -> Option<Pair> {
+    let within = pairs.iter().filter(|pair| pair.error <= tolerance);
+    within.copied().min_by(|a, b| {
+        let by_cost = a.cost.total_cmp(&b.cost);
+        by_cost.then(a.error.total_cmp(&b.error))
+    })
+}
+
+fn least(pairs: &[Pair]) -> f64 {
+    let errors = pairs.iter().map(|pair| pair.error);
+    errors.fold(f64::INFINITY, f64::min)
+}
+
+/// The two within a budget together whose errors are beyond their tolerances by the least factor; of
+/// equal ones the cheapest.
+fn nearest(pairs: [&[Pair]; 2], tolerances: [f64; 2], budget: f64) -> Option<[Pair; 2]> {
+    let [shapes, forces] = pairs.map(front);
+    let mut best: Option<([f64; 2], [Pair; 2])> = None;
+    for shape in &shapes {
+        for force in &forces {
+            let cost = shape.cost + force.cost;
+            let factor = (shape.error / tolerances[0]).max(force.error / tolerances[1]);
+            let key = [factor, cost];
+            if cost <= budget && best.is_none_or(|(known, _)| key < known) {
+                best = Some((key, [*shape, *force]));
+            }
+        }
+    }
+    best.map(|(_, pair)| pair)
+}
+
+/// Those than which nothing is both cheaper and more exact, the cheapest first.
+fn front(pairs: &[Pair]) -> Vec<Pair> {
+    let mut sorted = pairs.to_vec();
+    sorted.sort_by(|a, b| {
+        let by_cost = a.cost.total_cmp(&b.cost);
+        by_cost.then(a.error.total_cmp(&b.error))
+    });
+    let mut least = f64::INFINITY;
+    sorted.retain(|pair| {
+        let is_better = pair.error < least;
+        least = least.min(pair.error);
+        is_better
+    });
+    sorted
+}
+
+impl SceneCurves {
+    fn planned(&self, shape: Pair, force: Pair, slower: f64) -> ScenePlan {
+        let (mesh, cut) = (&self.meshes[shape.indices[0]], &self.cuts[shape.indices[1]]);
+        let step = &self.steps[force.indices[0]];
+        let family = &self.families[force.indices[1]];
+        let mut plan = ScenePlan {
+            mesh: mesh.clone(),
+            cut: cut.clone(),
+            step: step.clone(),
+            family: family.clone(),
+            shape_error_mm: shape.error,
+            force_error_n: force.error,
+            cost_us: shape.cost + force.cost,
+            dropped: Vec::new(),
+            inert: INERT,
+        };
+        plan.dropped = self.dropped(&plan, slower);
+        plan
+    }
+
+    /// Part by part, what the most exact measured would be instead.
+    fn dropped(&self, plan: &ScenePlan, slower: f64) -> Vec<Dropped> {
+        let ScenePlan {
+            mesh,
+            cut,
+            step,
+            family,
+            ..
+        } = plan;
+        let finest = most_exact(&self.meshes, |point| (point.error_mm, point.cost_us));
+        let widest = most_exact(&self.cuts, |point| (point.error_mm, point.cost_share));
+        let shortest = most_exact(&self.steps, |point| (point.error_n, point.cost_us));
+        let fullest = most_exact(&self.families, |point| (point.error_n, point.cost_us));
+        let mut dropped = Vec::new();
+        let mut drop = |what: String, error: [f64; 2], unit, saved_us: f64| {
+            // What is as exact as the most exact leaves nothing out.
+            if error[0] > error[1] {
+                dropped.push(Dropped {
+                    what,
+                    error: error[0],
+                    unit,
+                    saved_us: slower * saved_us,
+                });
+            }
+        };
+        if let Some(finest) = finest {
+            drop(
+                format!(
+                    "a mesh of {} nodes a side; {} are used",
+                    finest.nodes, mesh.nodes
+                ),
+                [mesh.error_mm, finest.error_mm],
+                "mm",
+                (finest.cost_us - mesh.cost_us) * cut.cost_share,
+            );
+        }
+        if let Some(widest) = widest {
+            drop(
+                format!("influence beyond {}", cut.words()),
+                [cut.error_mm, widest.error_mm],
+                "mm",
+                (widest.cost_share - cut.cost_share) * mesh.cost_us,
+            );
+        }
+        if let Some(shortest) = shortest {
+            let words = |step: &StepPoint| format!("{} at {} s", step.scheme.name(), step.step_s);
+            drop(
+                format!("{}; {} is used", words(shortest), words(step)),
+                [step.error_n, shortest.error_n],
+                "N",
+                shortest.cost_us - step.cost_us,
+            );
+        }
+        if let Some(fullest) = fullest {
+            drop(
+                format!("the family {}; {} is used", fullest.family, family.family),
+                [family.error_n, fullest.error_n],
+                "N",
+                fullest.cost_us - family.cost_us,
+            );
+        }
+        dropped
+    }
+}
+
+/// The point of the least error; of equal ones the cheapest.
+fn most_exact<T>(points: &[T], key: impl Fn(&T) -> (f64, f64)) -> Option<&T> {
+    points.iter().min_by(|a, b| {
+        let (a, b) = (key(a), key(b));
+        a.0.total_cmp(&b.0).then(a.1.total_cmp(&b.1))
+    })
+}

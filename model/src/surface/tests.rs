@@ -1,0 +1,151 @@
+use super::chain::Chain;
+use super::contact::Poke;
+use super::sorted::Sorted;
+use super::*;
+use crate::random::SplitMix;
+use crate::units::Seconds;
+
+fn field(n: usize) -> HeightField {
+    HeightField::flat(Grid::new(n, n, 1.0).expect("a grid"), 0.25).expect("a field")
+}
+
+fn random_poke(random: &mut SplitMix, n: usize) -> Poke {
+    let [column, row] = [0, 1].map(|_| random.below(n) as u16);
+    Poke {
+        node: Node { column, row },
+        z: 4.0 * random.normal(),
+        side: [Side::Push, Side::Pull][random.below(2)],
+    }
+}
+
+#[test]
+fn no_node_moves_twice_in_a_pass_and_the_queue_is_in_order_of_steps() {
+    let mut random = SplitMix::seeded(1);
+    let mut field = field(31);
+    let mut chain = Chain::new(field.grid());
+    for _ in 0..200 {
+        let poke = random_poke(&mut random, 31);
+        let before = field.heights().to_vec();
+        let told = chain.poke(&mut field, 0.25, Cut::NONE, poke);
+        let mut order: Vec<_> = chain
+            .order()
+            .iter()
+            .map(|node| field.grid.index(*node))
+            .collect();
+        assert!(
+            chain
+                .order()
+                .is_sorted_by_key(|node| node.steps_to(poke.node))
+        );
+        assert_eq!(order.len(), told.moved);
+        order.sort_unstable();
+        assert!(order.windows(2).all(|pair| pair[0] != pair[1]));
+        let changed = (0..before.len()).filter(|&index| before[index] != field.now[index]);
+        assert_eq!(order, changed.collect::<Vec<_>>());
+    }
+}
+
+#[test]
+fn a_pass_after_the_last_number_of_passes_starts_anew() {
+    let mut stamps = chain::Stamps::new(3);
+    stamps.begin();
+    stamps.set(1);
+    assert!(stamps.has(1) && !stamps.has(0));
+    stamps.at_pass(u32::MAX);
+    stamps.set(2);
+    stamps.begin();
+    assert!((0..3).all(|index| !stamps.has(index)));
+}
+
+#[test]
+fn the_sorted_chain_never_needs_more_room() {
+    let mut random = SplitMix::seeded(2);
+    let grid = Grid::new(23, 23, 1.0).unwrap();
+    let limits = (0..grid.nodes()).map(|_| 0.01 + random.normal().abs());
+    let limits = Shear::PerNode(limits.collect());
+    let mut field = HeightField::new(grid, vec![0.0; grid.nodes()], limits).unwrap();
+    let mut sorted = Sorted::new(&grid);
+    let room = sorted.room();
+    for _ in 0..300 {
+        sorted.poke(&mut field, Cut::NONE, random_poke(&mut random, 23));
+    }
+    assert_eq!(sorted.room(), room);
+}
+
+#[test]
+fn meshes_that_cannot_be_are_refused_in_words() {
+    let refused = |columns, rows, spacing| Grid::new(columns, rows, spacing).unwrap_err();
+    for bad in [
+        refused(1, 5, 1.0),
+        refused(5, 65_536, 1.0),
+        refused(5000, 5000, 1.0),
+        refused(5, 5, 0.0),
+        refused(5, 5, f64::NAN),
+        refused(5, 5, f64::INFINITY),
+    ] {
+        assert!(bad.to_string().contains("not possible"), "{bad}");
+    }
+    let grid = Grid::new(3, 2, 1.0).unwrap();
+    let made = |rest: &[f64], shear| HeightField::new(grid, rest.to_vec(), shear);
+    let said = |rest: &[f64], shear| made(rest, shear).unwrap_err().to_string();
+    let flat = [0.0; 6];
+    let one = Shear::Uniform;
+    assert!(said(&flat[1..], one(1.0)).contains("5 rest heights for 6 nodes"));
+    assert!(said(&[0.0, 0.0, 0.0, 0.0, f64::NAN, 0.0], one(1.0)).contains("column 1, row 1"));
+    assert!(said(&[2e6; 6], one(1.0)).contains("within 1000000 mm"));
+    for shear in [-1.0, f64::NAN] {
+        assert!(said(&flat, one(shear)).contains("MaxShear"));
+        let own = Shear::PerNode([1.0, 1.0, shear, 1.0, 1.0, 1.0].into());
+        assert!(said(&flat, own).contains("MaxShear"));
+    }
+    assert!(said(&flat, Shear::PerNode([1.0].into())).contains("1 MaxShears"));
+    assert!(said(&[0.0, 0.0, 1.5, 0.0, 0.0, 1.5], one(1.0)).contains("column 1, row 0 is 1.5 mm"));
+    // Made to the limit with roundings: possible.
+    let ramp: Vec<f64> = (0..6).map(|index| 0.1 * f64::from(index % 3)).collect();
+    let field = made(&ramp, one(0.1)).unwrap();
+    let marks = Pins::Nodes([true].into());
+    assert!(field.clone().pinned(marks).is_err());
+    for (min, max) in [(-0.1, 2.0), (1.1, 2.0), (0.5, 0.9), (f64::NAN, 2.0)] {
+        let refused = field.clone().with_distances(Distances { min, max });
+        assert!(refused.unwrap_err().to_string().contains("MinDist"));
+    }
+}
+
+#[test]
+fn distances_are_kept_and_have_no_effect() {
+    let shape = |distances| {
+        let field = field(11).with_distances(distances).unwrap();
+        let mut surface = Surface::new(field, Method::Envelope, Recovery::NONE, Cut::NONE).unwrap();
+        let at = Node { column: 4, row: 5 };
+        surface.tick(&[Contact::at(surface.field().grid(), at, -1.3, Side::Push)]);
+        (surface.field().distances(), surface.heights().to_vec())
+    };
+    let [narrow, wide] =
+        [(1.0, 1.0), (0.0, f64::INFINITY)].map(|(min, max)| Distances { min, max });
+    assert_eq!((shape(narrow).0, shape(wide).0), (narrow, wide));
+    assert_eq!(shape(narrow).1, shape(wide).1);
+    assert_eq!(INERT.map(|(name, _)| name), ["MinDist", "MaxDist"]);
+}
+
+#[test]
+fn a_surface_that_came_to_rest_reaches_no_further_than_a_new_one() {
+    // Bounds of heights widen with pulls; left wide they would only cost time.
+    let recovery = Recovery::new(Seconds(1e-3), Seconds(1e-3)).unwrap();
+    let mut used = Surface::new(field(41), Method::Envelope, recovery, Cut::NONE).unwrap();
+    let at = |z, side| {
+        Contact::at(
+            &Grid::new(41, 41, 1.0).unwrap(),
+            Node {
+                column: 20,
+                row: 20,
+            },
+            z,
+            side,
+        )
+    };
+    used.tick(&[at(5.0, Side::Pull)]);
+    while !used.tick(&[]).dirty.is_empty() {}
+    let mut new = Surface::new(field(41), Method::Envelope, recovery, Cut::NONE).unwrap();
+    let poke = [at(-1.0, Side::Push)];
+    assert_eq!(used.tick(&poke), new.tick(&poke));
+}

@@ -1,0 +1,46 @@
+//! The priority of the loop's thread: the best that the system grants.
+
+use std::fmt;
+use thread_priority::{
+    RealtimeThreadSchedulePolicy, ThreadPriority, ThreadPriorityValue, ThreadSchedulePolicy,
+    set_thread_priority_and_policy, thread_native_id,
+};
+
+/// Above ordinary real-time work such as sound (10 to 20 on common systems), below the kernel's own threads (50).
+const WANTED: u8 = 30;
+
+/// What was granted.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Granted {
+    /// Real time, first in first out, with this priority: nothing ordinary comes between.
+    RealTime(u8),
+    /// As any program, and why.
+    Ordinary(String),
+}
+
+impl fmt::Display for Granted {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::RealTime(priority) => write!(f, "real time, priority {priority}"),
+            Self::Ordinary(reason) => write!(
+                f,
+                "ordinary, because the system grants no real time ({reason}); let your account have 'rtprio' in /etc/security/limits.conf"
+            ),
+        }
+    }
+}
+
+/// Asks for real time for the thread that calls.
+#[must_use]
+pub fn ask() -> Granted {
+    let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+    let granted = ThreadPriorityValue::try_from(WANTED).and_then(|value| {
+        let priority = ThreadPriority::Crossplatform(value);
+        set_thread_priority_and_policy(thread_native_id(), priority, policy)
+            .map_err(|err| err.to_string())
+    });
+    match granted {
+        Ok(()) => Granted::RealTime(WANTED),
+        Err(reason) => Granted::Ordinary(reason),
+    }
+}

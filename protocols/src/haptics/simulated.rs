@@ -1,0 +1,45 @@
+//! The master-slave system on its simulated device, as a loop ticks it.
+
+use super::Ticking;
+use palpate_model::haptics::MasterSlaveError;
+use palpate_model::haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
+
+/// Ticks of a stall that the device is led through; after longer ones it stands where it was.
+const LED_MAX: u64 = 1000;
+
+/// A simulation, its hand pressing again and again where its path says so.
+#[derive(Clone, Copy, Debug)]
+pub struct Simulated {
+    simulation: Simulation,
+    last: SimulationTick,
+}
+
+impl Simulated {
+    /// At the start, after one tick.
+    pub fn new(settings: &SimulationSettings) -> Result<Self, MasterSlaveError> {
+        let mut simulation = Simulation::new(settings)?;
+        let last = simulation.tick();
+        Ok(Self { simulation, last })
+    }
+
+    /// The newest tick.
+    #[must_use]
+    pub fn last(&self) -> &SimulationTick {
+        &self.last
+    }
+}
+
+impl Ticking for Simulated {
+    type View = SimulationTick;
+
+    fn tick(&mut self, elapsed: u64) {
+        for _ in 1..elapsed.min(LED_MAX) {
+            let _away = self.simulation.stalled();
+        }
+        self.last = self.simulation.tick();
+    }
+
+    fn show(&self, view: &mut SimulationTick) {
+        *view = self.last;
+    }
+}

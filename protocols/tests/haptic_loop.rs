@@ -1,0 +1,138 @@
+//! The haptic loop as a thread: what it hands over is whole, and a tick neither allocates nor waits.
+
+use palpate_model::haptics::Period;
+use palpate_model::haptics::rig::{Hand, HandPath};
+use palpate_model::haptics::simulation::SimulationSettings;
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_protocols::haptics::{Beat, Simulated, Ticking};
+
+fn device(period: Period) -> Simulated {
+    let path = HandPath::RampHold {
+        from: 0.0,
+        to: 30.0,
+        speed: 50.0,
+    };
+    let settings = SimulationSettings::of(ModifiedKelvin::THESIS, period, Hand::firm(path));
+    Simulated::new(&settings).expect("a device")
+}
+
+#[test]
+fn a_tick_allocates_nothing() {
+    let mut device = device(Period::MILLISECOND);
+    let mut seen = *device.last();
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..20_000_u64 {
+            // Stalls too.
+            device.tick(1 + u64::from(tick % 997 == 0) * 20);
+            device.show(&mut seen);
+        }
+    });
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+    assert!(seen.snapshot.is_whole());
+    // The counter counts.
+    let counted = allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 100])));
+    assert_eq!(counted.count_total, 1);
+}
+
+/// How often the thread that asks gave its processor away of its own accord, as every wait for a lock does.
+#[cfg(target_os = "linux")]
+fn waits() -> u64 {
+    let status = std::fs::read_to_string("/proc/thread-self/status").expect("Linux has it");
+    let mut lines = status.lines();
+    let count = lines.find_map(|line| line.strip_prefix("voluntary_ctxt_switches:"));
+    count
+        .and_then(|count| count.trim().parse().ok())
+        .expect("a count")
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_tick_waits_for_nobody() {
+    let mut device = device(Period::MILLISECOND);
+    let (mut shown, mut seen) = triple_buffer::triple_buffer(device.last());
+    let reader = std::thread::Builder::new().spawn(move || {
+        let mut last = 0;
+        for _ in 0..100_000 {
+            last = seen.read().snapshot.tick;
+        }
+        last
+    });
+    // The first reading of the count opens the file, which may wait.
+    waits();
+    let before = waits();
+    for _ in 0..20_000 {
+        device.tick(1);
+        device.show(shown.input_buffer_mut());
+        shown.publish();
+    }
+    let after = waits();
+    // Reading the count itself may wait once.
+    assert!(after - before <= 1, "{before} {after}");
+    // The count counts.
+    std::thread::sleep(std::time::Duration::from_millis(1));
+    assert!(waits() > after);
+    reader.unwrap().join().unwrap();
+}
+
+#[test]
+fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
+    let period = Period::of_rate(10_000.0).unwrap();
+    let device = device(period);
+    let first = *device.last();
+    let mut beat = Beat::start(device, period, first).unwrap();
+    let (mut newest, mut changes) = (0, 0);
+    for read in 0..1_000_000_u32 {
+        let seen = &beat.seen().snapshot;
+        assert!(seen.is_whole(), "read {read}: {seen:?}");
+        assert!(seen.tick >= newest, "read {read}");
+        changes += u32::from(seen.tick > newest);
+        newest = seen.tick;
+    }
+    assert!(changes > 10, "{changes}");
+    let kept = beat.kept();
+    assert!(kept.work.count > 10 && kept.period.p50.0 > 0.0, "{kept:?}");
+    let last = beat.end().unwrap();
+    assert!(last.last().snapshot.tick >= newest);
+}
+
+#[test]
+fn ticks_that_were_missed_are_told_and_none_is_lost() {
+    /// Sleeps through some ticks now and then, which a loop must never do.
+    struct Sleepy {
+        calls: u64,
+        ticks: u64,
+    }
+    impl Ticking for Sleepy {
+        type View = (u64, u64);
+        fn tick(&mut self, elapsed: u64) {
+            self.calls += 1;
+            self.ticks += elapsed;
+            if self.calls.is_multiple_of(50) {
+                std::thread::sleep(std::time::Duration::from_millis(5));
+            }
+        }
+        fn show(&self, view: &mut (u64, u64)) {
+            *view = (self.calls, self.ticks);
+        }
+    }
+    let task = Sleepy { calls: 0, ticks: 0 };
+    let mut beat = Beat::start(task, Period::MILLISECOND, (0, 0)).unwrap();
+    while beat.seen().0 < 200 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let kept = beat.kept();
+    assert!(beat.is_alive());
+    let task = beat.end().unwrap();
+    assert!(kept.overruns >= 4 && kept.missed >= 12, "{kept:?}");
+    assert!(
+        kept.work.max.0 >= 0.005 && kept.work.p50.0 < 0.005,
+        "{kept:?}"
+    );
+    // Calls and misses are all ticks that were due.
+    assert!(
+        task.ticks >= task.calls + kept.missed,
+        "{} {}",
+        task.ticks,
+        task.calls
+    );
+}
