@@ -20,6 +20,7 @@ use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
 use crate::shell::palette::{Action, Palette};
 use crate::shell::rail::Screen;
+use crate::shell::sizes::{STEP, Sizes};
 use crate::shell::tour::Tour;
 use crate::theme;
 use crate::widgets::places::places;
@@ -85,6 +86,7 @@ pub struct WorkbenchApp {
     pub(crate) palette: Palette,
     pub(crate) tour: Tour,
     pub(crate) settings: Kept,
+    pub(crate) sizes: Sizes,
     is_zoom_set: bool,
     start: Start,
     is_closing: bool,
@@ -155,6 +157,7 @@ impl WorkbenchApp {
             middle: Middle::default(),
             chooser: Chooser::default(),
             time_view: TimeView::default(),
+            sizes: Sizes::remembered([settings.now.left, settings.now.right, settings.now.log]),
             screen: Screen::by_name(&settings.now.screen).unwrap_or_default(),
             rig_screen: RigScreen::default(),
             catalog: LibraryScreen::new(curves_in.clone()),
@@ -327,6 +330,9 @@ impl WorkbenchApp {
                 }
                 Command::Show(screen) => self.screen = screen,
                 Command::SwitchTheme => theme::switch(ctx),
+                Command::Resize { edge, is_larger } => {
+                    self.sizes.grow(edge, if is_larger { STEP } else { -STEP });
+                }
                 Command::TextSize(size) => {
                     let zoom = ctx.zoom_factor();
                     let zoom = match size {
@@ -453,6 +459,7 @@ impl WorkbenchApp {
         now.screen = self.screen.name().to_owned();
         now.operator = self.form.told_text("operator").to_owned();
         now.sessions.clone_from(&self.form.folder);
+        [now.left, now.right, now.log] = self.sizes.told();
     }
 
     /// Files dropped on the window go where they belong.

@@ -3,6 +3,7 @@
 use crate::screens::run_middle::Middle;
 use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
+use crate::shell::sizes::Edge;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::Id;
 use std::collections::BTreeMap;
@@ -53,6 +54,13 @@ pub enum Command {
     Review(Vec<PathBuf>),
     /// Make text and everything else larger or smaller.
     TextSize(TextSize),
+    /// Make a panel larger, or smaller.
+    Resize {
+        /// Which.
+        edge: Edge,
+        /// Whether larger.
+        is_larger: bool,
+    },
     /// Put the keyboard's focus on something.
     Focus(Id),
     /// Open or close the list of everything that can be asked for.

@@ -2,6 +2,7 @@
 
 use crate::app::WorkbenchApp;
 use crate::command::Commands;
+use crate::plots::course::CourseLimits;
 use crate::plots::force_depth::force_depth_ui;
 use crate::plots::force_time::{force_time_ui, head_ui};
 use crate::plots::residual::residual_ui;
@@ -16,6 +17,7 @@ use crate::screens::weighing::weighing_ui;
 use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
+use crate::shell::sizes::{Edge, Sizes};
 use crate::shell::top_bar::{HEIGHT, top_bar_ui};
 use crate::theme::Tokens;
 use crate::workers::fit::Refit;
@@ -31,13 +33,6 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
 use std::path::PathBuf;
-
-/// Widths of the panels beside the plots, in points.
-const LEFT_WIDTH: f32 = 304.0;
-const RIGHT_WIDTH: f32 = 318.0;
-
-/// Height of the event log in points.
-const LOG_HEIGHT: f32 = 134.0;
 
 /// Height of the residuals under the force in points.
 const RESIDUAL_HEIGHT: f32 = 96.0;
@@ -129,31 +124,21 @@ pub(crate) fn frame(ui: &Ui, is_canvas: bool) -> Frame {
         .stroke(Stroke::NONE)
 }
 
-/// Where a panel stands beside the middle.
-#[derive(Clone, Copy)]
-enum Side {
-    /// What is asked for.
-    Left,
-    /// What is known.
-    Right,
-}
-
 /// A panel beside the middle that scrolls.
-fn side_ui(ui: &mut Ui, side: Side, content: impl FnOnce(&mut Ui)) {
-    let (panel, width) = match side {
-        Side::Left => (Panel::left("left"), LEFT_WIDTH),
-        Side::Right => (Panel::right("right"), RIGHT_WIDTH),
+fn side_ui(ui: &mut Ui, sizes: &mut Sizes, edge: Edge, content: impl FnOnce(&mut Ui)) {
+    let panel = match edge {
+        Edge::Left => Panel::left("left"),
+        _ => Panel::right("right"),
     };
-    panel
-        .exact_size(width)
-        .resizable(false)
-        .frame(frame(ui, false))
-        .show(ui, |ui| {
-            ScrollArea::vertical()
-                .id_salt("side")
-                .auto_shrink(false)
-                .show(ui, content);
-        });
+    let scrolled = |ui: &mut Ui| {
+        ScrollArea::vertical()
+            .id_salt("side")
+            .auto_shrink(false)
+            .show(ui, content);
+    };
+    let panel = sizes.of(edge, panel).frame(frame(ui, false));
+    let shown = panel.show(ui, scrolled);
+    sizes.drag(ui, edge, shown.response.rect);
 }
 
 impl WorkbenchApp {
@@ -184,11 +169,10 @@ impl WorkbenchApp {
             .resizable(false)
             .frame(frame(ui, false))
             .show(ui, |ui| rail_ui(ui, self.screen, commands));
-        Panel::bottom("log")
-            .exact_size(LOG_HEIGHT)
-            .resizable(false)
-            .frame(frame(ui, true))
-            .show(ui, |ui| self.events.ui(ui, &self.snapshot, commands));
+        let log = Panel::bottom("log").frame(frame(ui, true));
+        let log = self.sizes.of(Edge::Log, log);
+        let log = log.show(ui, |ui| self.events.ui(ui, &self.snapshot, commands));
+        self.sizes.drag(ui, Edge::Log, log.response.rect);
         match self.screen {
             Screen::Rig => self.rig_screen_ui(ui, commands),
             Screen::Library => self.library_ui(ui, commands),
@@ -202,7 +186,7 @@ impl WorkbenchApp {
     }
 
     fn rig_screen_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        side_ui(ui, Side::Left, |ui| {
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
             rig_ui(ui, &self.snapshot, &self.ports, commands);
         });
         CentralPanel::default()
@@ -223,16 +207,24 @@ impl WorkbenchApp {
     }
 
     fn library_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        side_ui(ui, Side::Left, |ui| self.catalog.left_ui(ui, commands));
-        side_ui(ui, Side::Right, |ui| self.catalog.right_ui(ui, commands));
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
+            self.catalog.left_ui(ui, commands)
+        });
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.catalog.right_ui(ui, commands)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.catalog.middle_ui(ui, commands));
     }
 
     fn review_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        side_ui(ui, Side::Left, |ui| self.review.left_ui(ui, commands));
-        side_ui(ui, Side::Right, |ui| self.review.right_ui(ui, commands));
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
+            self.review.left_ui(ui, commands)
+        });
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.review.right_ui(ui, commands)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.review.middle_ui(ui, commands));
@@ -240,10 +232,12 @@ impl WorkbenchApp {
 
     fn trade_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
         let verdict = self.measure_verdict();
-        side_ui(ui, Side::Left, |ui| {
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
             self.trade.left_ui(ui, &verdict, commands);
         });
-        side_ui(ui, Side::Right, |ui| self.trade.right_ui(ui));
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.trade.right_ui(ui)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.trade.middle_ui(ui));
@@ -255,18 +249,24 @@ impl WorkbenchApp {
             is_busy: self.is_busy(),
             run: self.snapshot.run.as_ref(),
         };
-        side_ui(ui, Side::Left, |ui| {
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
             self.calibration.left_ui(ui, &facts, commands);
         });
-        side_ui(ui, Side::Right, |ui| self.calibration.right_ui(ui));
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.calibration.right_ui(ui)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.calibration.middle_ui(ui));
     }
 
     fn extremes_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        side_ui(ui, Side::Left, |ui| self.extremes.left_ui(ui, commands));
-        side_ui(ui, Side::Right, |ui| self.extremes.right_ui(ui));
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
+            self.extremes.left_ui(ui, commands)
+        });
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.extremes.right_ui(ui)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.extremes.middle_ui(ui));
@@ -277,34 +277,26 @@ impl WorkbenchApp {
         let last_run = run
             .filter(|run| run.outcome.is_some())
             .map(|run| run.folder.as_path());
-        side_ui(ui, Side::Left, |ui| {
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
             self.models.left_ui(ui, last_run, commands);
         });
-        side_ui(ui, Side::Right, |ui| self.models.right_ui(ui));
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.models.right_ui(ui)
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.models.middle_ui(ui));
     }
 
     fn run_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
-        Panel::left("rig_and_protocol")
-            .exact_size(LEFT_WIDTH)
-            .resizable(false)
-            .frame(frame(ui, false))
-            .show(ui, |ui| self.left_ui(ui, commands));
-        Panel::right("results")
-            .exact_size(RIGHT_WIDTH)
-            .resizable(false)
-            .frame(frame(ui, false))
-            .show(ui, |ui| {
-                ScrollArea::vertical()
-                    .id_salt("results")
-                    .auto_shrink(false)
-                    .show(ui, |ui| {
-                        let loops = self.plots.loops();
-                        results_ui(ui, &self.snapshot, self.refit(), loops, commands);
-                    });
-            });
+        let left = Panel::left("rig_and_protocol").frame(frame(ui, false));
+        let left = self.sizes.of(Edge::Left, left);
+        let left = left.show(ui, |ui| self.left_ui(ui, commands));
+        self.sizes.drag(ui, Edge::Left, left.response.rect);
+        let refit = self.refitter.of(self.snapshot.run.as_ref());
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            results_ui(ui, &self.snapshot, refit, self.plots.loops(), commands);
+        });
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.middle_ui(ui, commands));
@@ -367,7 +359,15 @@ impl WorkbenchApp {
                 };
                 self.chooser.ui(ui, &self.form, &facts, commands);
             }
-            Middle::Course => expected_ui(ui, self.form.checked()),
+            Middle::Course => {
+                let checked = self.form.checked();
+                let tight = |checked: &Checked| checked.plan.limits.tighten(self.bench.limits);
+                let limits = CourseLimits {
+                    force: checked.map_or(self.bench.limits, tight).force_max,
+                    speed: self.snapshot.rig.description.speed_max,
+                };
+                expected_ui(ui, checked, limits);
+            }
             Middle::Measured => self.plots_ui(ui),
         }
     }

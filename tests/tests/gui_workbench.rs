@@ -1,6 +1,6 @@
 //! What stands on every screen, the rig's screen, weighing and the search for the surface, by accessible name.
 
-use eframe::egui::{Key, Modifiers};
+use eframe::egui::{Key, Modifiers, pos2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_app::shell::rail::Screen;
 use palpate_app::window::WindowOptions;
@@ -264,6 +264,22 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     flow.type_into("operator", "Grace");
     by_name(&mut flow, "light or dark");
     by_name(&mut flow, "larger text");
+    // The view's tabs stand right of the left panel: they move with its edge, by name and by the pointer.
+    let edge = |flow: &Flow| flow.window.get_by_label("Protocols").rect().left();
+    let usual = edge(&flow);
+    by_name(&mut flow, "larger left panel");
+    let larger = edge(&flow);
+    assert!((larger - usual - 40.0).abs() < 0.6, "{usual} {larger}");
+    let grip = flow.window.get_by_label("operator").rect().center();
+    let grip = pos2(larger - 8.0, grip.y);
+    flow.window.drag_at(grip);
+    flow.window.step();
+    flow.window.hover_at(grip + vec2(25.0, 0.0));
+    flow.window.step();
+    flow.window.drop_at(grip + vec2(25.0, 0.0));
+    flow.window.run_steps(2);
+    let dragged = edge(&flow);
+    assert!((dragged - larger - 25.0).abs() < 0.6, "{larger} {dragged}");
     by_name(&mut flow, "screen library");
     eframe::App::on_exit(flow.window.state_mut());
     let mut flow = open();
@@ -273,6 +289,7 @@ fn the_window_looks_as_it_was_left_and_the_tour_is_taken_once() {
     assert!((ctx.zoom_factor() - 1.1).abs() < 1e-6);
     assert!(ctx.global_style().visuals.dark_mode);
     by_name(&mut flow, "screen run");
+    assert!((edge(&flow) - dragged).abs() < 0.6, "{}", edge(&flow));
     assert!(
         flow.window
             .get_by_label("operator")

@@ -13,6 +13,7 @@ mod export;
 mod extremes;
 mod find;
 mod fit;
+mod haptics;
 mod history;
 mod import;
 mod info;
@@ -121,6 +122,9 @@ enum Command {
     /// Look at rigs on wires: which are there, whether one is as its file says, what it reports
     #[command(subcommand)]
     Rig(wired::RigCommand),
+    /// Feel a fitted body through a master-slave device: check it, run it, time its loop
+    #[command(subcommand)]
+    Haptics(haptics::HapticsCommand),
     /// Answer like a controller on a wire, with the simulated bench behind it
     #[command(subcommand)]
     Emulate(emulate::EmulateCommand),
@@ -246,6 +250,9 @@ pub fn main() -> ExitCode {
         Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
         Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
         Some(Command::Rig(command)) => with(command.is_json(), |out| wired::run(&command, out)),
+        Some(Command::Haptics(command)) => {
+            with(command.is_json(), |out| haptics::run(&command, out))
+        }
         Some(Command::Emulate(command)) => {
             with(command.is_json(), |out| emulate::run(&command, out))
         }

@@ -23,7 +23,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU32, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
 use std::time::Duration;
 
@@ -199,6 +199,10 @@ fn carry_out(
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
     bench.doubts.iter().for_each(|doubt| output.note(doubt));
+    let (answers, after_stop) = match bench.rig.is_virtual() {
+        true => (Answers::Confirm, AfterStop::Close),
+        false => (Answers::Operator, AfterStop::Ask),
+    };
     let request = RunRequest {
         plan,
         calibration: bench.calibration,
@@ -207,12 +211,8 @@ fn carry_out(
         labels,
         is_acknowledged: how.acknowledge,
         to_acknowledge: gate.to_acknowledge(),
-        after_stop: AfterStop::Close,
-        answers: if bench.rig.is_virtual() {
-            Answers::Confirm
-        } else {
-            Answers::Operator
-        },
+        after_stop,
+        answers,
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(
@@ -282,14 +282,14 @@ pub(super) fn execute(
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
-    stop_on_signals(&runner)?;
+    let is_asking = stop_on_signals(&runner)?;
     match answer.recv() {
         Ok(Ok(())) => {}
         Ok(Err(StartError::Refused(reason))) => return Err(Failure::Usage(reason)),
         Ok(Err(StartError::Failed(reason))) => return Err(Failure::Failed(reason)),
         Err(_) => return Err(Failure::failed("the runner ended before the run began")),
     }
-    let asking = is_asked.then(|| Asking::start(runner.requests()));
+    let asking = is_asked.then(|| Asking::start(runner.requests(), is_asking));
     watch(&runner, &woken, asking.transpose()?, output)
 }
 
@@ -308,18 +308,23 @@ fn labels(args: &HowArgs) -> Result<Labels, Failure> {
     Ok(labels)
 }
 
-/// The first signal stops, the second halts.
-pub(super) fn stop_on_signals(runner: &Runner) -> Result<(), Failure> {
+/// The first signal stops, the second halts; one while a stopped run asks how to go on leaves the probe where it is.
+/// Returns what says that it asks.
+pub(super) fn stop_on_signals(runner: &Runner) -> Result<Arc<AtomicBool>, Failure> {
     let requests = runner.requests();
     let count = AtomicU32::new(0);
+    let is_asking = Arc::new(AtomicBool::new(false));
+    let is_asked = Arc::clone(&is_asking);
     ctrlc::set_handler(move || {
         let choice = match count.fetch_add(1, Ordering::Relaxed) {
+            _ if is_asked.load(Ordering::Relaxed) => Operator::Close,
             0 => Operator::Stop,
             _ => Operator::Halt,
         };
         let _ = requests.try_send(Request::Operator(choice));
     })
-    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
+    .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))?;
+    Ok(is_asking)
 }
 
 /// Draws progress until the run is over.
@@ -337,7 +342,7 @@ fn watch(
         bar.set_position((view.fraction * 1000.0) as u64);
         bar.set_message(progress_text(view));
         if let Some(asking) = &mut asking {
-            bar.suspend(|| asking.look(view.prompt.as_ref(), output));
+            bar.suspend(|| asking.look(view, output));
         }
         if view.outcome.is_some() {
             bar.finish_and_clear();

@@ -11,6 +11,7 @@ pub mod extremes;
 pub mod family;
 pub(crate) mod family_json;
 pub mod figures;
+pub mod haptics;
 pub(crate) mod imported;
 pub mod kept;
 mod page;

@@ -3,7 +3,7 @@
 use super::form::{Checked, ProtocolForm};
 use super::protocol_panel::ProtocolFacts;
 use crate::command::{Command, Commands};
-use crate::plots::course::course_ui;
+use crate::plots::course::{CourseLimits, course_ui};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
 use crate::workers::Job;
@@ -221,14 +221,14 @@ fn protocol_ui(ui: &mut Ui, protocol: &Protocol, is_chosen: bool, commands: &mut
 }
 
 /// Draws what the plan is expected to do.
-pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>) {
+pub fn expected_ui(ui: &mut Ui, checked: Option<&Checked>, limits: CourseLimits) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     match checked {
         Some(checked) if checked.outline.iter().all(|point| point.depth.0 == 0.0) => {
             let words = "this protocol does not indent; there is no depth or force to draw";
             ui.label(RichText::new(words).color(tokens.text_quiet));
         }
-        Some(checked) => course_ui(ui, &checked.outline),
+        Some(checked) => course_ui(ui, &checked.outline, limits),
         None => {
             let words = "nothing to draw until the protocol and its values are right";
             ui.label(RichText::new(words).color(tokens.text_quiet));

@@ -4,6 +4,7 @@ use super::activity::run_in_progress;
 use super::palette::Action;
 use super::rail::Screen;
 use super::run_strip::Wish;
+use super::sizes::Edge;
 use crate::app::WorkbenchApp;
 use crate::command::{Aside, Command, TextSize};
 use crate::screens::calibration::can_keep;
@@ -107,6 +108,14 @@ impl WorkbenchApp {
                 "Ctrl+0",
                 Command::TextSize(TextSize::Usual),
             ),
+        ]);
+        for edge in Edge::ALL {
+            for (word, is_larger) in [("Larger", true), ("Smaller", false)] {
+                let name = format!("{word} {}", edge.name());
+                actions.push(Action::new(name, "", Command::Resize { edge, is_larger }));
+            }
+        }
+        actions.extend([
             Action::new("Take the tour", "", Command::TourStart),
             Action::new("End the tour", "", Command::TourEnd).if_ok(is_on_tour),
             Action::new("This list", "Ctrl+K, F1", Command::Palette),

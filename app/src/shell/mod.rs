@@ -8,5 +8,6 @@ pub mod keys;
 pub mod palette;
 pub mod rail;
 pub mod run_strip;
+pub mod sizes;
 pub mod top_bar;
 pub mod tour;

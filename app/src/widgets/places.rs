@@ -17,6 +17,10 @@ pub trait Place {
 
 impl Place for Response {
     fn place(self, name: &str) -> Self {
+        // Who comes here by key finds it in sight.
+        if self.gained_focus() {
+            self.scroll_to_me(None);
+        }
         if self.enabled() {
             let pass = self.ctx.cumulative_pass_nr();
             self.ctx.data_mut(|data| {

@@ -1,6 +1,7 @@
 //! A number with a unit, checked on every change, with its error sentence beside it.
 
 use super::places::Place;
+use super::steady::steady;
 use crate::theme::Tokens;
 use eframe::egui::{Align, Align2, RichText, TextEdit, Ui};
 
@@ -52,19 +53,18 @@ pub const LABEL_WIDTH: f32 = 74.0;
 /// Draws a labelled input with its unit; true when the text changed.
 pub fn quantity_ui(ui: &mut Ui, name: &str, unit: &str, field: &mut QuantityField) -> bool {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let has_changed = ui
-        .horizontal(|ui| {
-            let label = form_label(ui, name);
-            let input = ui.add(
-                TextEdit::singleline(&mut field.text)
-                    .desired_width(76.0)
-                    .char_limit(24)
-                    .align(Align2::RIGHT_CENTER),
-            );
-            ui.label(RichText::new(unit).color(tokens.text_quiet));
-            input.labelled_by(label.id).place(name).changed()
-        })
-        .inner;
+    let row = |ui: &mut Ui| {
+        let label = form_label(ui, name);
+        let input = ui.add(
+            TextEdit::singleline(&mut field.text)
+                .desired_width(76.0)
+                .char_limit(24)
+                .align(Align2::RIGHT_CENTER),
+        );
+        ui.label(RichText::new(unit).color(tokens.text_quiet));
+        input.labelled_by(label.id).place(name).changed()
+    };
+    let has_changed = steady(ui, name, |ui| ui.horizontal(row).inner);
     if let Err(reason) = &field.value {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());
     }

@@ -1,6 +1,7 @@
 //! A button that, when it cannot be pressed, says why in words beside it.
 
 use super::places::Place;
+use super::steady::steady;
 use crate::theme::Tokens;
 use eframe::egui::{Button, Label, RichText, Ui, Vec2};
 
@@ -12,10 +13,11 @@ pub fn reason_button(
     verdict: &Result<(), String>,
 ) -> bool {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let is_pressed = ui
-        .add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size))
-        .place(text)
-        .clicked();
+    let is_pressed = steady(ui, text, |ui| {
+        ui.add_enabled(verdict.is_ok(), Button::new(text).min_size(min_size))
+            .place(text)
+            .clicked()
+    });
     if let Err(reason) = verdict {
         let reason = RichText::new(reason).color(tokens.text_quiet).small();
         ui.add(Label::new(reason).wrap());

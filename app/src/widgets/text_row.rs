@@ -2,6 +2,7 @@
 
 use super::places::Place;
 use super::quantity_input::form_label;
+use super::steady::steady;
 use eframe::egui::{Key, TextEdit, Ui};
 
 /// Longest text taken: a path.
@@ -9,16 +10,14 @@ const TEXT_MAX: usize = 4096;
 
 /// Draws the field behind its label; true when it was left with Enter.
 pub fn text_row(ui: &mut Ui, name: &str, hint: &str, text: &mut String) -> bool {
-    ui.horizontal(|ui| {
+    let row = |ui: &mut Ui| {
         let label = form_label(ui, name);
         let input = TextEdit::singleline(text)
-            // Whatever grows or shrinks above it, who types goes on typing.
-            .id_salt(("text_row", name))
             .desired_width(ui.available_width() - 8.0)
             .char_limit(TEXT_MAX)
             .hint_text(hint);
         let typed = ui.add(input).labelled_by(label.id).place(name);
         typed.lost_focus() && ui.input(|input| input.key_pressed(Key::Enter))
-    })
-    .inner
+    };
+    steady(ui, name, |ui| ui.horizontal(row).inner)
 }

@@ -9,6 +9,7 @@ mod doctor;
 mod emulate;
 mod extremes;
 mod fit;
+mod haptics;
 mod import;
 mod lake;
 mod plan;

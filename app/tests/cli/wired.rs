@@ -2,7 +2,10 @@
 
 use super::emulate::{Emulator, emulate_galil};
 use super::{json, palpate, stderr, stdout};
+use palpate_sessions::log::Session;
+use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
+use std::process::{Command, Stdio};
 
 /// A rig file for the emulated controller.
 fn rig_file(folder: &Path, at: &str, more: &str) -> String {
@@ -74,4 +77,86 @@ fn what_is_not_as_the_file_says_is_told() {
         "{}",
         stdout(&nobody)
     );
+}
+
+/// Runs a check of the home switch whose load cell fails under way, and answers the question that follows; how many
+/// mm from home the probe was, at most and at the end, and what was said.
+///
+/// A computer busy with other tests may make a sample late, which stops the run before: then it is made again.
+fn stopped_run(answer: Option<&str>) -> ([f64; 2], String) {
+    (0..5)
+        .map(|_| stopped_once(answer))
+        .find(|(_, said)| said.contains("the force is 55"))
+        .expect("one run of five that keeps up")
+}
+
+fn stopped_once(answer: Option<&str>) -> ([f64; 2], String) {
+    let folder = tempfile::tempdir().expect("a folder");
+    // Home is found after 6 s, the way after it takes until 26 s.
+    let (_emulator, at) = emulate_galil(&["--fault", "saturated@11"]);
+    let rig = rig_file(folder.path(), &at, "unseen_mm = 0.5\n");
+    let words = ["run", "check-home", "--set", "distance=60mm", "--rig", &rig];
+    let mut run = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(words)
+        .args([
+            "--acknowledge",
+            "--calibration",
+            "thesis",
+            "--out",
+            "session",
+        ])
+        .current_dir(folder.path())
+        .env("PALPATE_HOME", folder.path().join("library"))
+        .stdin(match answer {
+            Some(_) => Stdio::piped(),
+            None => Stdio::null(),
+        })
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .expect("palpate starts");
+    let mut said = String::new();
+    let told = run.stderr.take().expect("it is piped");
+    for line in BufReader::new(told).lines() {
+        let line = line.expect("it is text");
+        if let (Some(answer), true) = (answer, line.contains("press Enter to retract")) {
+            // The cell recovers half a second after it failed, which is another jump of the force.
+            std::thread::sleep(std::time::Duration::from_secs(1));
+            let mut hand = run.stdin.take().expect("it is piped");
+            writeln!(hand, "{answer}").expect("palpate listens");
+        }
+        said.push_str(&line);
+        said.push('\n');
+    }
+    assert_eq!(run.wait().expect("it ends").code(), Some(1), "{said}");
+    let session = Session::open(&folder.path().join("session")).expect("it can be read");
+    let pulses: Vec<i64> = session.rows.iter().filter_map(|row| row.pulses).collect();
+    let furthest = pulses
+        .iter()
+        .max()
+        .copied()
+        .expect("the axis told where it was");
+    let last = pulses.last().copied().expect("the axis told where it was");
+    ([furthest, last].map(|pulses| 0.015 * pulses as f64), said)
+}
+
+#[test]
+fn a_stopped_probe_leaves_where_somebody_says_so_and_stays_otherwise() {
+    std::thread::scope(|scope| {
+        let retracted = scope.spawn(|| stopped_run(Some("")));
+        let left = scope.spawn(|| stopped_run(Some("no")));
+        let alone = scope.spawn(|| stopped_run(None));
+        let ([furthest, last], said) = retracted.join().unwrap();
+        assert!(
+            furthest > 5.0 && last < furthest - 2.0,
+            "{furthest} {last} {said}"
+        );
+        assert!(said.contains("the force is 55"), "{said}");
+        let ([furthest, last], said) = left.join().unwrap();
+        assert!(last > furthest - 0.1, "{furthest} {last} {said}");
+        // Without anybody at the terminal nothing is asked.
+        let ([furthest, last], said) = alone.join().unwrap();
+        assert!(last > furthest - 0.1, "{furthest} {last} {said}");
+        assert!(!said.contains("nobody answered"), "{said}");
+    });
 }

@@ -118,8 +118,9 @@ pub(super) fn run(
         let _ = wake.try_send(());
     })
     .map_err(Failure::failed)?;
-    super::run::stop_on_signals(&runner)?;
-    let asking = (answers == Answers::Operator).then(|| Asking::start(runner.requests()));
+    let is_asking = super::run::stop_on_signals(&runner)?;
+    let asking =
+        (answers == Answers::Operator).then(|| Asking::start(runner.requests(), is_asking));
     let laboratory = Laboratory {
         runner: &runner,
         woken: &woken,
@@ -155,7 +156,7 @@ fn watch(
         Event::Running(view, left) => {
             bar.set_message(format!("{so_far}  {}", going(view, left.0)));
             if let Some(asking) = &mut asking {
-                bar.suspend(|| asking.look(view.prompt.as_ref(), output));
+                bar.suspend(|| asking.look(view, output));
             }
         }
         Event::Finished(..) | Event::Calibrated(_) => {}

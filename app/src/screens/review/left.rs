@@ -9,7 +9,7 @@ use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::review::{Leader, Quantity, Stage};
-use eframe::egui::{Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
+use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
 use std::path::PathBuf;
 
 /// What was pressed at a session.
@@ -23,6 +23,11 @@ enum Asked {
 /// The colour of a session.
 pub(super) fn color_of(tokens: &Tokens, id: u64) -> Color32 {
     tokens.sessions[(id % tokens.sessions.len() as u64) as usize]
+}
+
+/// A small button; a name too long for the panel is cut.
+fn small(text: &str) -> Button<'_> {
+    Button::new(text).small().truncate()
 }
 
 impl ReviewScreen {
@@ -92,16 +97,13 @@ impl ReviewScreen {
             ui.horizontal(|ui| {
                 if index == 0 {
                     quiet_ui(ui, "in front");
-                } else if ui
-                    .small_button(format!("front: {}", subject.name))
-                    .clicked()
-                {
+                } else if ui.add(small(&format!("front: {}", subject.name))).clicked() {
                     asked = Some(Asked::Front(index));
                 }
             });
             ui.horizontal(|ui| {
                 if ui
-                    .small_button(format!("remove: {}", subject.name))
+                    .add(small(&format!("remove: {}", subject.name)))
                     .clicked()
                 {
                     asked = Some(Asked::Remove(index));
@@ -118,7 +120,7 @@ impl ReviewScreen {
                     ui.horizontal(|ui| {
                         quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
                         if ui
-                            .small_button(format!("cancel: {}", subject.name))
+                            .add(small(&format!("cancel: {}", subject.name)))
                             .clicked()
                         {
                             asked = Some(Asked::Cancel(index));

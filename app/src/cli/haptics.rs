@@ -1,0 +1,347 @@
+//! `palpate haptics`: a fitted body felt through a master-slave device.
+
+use super::Failure;
+use super::new_file;
+use super::output::Output;
+use super::run::number;
+use crate::report::haptics::{
+    bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
+};
+use crate::workers::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
+use clap::{Args, Subcommand, ValueEnum};
+use palpate_model::haptics::check::CheckSettings;
+use palpate_model::haptics::{DriveKind, Period};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use serde::Serialize;
+use std::path::{Path, PathBuf};
+
+/// What to do with a body on a device.
+#[derive(Debug, Subcommand)]
+pub enum HapticsCommand {
+    /// Tell before play where a body can return energy, what damping it needs, and what the guard does about it
+    Check(CheckArgs),
+    /// Run the loop in real time on the simulated device and tell how it kept its time
+    Run(RunArgs),
+    /// Push the master's rack with a simulated slider and compare the force commanded with the force measured
+    Follow(FollowArgs),
+    /// Time the loop on this computer at several rates, idle and beside busy threads
+    Bench(BenchArgs),
+}
+
+impl HapticsCommand {
+    /// Whether one JSON object is wanted.
+    #[must_use]
+    pub fn is_json(&self) -> bool {
+        match self {
+            Self::Check(args) => args.json,
+            Self::Run(args) => args.json,
+            Self::Follow(args) => args.json,
+            Self::Bench(args) => args.json,
+        }
+    }
+}
+
+/// The motor's drive.
+#[derive(Clone, Copy, Debug, ValueEnum)]
+enum Drive {
+    /// By voltage, as the source thesis did; the motor's back-EMF damps
+    Voltage,
+    /// By current; the motor damps nothing
+    Current,
+}
+
+/// The device, the loop and the hand.
+#[derive(Debug, Args)]
+struct DeviceArgs {
+    /// Ticks of the loop a second, 250 to 10000
+    #[arg(long, default_value_t = 1000.0, value_parser = number, allow_negative_numbers = true, value_name = "HZ")]
+    rate: f64,
+    /// How the motor is driven
+    #[arg(long, value_enum, default_value = "voltage")]
+    drive: Drive,
+    /// Damping of the device without its motor, in N s/m
+    #[arg(long, default_value_t = 0.0, value_parser = number, allow_negative_numbers = true, value_name = "NS_PER_M")]
+    damping: f64,
+    /// Coulomb friction of the device in N; without it that of the source's motor
+    #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "N")]
+    friction: Option<f64>,
+    /// Ticks from an encoder count to the force made of it
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=16), value_name = "TICKS")]
+    delay: u8,
+    /// End of the stroke in mm
+    #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
+    depth: f64,
+    /// Speed of the hand in mm/s
+    #[arg(long, default_value_t = 50.0, value_parser = number, allow_negative_numbers = true, value_name = "MM_PER_S")]
+    speed: f64,
+}
+
+impl DeviceArgs {
+    fn setting(&self) -> Result<Setting, Failure> {
+        let positive = |name: &str, value: f64, most: f64, unit: &str| {
+            let is_good = value > 0.0 && value <= most;
+            is_good.then_some(value).ok_or_else(|| {
+                Failure::usage(format!(
+                    "--{name} {value} is not possible; give a number above 0 and up to {most} {unit}"
+                ))
+            })
+        };
+        let not_negative = |name: &str, value: f64| {
+            (value >= 0.0).then_some(value).ok_or_else(|| {
+                Failure::usage(format!("--{name} {value} is not possible; give 0 or more"))
+            })
+        };
+        let friction = self
+            .friction
+            .map(|friction| not_negative("friction", friction));
+        let period = Period::of_rate(self.rate).map_err(Failure::usage)?;
+        let usual = Setting::source(period);
+        Ok(Setting {
+            period,
+            drive: match self.drive {
+                Drive::Voltage => usual.drive,
+                Drive::Current => DriveKind::Current { amps_per_volt: 1.0 },
+            },
+            // N s/m as catalogues have it, N s/mm inside.
+            damping: 1e-3 * not_negative("damping", self.damping)?,
+            friction: friction.transpose()?.map(Newtons),
+            delay: usize::from(self.delay),
+            deepest: Depth(positive("depth", self.depth, 100.0, "mm")?),
+            speed: MmPerS(positive("speed", self.speed, 1000.0, "mm/s")?),
+        })
+    }
+}
+
+/// Arguments of `palpate haptics check`.
+#[derive(Debug, Args)]
+pub struct CheckArgs {
+    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+    #[arg(value_name = "SESSION|thesis")]
+    source: PathBuf,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate haptics run`.
+#[derive(Debug, Args)]
+pub struct RunArgs {
+    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+    #[arg(value_name = "SESSION|thesis")]
+    source: PathBuf,
+    #[command(flatten)]
+    device: DeviceArgs,
+    /// For how long, in s
+    #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    seconds: f64,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate haptics follow`.
+#[derive(Debug, Args)]
+pub struct FollowArgs {
+    /// A session or a table, whose fit is taken, or 'thesis' for the body of the source thesis
+    #[arg(value_name = "SESSION|thesis")]
+    source: PathBuf,
+    /// Speed of the slider in mm/s
+    #[arg(long, default_value_t = 0.75, value_parser = number, allow_negative_numbers = true, value_name = "MM_PER_S")]
+    speed: f64,
+    /// Its way in mm
+    #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
+    depth: f64,
+    /// How long it holds in s
+    #[arg(long, default_value_t = 50.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    hold: f64,
+    /// Share of the motor's friction that the drive makes up for, in percent
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=100), value_name = "PERCENT")]
+    help_friction: u8,
+    /// Draw both forces and the torque as a new SVG file
+    #[arg(long, value_name = "FILE.svg")]
+    plot: Option<PathBuf>,
+    /// Write the samples as a new table, which 'palpate fit' and 'palpate import' read
+    #[arg(long, value_name = "FILE.csv")]
+    table: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate haptics bench`.
+#[derive(Debug, Args)]
+pub struct BenchArgs {
+    /// Seconds for each rate and load
+    #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
+    seconds: f64,
+    /// Rates in Hz
+    #[arg(long, value_delimiter = ',', default_values_t = [500.0, 1000.0, 2000.0, 5000.0], value_parser = number, allow_negative_numbers = true, value_name = "HZ,...")]
+    rates: Vec<f64>,
+    /// Busy threads beside the loop in the second half of the table
+    #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=64), value_name = "THREADS")]
+    busy: u8,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+#[derive(Serialize)]
+struct CheckOutput<'a> {
+    command: &'static str,
+    #[serde(flatten)]
+    checked: &'a Checked,
+}
+
+#[derive(Serialize)]
+struct RunOutput<'a> {
+    command: &'static str,
+    #[serde(flatten)]
+    paced: &'a Paced,
+}
+
+#[derive(Serialize)]
+struct FollowOutput<'a> {
+    command: &'static str,
+    #[serde(flatten)]
+    followed: &'a Followed,
+}
+
+#[derive(Serialize)]
+struct BenchOutput<'a> {
+    command: &'static str,
+    seconds: f64,
+    loops: &'a [Paced],
+}
+
+/// Longest run asked for, in s: a day.
+const SECONDS_MAX: f64 = 86_400.0;
+
+pub(super) fn run(command: &HapticsCommand, output: &Output) -> Result<(), Failure> {
+    match command {
+        HapticsCommand::Check(args) => run_check(args, output),
+        HapticsCommand::Run(args) => run_loop(args, output),
+        HapticsCommand::Follow(args) => run_follow(args, output),
+        HapticsCommand::Bench(args) => run_bench(args, output),
+    }
+}
+
+/// The body of a source, with what is to be known of it as notes.
+fn body(source: &Path, deepest: Depth, output: &Output) -> Result<ModifiedKelvin, Failure> {
+    let found = body_of(source).map_err(Failure::usage)?;
+    let notes = found.notes.iter().cloned();
+    notes
+        .chain(found.beyond(deepest))
+        .for_each(|note| output.note(&note));
+    Ok(found.body)
+}
+
+fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+    let setting = args.device.setting()?;
+    let body = body(&args.source, setting.deepest, output)?;
+    let bar = output.share_bar(1000);
+    let checked = check(body, &setting, &mut |share| {
+        bar.set_position((1000.0 * share) as u64)
+    });
+    bar.finish_and_clear();
+    let checked = checked.map_err(Failure::usage)?;
+    let found = CheckOutput {
+        command: "haptics-check",
+        checked: &checked,
+    };
+    output.result(&found, || check_text(&checked));
+    Ok(())
+}
+
+fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
+    new_file::check("picture", args.plot.as_deref())?;
+    new_file::check("table", args.table.as_deref())?;
+    let body = body(&args.source, Depth(args.depth), output)?;
+    let settings = CheckSettings {
+        speed: MmPerS(args.speed),
+        depth: Depth(args.depth),
+        hold: Seconds(args.hold),
+        friction_share: f64::from(args.help_friction) / 100.0,
+        ..CheckSettings::source(body)
+    };
+    let bar = output.share_bar(1000);
+    let followed = follow(&settings, &mut |share| {
+        bar.set_position((1000.0 * share) as u64)
+    });
+    bar.finish_and_clear();
+    let followed = followed.map_err(Failure::usage)?;
+    let found = FollowOutput {
+        command: "haptics-follow",
+        followed: &followed,
+    };
+    output.result(&found, || follow_text(&followed));
+    let source = args.source.display().to_string();
+    new_file::write("picture", args.plot.as_deref(), || {
+        follow_plot(&source, &followed)
+    })?;
+    new_file::write("table", args.table.as_deref(), || follow_table(&followed))
+}
+
+fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
+    let setting = args.device.setting()?;
+    let seconds = checked_seconds(args.seconds)?;
+    let body = body(&args.source, setting.deepest, output)?;
+    let bar = output.share_bar(1000);
+    let paced = pace(&setting.simulation(body, true), seconds, 0, &mut |share| {
+        bar.set_position((1000.0 * share) as u64);
+        true
+    });
+    bar.finish_and_clear();
+    let paced = paced.map_err(Failure::failed)?;
+    let found = RunOutput {
+        command: "haptics-run",
+        paced: &paced,
+    };
+    output.result(&found, || run_text(&paced));
+    Ok(())
+}
+
+fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
+    let seconds = checked_seconds(args.seconds)?;
+    let periods = args.rates.iter().map(|rate| Period::of_rate(*rate));
+    let periods: Vec<Period> = periods.collect::<Result<_, _>>().map_err(Failure::usage)?;
+    let loads = match args.busy {
+        0 => vec![0],
+        busy => vec![0, usize::from(busy)],
+    };
+    let bar = output.share_bar(1000);
+    let count = (periods.len() * loads.len()).max(1) as f64;
+    let mut loops = Vec::new();
+    for &busy in &loads {
+        for &period in &periods {
+            let setting = Setting::source(period);
+            let done = loops.len() as f64;
+            let settings = setting.simulation(ModifiedKelvin::THESIS, true);
+            let paced = pace(&settings, seconds, busy, &mut |share| {
+                bar.set_position((1000.0 * (done + share) / count) as u64);
+                true
+            });
+            loops.push(paced.map_err(Failure::failed)?);
+        }
+    }
+    bar.finish_and_clear();
+    let found = BenchOutput {
+        command: "haptics-bench",
+        seconds,
+        loops: &loops,
+    };
+    output.result(&found, || bench_text(&loops));
+    Ok(())
+}
+
+fn checked_seconds(seconds: f64) -> Result<f64, Failure> {
+    if seconds > 0.0 && seconds <= SECONDS_MAX {
+        Ok(seconds)
+    } else {
+        Err(Failure::usage(format!(
+            "--seconds {seconds} is not possible; give a number above 0 and up to {SECONDS_MAX}"
+        )))
+    }
+}

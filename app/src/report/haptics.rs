@@ -1,0 +1,190 @@
+//! What is said of a body on a device, and of a loop's time.
+
+use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
+use super::svg::{Anchor, Ink, Panel, Svg};
+use super::text::parameter_lines;
+use super::thin::thin;
+use crate::theme::tokens::LIGHT;
+use crate::widgets::uncertain::plain;
+use crate::workers::haptics::{Checked, Followed, Paced, Tried};
+use palpate_model::haptics::check::CheckSample;
+use palpate_model::units::Seconds;
+use palpate_protocols::haptics::timing::Spread;
+
+/// A check in words.
+#[must_use]
+pub fn check_text(checked: &Checked) -> String {
+    let body = &checked.body;
+    let [tau_eps, mu1, mu2, mu3, tau_sig] = [
+        body.tau_eps,
+        body.mu[0],
+        body.mu[1],
+        body.mu[2],
+        body.tau_sig,
+    ]
+    .map(plain);
+    let mut lines = vec![format!(
+        "body: tau_eps {tau_eps} s, mu1 {mu1} N/mm, mu2 {mu2} N/mm^2, mu3 {mu3} N/mm^3, tau_sig {tau_sig} N*s/mm^2"
+    )];
+    lines.extend(checked.sentences.iter().cloned());
+    lines.push(String::new());
+    lines.push(
+        "Simulated: a firm hand of little damping presses to the end of the stroke and holds there.".to_owned(),
+    );
+    for tried in &checked.tried {
+        lines.push(tried_text(tried));
+        lines.extend(tried.flags.iter().map(|flag| format!("  {flag}")));
+    }
+    lines.join("\n")
+}
+
+fn tried_text(tried: &Tried) -> String {
+    let guards = if tried.is_guarded { "with" } else { "without" };
+    let buzz = match (tried.buzz, tried.buzz_until_s) {
+        (Some((frequency, amplitude)), Some(until)) => format!(
+            "it buzzes in {:.0} % of the hold, last {until:.2} s after the hand arrived, up to {amplitude:.3} mm at {frequency:.0} Hz",
+            100.0 * tried.buzz_share
+        ),
+        _ => "no buzz".to_owned(),
+    };
+    let returned = match tried.energy_min_mj < 0.0 {
+        true => format!("energy returned {:.3} mJ", -tried.energy_min_mj),
+        false => "no energy returned".to_owned(),
+    };
+    format!(
+        "{guards} guards: {buzz}; the place swings by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
+        tried.swing_mm, tried.force_max_n, tried.damping_added_max
+    )
+}
+
+/// A run of the loop in words.
+#[must_use]
+pub fn run_text(paced: &Paced) -> String {
+    let mut lines = vec![format!("priority: {}", paced.priority)];
+    lines.extend(table(std::slice::from_ref(paced)));
+    lines.join("\n")
+}
+
+/// Loops at several rates, as a table.
+#[must_use]
+pub fn bench_text(loops: &[Paced]) -> String {
+    let mut lines = Vec::new();
+    if let Some(first) = loops.first() {
+        lines.push(format!("priority: {}", first.priority));
+    }
+    lines.extend(table(loops));
+    lines.join("\n")
+}
+
+fn table(loops: &[Paced]) -> Vec<String> {
+    let mut lines = vec![format!(
+        "{:>6} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
+        "rate", "busy", "late (us)", "period (us)", "work (us)", "overruns", "missed"
+    )];
+    let heads = "p50    p99   p99.9  max";
+    lines.push(format!(
+        "{:>6} {:>5}  {heads:<28} {heads:<28} {heads:<28}",
+        "Hz", ""
+    ));
+    for one in loops {
+        let kept = &one.kept;
+        lines.push(format!(
+            "{:>6.0} {:>5}  {:<28} {:<28} {:<28} {:>8} {:>7}",
+            one.rate_hz,
+            one.busy_threads,
+            spread(&kept.late),
+            spread(&kept.period),
+            spread(&kept.work),
+            kept.overruns,
+            kept.missed
+        ));
+    }
+    lines
+}
+
+fn spread(spread: &Spread) -> String {
+    let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
+    let [p50, p99, p99_9, max] = [spread.p50, spread.p99, spread.p99_9, spread.max].map(micros);
+    format!("{p50:<6} {p99:<5} {p99_9:<6} {max:<8}")
+}
+
+/// A check of the feedback in words.
+#[must_use]
+pub fn follow_text(followed: &Followed) -> String {
+    let mut lines = vec![
+        format!(
+            "peak       commanded {:.3} N, measured {:.3} N",
+            followed.peak_commanded_n, followed.peak_measured_n
+        ),
+        format!(
+            "on the way in the measured force is {:+.3} N from the commanded, and within {:.3} N (rms) of that",
+            followed.offset_n, followed.scatter_n
+        ),
+    ];
+    if let Some(found) = &followed.calibration {
+        lines.push(format!(
+            "bias       {:.4} ± {:.4} N/V at the rack, a line from {:.3} to {:.3}",
+            found.slope, found.slope_error, found.rising.line[0], found.rising.line[1]
+        ));
+    }
+    if let Some(report) = &followed.fit {
+        lines.push("fit of the measured force:".to_owned());
+        lines.extend(parameter_lines(&report.parameters));
+    }
+    lines.extend(followed.refusals.iter().cloned());
+    lines.join("\n")
+}
+
+/// A check of the feedback as a picture: forces over time, and one over the other.
+#[must_use]
+pub fn follow_plot(source: &str, followed: &Followed) -> String {
+    let columns = (RIGHT - LEFT) as usize;
+    let series = |of: fn(&CheckSample) -> [f64; 2]| thin(followed.samples.iter().map(of), columns);
+    let commanded = series(|one| [one.t.0, one.commanded.0]);
+    let measured = series(|one| [one.t.0, one.measured.0]);
+    let torque = series(|one| [one.t.0, one.torque]);
+    let last = followed.samples.last().map_or(1.0, |one| one.t.0);
+    let mut svg = Svg::new(WIDTH);
+    let line = format!(
+        "a slider pushes the rack while a cell measures; peak commanded {:.3} N, measured {:.3} N",
+        followed.peak_commanded_n, followed.peak_measured_n
+    );
+    title(&mut svg, source, &line);
+    let upper = Panel::around(
+        [LEFT, 66.0, RIGHT, 360.0],
+        [0.0, last],
+        &[&commanded, &measured],
+    );
+    upper.axes(&mut svg, ["", "force (N)"], look());
+    // Wide under narrow, so that both are seen where they agree.
+    upper.line(&mut svg, &measured, LIGHT.series, 2.6);
+    upper.line(&mut svg, &commanded, LIGHT.limit, 1.4);
+    let words = [("measured", LIGHT.series), ("commanded", LIGHT.limit)];
+    for (place, (word, color)) in words.into_iter().enumerate() {
+        let at = [RIGHT - 8.0, 90.0 + LINE * place as f64];
+        svg.text(at, Ink::plain(color).anchored(Anchor::End), word);
+    }
+    let lower = Panel::around([LEFT, 396.0, RIGHT, 510.0], [0.0, last], &[&torque]);
+    lower.axes(&mut svg, ["time (s)", "torque (N mm)"], look());
+    lower.line(&mut svg, &torque, LIGHT.limit, 1.4);
+    svg.finish(556.0, LIGHT.canvas, &format!("Feedback of {source}"))
+}
+
+/// The check as a table that palpate fits and imports.
+#[must_use]
+pub fn follow_table(followed: &Followed) -> String {
+    let mut table = "time_s,depth_mm,force_n,commanded_n,torque_nmm,bias_v\n".to_owned();
+    for one in &followed.samples {
+        let row = [
+            one.t.0,
+            one.depth.0,
+            one.measured.0,
+            one.commanded.0,
+            one.torque,
+            one.bias.0,
+        ];
+        table.push_str(&row.map(|value| value.to_string()).join(","));
+        table.push('\n');
+    }
+    table
+}

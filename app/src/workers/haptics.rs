@@ -1,0 +1,399 @@
+//! What a device makes of a body: the margin before play, what the loop does without its guards and with them, and
+//! how the loop keeps its time on this computer.
+
+use super::fit::fit_source;
+use palpate_model::fit::{FitOptions, FitReport, FitSample, fit};
+use palpate_model::haptics::check::{
+    CheckSample, CheckSettings, calibration_points, check as run_check,
+};
+use palpate_model::haptics::margin::Verdict;
+use palpate_model::haptics::rig::{Hand, HandPath};
+use palpate_model::haptics::simulation::SimulationSettings;
+use palpate_model::haptics::{BiasCalibration, Buzz, DriveKind, Flags, Period, TorqueSettings};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_protocols::analysis::Wanted;
+use palpate_protocols::haptics::timing::Kept;
+use palpate_protocols::haptics::{Beat, Simulated, Ticking};
+use serde::Serialize;
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// The name of the body that needs no session.
+pub const THESIS: &str = "thesis";
+
+/// Damping of the hand in N s/mm: a firm grip has more, which would calm what is to be seen.
+const GRIP_DAMPING: f64 = 0.002;
+
+/// A body and where it comes from.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Source {
+    /// The body.
+    pub body: ModifiedKelvin,
+    /// How deep the record went that it was fitted to.
+    pub deepest: Depth,
+    /// What is to be known of it, one sentence each.
+    pub notes: Vec<String>,
+}
+
+/// The body of a session or a table by its fit, or the source thesis's.
+pub fn body_of(source: &Path) -> Result<Source, String> {
+    if source == Path::new(THESIS) {
+        return Ok(Source {
+            body: ModifiedKelvin::THESIS,
+            deepest: Depth(30.0),
+            notes: Vec::new(),
+        });
+    }
+    let options = FitOptions::default();
+    let fitted =
+        fit_source(source, None, Wanted::default(), &options).map_err(|err| err.to_string())?;
+    let report = fitted
+        .result
+        .map_err(|err| format!("{} has no fit: {err}", source.display()))?;
+    let value = |name: &str| {
+        let parameter = report.parameter(name);
+        parameter
+            .map(|one| one.value)
+            .ok_or_else(|| format!("the fit of {} has no {name}", source.display()))
+    };
+    let depths = fitted.samples.iter().map(|sample| sample.depth.0);
+    let mut notes = fitted.notes;
+    notes.extend(report.warnings.iter().cloned());
+    Ok(Source {
+        body: ModifiedKelvin {
+            tau_eps: value("tau_eps")?,
+            mu: [value("mu1")?, value("mu2")?, value("mu3")?],
+            tau_sig: value("tau_sig")?,
+        },
+        deepest: Depth(depths.fold(0.0, f64::max)),
+        notes,
+    })
+}
+
+impl Source {
+    /// That a stroke goes beyond what was measured, if it does by more than a pulse of the source's slider.
+    #[must_use]
+    pub fn beyond(&self, deepest: Depth) -> Option<String> {
+        (deepest.0 > self.deepest.0 + 0.015).then(|| {
+            format!(
+                "the record went to {:.3}; from there to {deepest:.3} the model is extrapolated, and nothing says that it holds",
+                self.deepest
+            )
+        })
+    }
+}
+
+/// A device, a loop and a hand.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Setting {
+    /// The loop's tick.
+    pub period: Period,
+    /// The motor's drive.
+    pub drive: DriveKind,
+    /// Damping of the device without its motor, in N s/mm.
+    pub damping: f64,
+    /// Its Coulomb friction; that of the source's motor without it.
+    pub friction: Option<Newtons>,
+    /// Whole ticks from a count to the force made of it.
+    pub delay: usize,
+    /// End of the stroke.
+    pub deepest: Depth,
+    /// Speed of the hand.
+    pub speed: MmPerS,
+}
+
+impl Setting {
+    /// The source's device: a voltage drive, its motor's friction, a stroke of 30 mm.
+    #[must_use]
+    pub fn source(period: Period) -> Self {
+        Self {
+            period,
+            drive: TorqueSettings::default().drive,
+            damping: 0.0,
+            friction: None,
+            delay: 0,
+            deepest: Depth(30.0),
+            speed: MmPerS(50.0),
+        }
+    }
+
+    /// The simulation of a body with a firm hand that presses to the end of the stroke and holds there.
+    #[must_use]
+    pub fn simulation(&self, body: ModifiedKelvin, is_guarded: bool) -> SimulationSettings {
+        let path = HandPath::RampHold {
+            from: 0.0,
+            to: self.deepest.0,
+            speed: self.speed.0,
+        };
+        let hand = Hand {
+            damping: GRIP_DAMPING,
+            ..Hand::firm(path)
+        };
+        let mut all = SimulationSettings::of(body, self.period, hand);
+        all.plant.damping = self.damping;
+        all.plant.delay = self.delay;
+        all.system.damping = self.damping;
+        all.system.delay_ticks = self.delay as f64;
+        all.system.law.depth_max = self.deepest;
+        all.system.torque.drive = self.drive;
+        if let Some(friction) = self.friction {
+            // The motor's torque of friction, as it is felt at the rack.
+            let torque = friction.0 * all.system.torque.pinion.radius_mm();
+            all.system.torque.motor.friction = torque;
+            all.plant.friction = [friction.0; 2];
+            if let Some((motor, _)) = &mut all.plant.motor {
+                motor.friction = torque;
+            }
+        }
+        if is_guarded { all } else { all.unguarded() }
+    }
+}
+
+/// How long the hand holds at the end of the stroke in s: a buzz of a few hertz shows within one.
+const HOLD: f64 = 3.0;
+
+/// What the simulated device did.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Tried {
+    /// Whether guards and controller were at work.
+    pub is_guarded: bool,
+    /// Share of the ticks of the hold in which it buzzed.
+    pub buzz_share: f64,
+    /// How long after the hand arrived it buzzed last, in s; none if it did not while it held.
+    pub buzz_until_s: Option<f64>,
+    /// The strongest buzz: its frequency in Hz and its amplitude in mm.
+    pub buzz: Option<(f64, f64)>,
+    /// From the lowest to the highest place in the last second of the hold, in mm.
+    pub swing_mm: f64,
+    /// Largest force rendered, in N.
+    pub force_max_n: f64,
+    /// Lowest energy absorbed by the rendered force in N mm: below zero, so much was returned.
+    pub energy_min_mj: f64,
+    /// Most damping that the controller added, in N s/m.
+    pub damping_added_max: f64,
+    /// What was special on the way, one sentence each.
+    pub flags: Vec<&'static str>,
+}
+
+/// What is known of a body on a device before play.
+#[derive(Clone, Debug, Serialize)]
+pub struct Checked {
+    /// The body.
+    pub body: ModifiedKelvin,
+    /// The margin.
+    pub margin: Verdict,
+    /// The margin in words.
+    pub sentences: Vec<String>,
+    /// Without guards, then with them.
+    pub tried: [Tried; 2],
+}
+
+/// Looks at a body on a device: the margin, and the simulated device without guards and with them.
+pub fn check(
+    body: ModifiedKelvin,
+    setting: &Setting,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Checked, String> {
+    let guarded = setting.simulation(body, true);
+    let margin = guarded
+        .system
+        .watch()
+        .before_play(setting.deepest, setting.speed);
+    let without = try_out(body, setting, false, &mut |share| progress(0.5 * share))?;
+    let with = try_out(body, setting, true, &mut |share| {
+        progress(0.5 + 0.5 * share)
+    })?;
+    Ok(Checked {
+        body,
+        sentences: margin.sentences(),
+        margin,
+        tried: [without, with],
+    })
+}
+
+fn try_out(
+    body: ModifiedKelvin,
+    setting: &Setting,
+    is_guarded: bool,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Tried, String> {
+    let settings = setting.simulation(body, is_guarded);
+    let mut device = Simulated::new(&settings).map_err(|err| err.to_string())?;
+    let arrives = setting.deepest.0 / setting.speed.0;
+    let ticks = setting.period.ticks_in(Seconds(arrives + HOLD));
+    let last_second = ticks.saturating_sub(setting.period.ticks_in(Seconds(1.0)));
+    let mut buzz: Option<Buzz> = None;
+    let (mut buzzed, mut held, mut until) = (0_u64, 0_u64, None);
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    let mut flags = Flags::NONE;
+    let (mut force_max, mut energy_min, mut damping_max) = (0.0_f64, 0.0_f64, 0.0_f64);
+    for tick in 0..ticks {
+        device.tick(1);
+        let one = device.last();
+        let seen = &one.snapshot;
+        flags |= seen.flags;
+        force_max = force_max.max(seen.force.0.abs());
+        energy_min = energy_min.min(seen.energy);
+        damping_max = damping_max.max(seen.damping);
+        if one.t.0 > arrives {
+            held += 1;
+            if seen.buzz.is_some() {
+                buzzed += 1;
+                until = Some(one.t.0 - arrives);
+            }
+        }
+        buzz = match (buzz, seen.buzz) {
+            (Some(most), Some(now)) if now.amplitude_mm <= most.amplitude_mm => Some(most),
+            (most, now) => now.or(most),
+        };
+        if tick >= last_second {
+            (low, high) = (low.min(one.x), high.max(one.x));
+        }
+        if tick.is_multiple_of(100) {
+            progress(tick as f64 / ticks as f64);
+        }
+    }
+    Ok(Tried {
+        is_guarded,
+        buzz_share: buzzed as f64 / held.max(1) as f64,
+        buzz_until_s: until,
+        buzz: buzz.map(|one| (one.frequency_hz, one.amplitude_mm)),
+        swing_mm: high - low,
+        force_max_n: force_max,
+        energy_min_mj: energy_min,
+        damping_added_max: 1e3 * damping_max,
+        flags: flags.sentences().collect(),
+    })
+}
+
+/// The loop's time at one rate.
+#[derive(Clone, Debug, Serialize)]
+pub struct Paced {
+    /// Ticks a second.
+    pub rate_hz: f64,
+    /// Threads that did nothing but keep the processors busy meanwhile.
+    pub busy_threads: usize,
+    /// The priority that the system gave.
+    pub priority: String,
+    /// What was measured.
+    #[serde(flatten)]
+    pub kept: Kept,
+}
+
+/// Runs the loop in real time for some seconds beside so many busy threads. `is_going` ends it early.
+pub fn pace(
+    settings: &SimulationSettings,
+    seconds: f64,
+    busy: usize,
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<Paced, String> {
+    let period = settings.system.law.period;
+    let is_over = Arc::new(AtomicBool::new(false));
+    let mut others = Vec::new();
+    for _ in 0..busy {
+        let is_over = Arc::clone(&is_over);
+        let work = move || {
+            while !is_over.load(Ordering::Relaxed) {
+                std::hint::spin_loop();
+            }
+        };
+        let thread = std::thread::Builder::new().name("busy".into()).spawn(work);
+        others.push(thread.map_err(|err| err.to_string())?);
+    }
+    let device = Simulated::new(settings).map_err(|err| err.to_string())?;
+    let first = *device.last();
+    let beat = Beat::start(device, period, first)
+        .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
+    let parts = (seconds / PART.as_secs_f64()).ceil().max(1.0);
+    for part in 0..parts as u64 {
+        std::thread::sleep(PART);
+        if !is_going(part as f64 / parts) {
+            break;
+        }
+    }
+    let kept = beat.kept();
+    let priority = beat.granted().to_string();
+    drop(beat);
+    is_over.store(true, Ordering::Relaxed);
+    for thread in others {
+        // It only spins.
+        let _ = thread.join();
+    }
+    Ok(Paced {
+        rate_hz: 1.0 / period.seconds().0,
+        busy_threads: busy,
+        priority,
+        kept,
+    })
+}
+
+/// Between two looks at a loop that runs.
+const PART: Duration = Duration::from_millis(100);
+
+/// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
+#[derive(Clone, Debug, Serialize)]
+pub struct Followed {
+    /// What was measured; in a table of its own.
+    #[serde(skip)]
+    pub samples: Vec<CheckSample>,
+    /// How many.
+    #[serde(rename = "samples")]
+    pub count: usize,
+    /// Highest force commanded and measured, in N.
+    pub peak_commanded_n: f64,
+    /// See [`Self::peak_commanded_n`].
+    pub peak_measured_n: f64,
+    /// Mean of measured minus commanded force on the way in, and root mean square of what is left about it, in N.
+    pub offset_n: f64,
+    /// See [`Self::offset_n`].
+    pub scatter_n: f64,
+    /// Torque-force calibration: force at the rack per volt of bias.
+    pub calibration: Option<BiasCalibration>,
+    /// The body that a fit of the measured force finds, as the slider felt it.
+    pub fit: Option<FitReport>,
+    /// Why one of the two is not there, one sentence each.
+    pub refusals: Vec<String>,
+}
+
+/// Makes the check.
+pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result<Followed, String> {
+    let mut samples = Vec::new();
+    let made = run_check(settings, |one| samples.push(*one), progress);
+    made.map_err(|err| err.to_string())?;
+    let until = Seconds(settings.depth.0 / settings.speed.0);
+    let ramp = || samples.iter().filter(|one| one.t <= until);
+    let count = ramp().count().max(1) as f64;
+    let error = |one: &CheckSample| one.measured.0 - one.commanded.0;
+    let offset = ramp().map(error).sum::<f64>() / count;
+    let squares: f64 = ramp().map(|one| (error(one) - offset).powi(2)).sum();
+    let peak = |of: fn(&CheckSample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
+    let points = calibration_points(&samples, until);
+    let felt: Vec<FitSample> = samples
+        .iter()
+        .map(|one| FitSample {
+            t: one.t,
+            depth: one.depth,
+            force: one.measured,
+            sigma: Newtons(1.0),
+        })
+        .collect();
+    let mut refusals = Vec::new();
+    let calibration = BiasCalibration::fit(&points);
+    let calibration = calibration.map_err(|err| refusals.push(format!("no calibration: {err}")));
+    let fit = fit(&felt, &FitOptions::default());
+    let fit = fit.map_err(|err| refusals.push(format!("no fit: {err}")));
+    Ok(Followed {
+        count: samples.len(),
+        peak_commanded_n: peak(|one| one.commanded.0),
+        peak_measured_n: peak(|one| one.measured.0),
+        offset_n: offset,
+        scatter_n: (squares / count).sqrt(),
+        calibration: calibration.ok(),
+        fit: fit.ok(),
+        refusals,
+        samples,
+    })
+}

@@ -1,0 +1,111 @@
+//! `palpate haptics`.
+
+use super::{json, palpate, stderr, stdout};
+
+#[test]
+fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
+    let at = tempfile::tempdir().unwrap();
+    let with = palpate(at.path(), &["haptics", "check", "thesis", "--json"]);
+    let with = json(&with);
+    // The bands of the source's body, which its parameters imply: 0.712 mm and 1.430 mm.
+    let ends = |name: &str| with["margin"][name][0]["to"].as_f64().unwrap();
+    assert!((ends("cycles") - 0.712).abs() < 1e-3, "{with}");
+    assert!((ends("pokes") - 1.430).abs() < 1e-3, "{with}");
+    let sentences = with["sentences"].as_array().unwrap();
+    assert!(sentences.len() >= 3, "{with}");
+    // The back-EMF of a voltage drive calms what a current drive without friction lets buzz.
+    let calm = &with["tried"][0];
+    assert_eq!(calm["buzz_share"], 0.0, "{with}");
+    let weak = [
+        "haptics",
+        "check",
+        "thesis",
+        "--drive",
+        "current",
+        "--damping",
+        "0.5",
+        "--friction",
+        "0",
+        "--delay",
+        "2",
+    ];
+    let words = palpate(at.path(), &weak);
+    let told = stdout(&words);
+    assert!(told.contains("of the damping needed"), "{told}");
+    let both = json(&palpate(at.path(), &[&weak[..], &["--json"]].concat()));
+    let [without, with] = [0, 1].map(|i| &both["tried"][i]);
+    assert!(without["buzz_share"].as_f64().unwrap() > 0.5, "{both}");
+    assert!(without["swing_mm"].as_f64().unwrap() > 0.1, "{both}");
+    // With guards what begins as the hand arrives is over at once.
+    let last = |tried: &serde_json::Value| tried["buzz_until_s"].as_f64().unwrap_or(0.0);
+    assert!(last(without) > 2.5 && last(with) < 0.5, "{both}");
+    let swing = |tried: &serde_json::Value| tried["swing_mm"].as_f64().unwrap();
+    assert!(swing(with) < 0.2 * swing(without), "{both}");
+}
+
+#[test]
+fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
+    let at = tempfile::tempdir().unwrap();
+    let run = json(&palpate(
+        at.path(),
+        &["haptics", "run", "thesis", "--seconds", "1", "--json"],
+    ));
+    assert!(run["work"]["count"].as_u64().unwrap() > 100, "{run}");
+    assert!(run["work"]["p50_s"].as_f64().unwrap() > 0.0, "{run}");
+    assert!(!run["priority"].as_str().unwrap().is_empty());
+    // A stroke beyond what was measured is extrapolated, and told.
+    let session = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../tests/sessions/ramp-hold-lab"
+    );
+    let far = palpate(at.path(), &["haptics", "check", session]);
+    assert!(stderr(&far).contains("extrapolated"), "{}", stderr(&far));
+    let near = palpate(at.path(), &["haptics", "check", session, "--depth", "10"]);
+    assert!(!stderr(&near).contains("extrapolated"), "{}", stderr(&near));
+    for (words, reason) in [
+        (
+            &["check", "thesis", "--rate", "20"][..],
+            "250 Hz to 10000 Hz",
+        ),
+        (&["check", "thesis", "--damping", "-1"], "--damping -1"),
+        (&["check", "nowhere"], "nowhere"),
+        (&["run", "thesis", "--seconds", "0"], "--seconds 0"),
+    ] {
+        let out = palpate(at.path(), &[&["haptics"], words].concat());
+        assert_eq!(out.status.code(), Some(2), "{words:?}");
+        assert!(stderr(&out).contains(reason), "{words:?}: {}", stderr(&out));
+    }
+}
+
+#[test]
+fn the_check_of_the_source_follows_and_its_table_is_fitted() {
+    let at = tempfile::tempdir().unwrap();
+    let words = [
+        "haptics",
+        "follow",
+        "thesis",
+        "--plot",
+        "follow.svg",
+        "--table",
+        "follow.csv",
+        "--json",
+    ];
+    let found = json(&palpate(at.path(), &words));
+    let number = |name: &str| found[name].as_f64().unwrap();
+    // 6.396 N is the source's peak at 30 mm; the slider gives way, and so the master is a tenth of a millimetre less deep.
+    assert!((number("peak_commanded_n") - 6.396).abs() < 0.15, "{found}");
+    assert!((number("offset_n") - 0.81).abs() < 0.1, "{found}");
+    assert!(number("scatter_n") < 0.05, "{found}");
+    // What the motor's constants say: 33.6 mN m/A over 0.64 ohm and 10 mm.
+    let slope = found["calibration"]["slope"].as_f64().unwrap();
+    assert!((slope - 5.25).abs() < 0.1, "{found}");
+    let fitted = json(&palpate(at.path(), &["fit", "follow.csv", "--json"]));
+    assert!(
+        fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.98),
+        "{fitted}"
+    );
+    let picture = std::fs::read_to_string(at.path().join("follow.svg")).unwrap();
+    assert!(picture.contains("torque (N mm)"));
+    // Nothing is written over.
+    assert_eq!(palpate(at.path(), &words).status.code(), Some(2));
+}
