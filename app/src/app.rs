@@ -304,7 +304,8 @@ impl WorkbenchApp {
                 }
                 Command::OpenProtocol => self.read_protocol(|chooser| chooser.read_typed(ctx)),
                 Command::Work => match self.screen {
-                    Screen::Rig | Screen::Run | Screen::Library | Screen::Review => {}
+                    Screen::Rig | Screen::Run | Screen::Library => {}
+                    Screen::Review => self.review.fit(ctx),
                     Screen::Models => self.models.start(ctx),
                     Screen::Trade => {
                         if self.measure_verdict().is_ok() {
@@ -315,11 +316,8 @@ impl WorkbenchApp {
                     Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
-                    Screen::Rig
-                    | Screen::Run
-                    | Screen::Calibration
-                    | Screen::Library
-                    | Screen::Review => {}
+                    Screen::Rig | Screen::Run | Screen::Calibration | Screen::Library => {}
+                    Screen::Review => self.review.cancel_fit(),
                     Screen::Models => self.models.cancel(),
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),

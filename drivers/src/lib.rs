@@ -15,6 +15,7 @@ pub mod hx711;
 pub mod mark10;
 pub mod open;
 pub mod parts;
+pub mod priority;
 pub mod rig;
 pub mod rig_file;
 pub mod serial;

@@ -108,6 +108,8 @@ fn one_session_is_looked_at_closely() {
     flow.click("Zoom in");
     flow.click("Cycles");
     assert!(flow.says("peak force (N)"));
+    assert!(flow.says("cycle 1"));
+    flow.click("First and last cycle only");
     flow.window.check_accessibility();
 }
 
@@ -121,7 +123,7 @@ fn sessions_are_fitted_compared_and_foretold() {
     assert!(!flow.is_enabled("Foretell the second session"));
     assert!(flow.says("show two sessions"));
     let other = show(&mut flow, "hold-until-lab");
-    flow.click("Fit the sessions shown");
+    flow.window.key_press(Key::F6);
     flow.wait("the fits", |window| {
         use egui_kittest::kittest::Queryable;
         let mut found = window.query_all_by_label_contains("from the profile likelihood");

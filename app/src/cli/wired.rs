@@ -193,6 +193,7 @@ struct LinkObject {
     answers: u64,
     in_flight: usize,
     resynchronised: u64,
+    is_real_time: bool,
 }
 
 fn links(rig: &dyn Rig) -> Vec<LinkObject> {
@@ -205,6 +206,7 @@ fn links(rig: &dyn Rig) -> Vec<LinkObject> {
         answers: stats.answers,
         in_flight: stats.in_flight,
         resynchronised: stats.resynchronised,
+        is_real_time: stats.is_real_time,
     };
     rig.links().into_iter().map(object).collect()
 }
@@ -212,13 +214,17 @@ fn links(rig: &dyn Rig) -> Vec<LinkObject> {
 fn link_lines(links: &[LinkObject]) -> impl Iterator<Item = String> {
     links.iter().map(|link| {
         format!(
-            "link       {}: {:.2} ms there and back ({:.2} to {:.2}), jitter {:.2} ms, {} lost and found again",
+            "link       {}: {:.2} ms there and back ({:.2} to {:.2}), jitter {:.2} ms, {} lost and found again, its thread at {} priority",
             link.device,
             link.round_trip_mean_s * 1e3,
             link.round_trip_min_s * 1e3,
             link.round_trip_max_s * 1e3,
             link.jitter_s * 1e3,
-            link.resynchronised
+            link.resynchronised,
+            match link.is_real_time {
+                true => "real-time",
+                false => "ordinary",
+            }
         )
     })
 }

@@ -18,6 +18,8 @@ pub struct Source<'a> {
     pub track: &'a Track,
     /// Columns of depth and force in them.
     pub columns: [usize; 2],
+    /// The first sample drawn and the one behind the last.
+    pub rows: [usize; 2],
     /// Number that changes with the samples.
     pub version: u64,
     /// Number that tells it from the others.
@@ -30,7 +32,7 @@ struct Key {
     depth: [f64; 2],
     force: [f64; 2],
     pixels: [f64; 2],
-    versions: Vec<(u64, u64)>,
+    versions: Vec<(u64, u64, [usize; 2])>,
 }
 
 /// The line of one session.
@@ -67,7 +69,10 @@ impl DepthLines {
             depth: depth.shown(),
             force: force.shown(),
             pixels: pixels.map(f64::round),
-            versions: sources.iter().map(|one| (one.id, one.version)).collect(),
+            versions: sources
+                .iter()
+                .map(|one| (one.id, one.version, one.rows))
+                .collect(),
         };
         if self.made.as_ref().is_some_and(|(made, _)| *made == key) {
             return;
@@ -86,7 +91,7 @@ impl DepthLines {
         self.sought = Some(key.clone());
         let own = sources.iter();
         let sources: Vec<Owned> = own
-            .map(|one| (one.track.clone(), one.columns, one.id))
+            .map(|one| (one.track.clone(), one.columns, one.rows, one.id))
             .collect();
         let (is_unwanted, wake) = (Arc::clone(&self.is_unwanted), ctx.clone());
         // Without a thread the lines there stay; it is tried again in the next frame.
@@ -124,21 +129,26 @@ impl DepthLines {
     }
 }
 
-/// Samples, columns of depth and force, and number of a session.
-type Owned = (Track, [usize; 2], u64);
+/// Samples, columns of depth and force, rows, and number of a line.
+type Owned = (Track, [usize; 2], [usize; 2], u64);
 
 fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<(Key, Vec<Reduced>)> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
     let mut lines = Vec::with_capacity(sources.len());
-    for (track, columns, id) in sources {
+    for (track, columns, rows, id) in sources {
         let mut reducer = Reducer::new(width, height);
+        let mut before = 0;
         for segment in track.segments() {
             if is_unwanted.load(Ordering::Relaxed) {
                 return None;
             }
-            let [depths, forces] = columns.map(|column| segment.values(column));
+            let count = segment.times().len();
+            let [from, to] = rows.map(|row| row.saturating_sub(before).min(count));
+            before += count;
+            let [depths, forces] =
+                columns.map(|column| &segment.values(column)[from..to.max(from)]);
             for (depth, force) in depths.iter().zip(forces) {
                 let place = [f64::from(*depth) - x[0], f64::from(*force) - y[0]];
                 reducer.push(place[0] * scale[0], place[1] * scale[1]);

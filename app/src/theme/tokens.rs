@@ -45,6 +45,8 @@ pub struct Tokens {
     pub sessions: [Color32; 6],
     /// Shading of every other phase in plots; translucent, so the grid shows through.
     pub phase_band: Color32,
+    /// The part of [`viridis`] that stands out from `canvas` as a line.
+    pub ordered: [f32; 2],
 }
 
 const fn grey(level: u8) -> Color32 {
@@ -80,6 +82,7 @@ pub const LIGHT: Tokens = Tokens {
         grey(0x1C),
     ],
     phase_band: Color32::from_black_alpha(14),
+    ordered: [0.0, 0.55],
 };
 
 /// For dim rooms.
@@ -111,6 +114,7 @@ pub const DARK: Tokens = Tokens {
         grey(0xE8),
     ],
     phase_band: Color32::from_rgba_premultiplied(14, 14, 14, 14),
+    ordered: [0.5, 1.0],
 };
 
 impl Tokens {
@@ -119,6 +123,41 @@ impl Tokens {
     pub const fn of(is_dark: bool) -> &'static Self {
         if is_dark { &DARK } else { &LIGHT }
     }
+
+    /// The line of one of `count` things that have an order, such as cycles.
+    #[must_use]
+    pub fn in_order(&self, index: usize, count: usize) -> Color32 {
+        let [first, last] = self.ordered;
+        let share = index as f32 / count.saturating_sub(1).max(1) as f32;
+        viridis(first + share * (last - first))
+    }
+}
+
+/// Every eighth of viridis (Smith & van der Walt, matplotlib 2015).
+const VIRIDIS: [[u8; 3]; 9] = [
+    [0x44, 0x01, 0x54],
+    [0x47, 0x2D, 0x7B],
+    [0x3B, 0x52, 0x8B],
+    [0x2C, 0x72, 0x8E],
+    [0x21, 0x90, 0x8C],
+    [0x27, 0xAD, 0x81],
+    [0x5D, 0xC8, 0x63],
+    [0xAA, 0xDC, 0x32],
+    [0xFD, 0xE7, 0x25],
+];
+
+/// The colour of a share from 0 to 1: as light as the share is large, for every kind of colour vision.
+#[must_use]
+pub fn viridis(share: f32) -> Color32 {
+    let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
+    let index = (place as usize).min(VIRIDIS.len() - 2);
+    let part = place - index as f32;
+    let [low, high] = [VIRIDIS[index], VIRIDIS[index + 1]];
+    let mix = |channel: usize| {
+        let [low, high] = [f32::from(low[channel]), f32::from(high[channel])];
+        (low + part * (high - low)).round() as u8
+    };
+    Color32::from_rgb(mix(0), mix(1), mix(2))
 }
 
 #[cfg(test)]
@@ -181,6 +220,7 @@ mod tests {
             for line in [tokens.series, tokens.limit]
                 .into_iter()
                 .chain(tokens.sessions)
+                .chain((0..100).map(|index| tokens.in_order(index, 100)))
             {
                 for ground in [tokens.canvas, band(tokens)] {
                     // WCAG 2.2 success criterion 1.4.11, graphical objects.
@@ -188,5 +228,15 @@ mod tests {
                 }
             }
         }
+    }
+
+    #[test]
+    fn viridis_grows_lighter_all_the_way() {
+        let lightness: Vec<f64> = (0..=256)
+            .map(|step| luminance(viridis(step as f32 / 256.0)))
+            .collect();
+        assert!(lightness.windows(2).all(|pair| pair[0] < pair[1] + 0.001));
+        assert!(lightness[0] < 0.03 && lightness[256] > 0.75);
+        assert_eq!(viridis(f32::NAN), viridis(0.0));
     }
 }

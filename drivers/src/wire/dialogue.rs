@@ -24,6 +24,8 @@ pub struct LinkStats {
     pub lost: u64,
     /// How often the order of questions and answers was lost and found again.
     pub resynchronised: u64,
+    /// Whether the system grants the link's thread real time, so that other programs do not make a stop late.
+    pub is_real_time: bool,
 }
 
 impl LinkStats {

@@ -3,6 +3,7 @@
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
 use super::link::Link;
+use crate::priority::{self, Granted};
 use crate::rig::{RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{Age, Fault, RawBytes, RigCommand};
@@ -81,10 +82,12 @@ impl Line {
             urgent,
             queued,
             arrived: VecDeque::new(),
+            is_real_time: false,
             reports: Arc::clone(&reports),
         };
         let closing = Arc::clone(&is_closing);
         let thread = std::thread::Builder::new().name(name).spawn(move || {
+            owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
             owner.run(&closing);
         })?;
         Ok(Self {
@@ -165,6 +168,7 @@ struct Owner<D> {
     queued: Receiver<Numbered>,
     /// Taken out of `queued`, not looked at.
     arrived: VecDeque<Numbered>,
+    is_real_time: bool,
     reports: Shared,
 }
 
@@ -305,7 +309,10 @@ impl<D: Dialogue> Owner<D> {
     fn report(&mut self, events: Vec<RigEvent>) {
         let (reports, came) = &*self.reports;
         let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
-        reports.stats = self.dialogue.stats();
+        reports.stats = LinkStats {
+            is_real_time: self.is_real_time,
+            ..self.dialogue.stats()
+        };
         if std::mem::take(&mut reports.is_attended) {
             self.dialogue.attended((self.clock)());
         }

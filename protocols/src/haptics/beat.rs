@@ -1,8 +1,8 @@
 //! The thread of the loop.
 
-use super::priority::{Granted, ask};
 use super::timing::{Kept, Timing};
 use crate::runner::Metronome;
+use palpate_drivers::priority::{Granted, ask};
 use palpate_model::haptics::Period;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -5,9 +5,9 @@
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
 mod beat;
-pub mod priority;
 mod simulated;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};
+pub use palpate_drivers::priority;
 pub use simulated::Simulated;

@@ -1,12 +1,15 @@
-//! Every cycle of every session shown: its peak, where it was, and how it compares with the first.
+//! Every cycle: the loops of the session in front over each other, and of every session shown the peaks, where they
+//! were, and how they compare with the first.
 
 use super::ReviewScreen;
 use super::left::quiet_ui;
 use super::middle::head_ui;
 use super::subject::Subject;
+use crate::plots::over_depth::{Layer, Source, over_depth_ui};
+use crate::theme::Tokens;
 use crate::widgets::table::{Column, Row, table_ui};
 use crate::workers::review::Quantity;
-use eframe::egui::Ui;
+use eframe::egui::{Color32, RichText, Ui, vec2};
 
 /// A cycle of a session.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,6 +24,8 @@ pub(super) struct Cycle {
     pub depth_mm: Option<f64>,
     /// When it began and ended.
     pub t: [f64; 2],
+    /// Its first sample and the one behind its last.
+    pub rows: [usize; 2],
 }
 
 /// The cycles of a session, as far as it was read.
@@ -49,6 +54,7 @@ pub(super) fn cycles(subject: &Subject) -> Vec<Cycle> {
                 stretch.t,
                 track.time_of(end.saturating_sub(1)).unwrap_or(stretch.t),
             ],
+            rows: [stretch.first, end],
         });
     }
     found
@@ -97,15 +103,21 @@ fn rows_of(subject: &Subject) -> Vec<Row> {
     own.iter().map(row).collect()
 }
 
+/// Cycles that have each a mark below the plot; of more, the first and the last have.
+const MARKS_MAX: usize = 16;
+
 impl ReviewScreen {
     pub(super) fn cycles_ui(&mut self, ui: &mut Ui) {
-        let words = "the highest force of every cycle; 'palpate analyse' tells hysteresis, relaxation and shift";
-        head_ui(ui, "Cycles", words);
         self.cycle_rows.update(&self.subjects);
         if self.cycle_rows.rows.is_empty() {
             quiet_ui(ui, "no session shown has cycles");
             return;
         }
+        self.moves_ui(ui);
+        let height = (0.55 * ui.available_height()).max(160.0);
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| self.loops_ui(ui));
+        let words = "the highest force of every cycle; 'palpate analyse' tells hysteresis, relaxation and shift";
+        head_ui(ui, "Cycles", words);
         let columns = [
             Column::words("session", 200.0),
             Column::numbers("cycle", 50.0),
@@ -116,5 +128,64 @@ impl ReviewScreen {
             Column::numbers("of the first (%)", 110.0),
         ];
         table_ui(ui, "review_cycles", &columns, &self.cycle_rows.rows);
+    }
+
+    /// The loops of the session in front, from the first cycle to the last.
+    fn loops_ui(&mut self, ui: &mut Ui) {
+        let Some(front) = self.subjects.first() else {
+            return;
+        };
+        let all = cycles(front);
+        if all.is_empty() {
+            quiet_ui(ui, &format!("{} has no cycles", front.name));
+            return;
+        }
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let colors: Vec<Color32> = (0..all.len())
+            .map(|index| tokens.in_order(index, all.len()))
+            .collect();
+        ui.horizontal_wrapped(|ui| {
+            ui.label(format!("{}:", front.name));
+            for (index, (cycle, color)) in all.iter().zip(&colors).enumerate() {
+                if all.len() <= MARKS_MAX || index == 0 || index + 1 == all.len() {
+                    let mark = RichText::new(format!("cycle {}", cycle.number));
+                    ui.label(mark.color(*color).strong());
+                }
+            }
+            ui.checkbox(&mut self.has_ends_only, "First and last cycle only");
+        });
+        let is_drawn = |index: usize| !self.has_ends_only || index == 0 || index + 1 == all.len();
+        let id = |cycle: &Cycle| (front.id << 32) | u64::from(cycle.number);
+        let drawn: Vec<(&Cycle, Color32)> = all
+            .iter()
+            .zip(colors)
+            .enumerate()
+            .filter(|(index, _)| is_drawn(*index))
+            .map(|(_, one)| one)
+            .collect();
+        let sources: Vec<Source<'_>> = drawn
+            .iter()
+            .map(|(cycle, _)| Source {
+                track: &front.recording.track,
+                columns: [Quantity::Depth as usize, Quantity::Force as usize],
+                rows: cycle.rows,
+                version: front.fifths(),
+                id: id(cycle),
+            })
+            .collect();
+        let spans = [&self.depth, &self.force];
+        self.depth_lines
+            .update(ui.ctx(), &sources, spans, self.depth_pixels);
+        let layers: Vec<Layer<'_>> = drawn
+            .iter()
+            .map(|(cycle, color)| Layer {
+                name: &front.name,
+                color: *color,
+                id: id(cycle),
+                cursors: [None; 2],
+            })
+            .collect();
+        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
+        self.follow_over_depth(drawn);
     }
 }

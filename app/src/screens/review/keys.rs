@@ -32,7 +32,7 @@ impl ReviewScreen {
     /// Does what a button or a key asks for.
     pub(super) fn go(&mut self, to: Move) {
         let spans = match self.view {
-            View::OverDepth => vec![&mut self.depth, &mut self.force],
+            View::OverDepth | View::Cycles => vec![&mut self.depth, &mut self.force],
             _ => vec![&mut self.time],
         };
         match to {

@@ -56,6 +56,10 @@ impl ReviewScreen {
                 ("Cursor B", "B, or a click with Shift", Move::Cursor(1)),
                 ("No cursors", "Delete", Move::NoCursors),
             ] {
+                let is_of_time = matches!(to, Move::Cursor(_) | Move::NoCursors);
+                if is_of_time && self.view == View::Cycles {
+                    continue;
+                }
                 if ui.add(Button::new(text)).on_hover_text(key).clicked() {
                     asked = Some(to);
                 }
@@ -76,10 +80,12 @@ impl ReviewScreen {
             }
         }
         let words = match self.view {
-            View::OverDepth => match (self.depth_lines.is_busy(), self.depth_lines.remark()) {
-                (true, _) => Some("finding the lines for this view".to_owned()),
-                (false, remark) => remark,
-            },
+            View::OverDepth | View::Cycles => {
+                match (self.depth_lines.is_busy(), self.depth_lines.remark()) {
+                    (true, _) => Some("finding the lines for this view".to_owned()),
+                    (false, remark) => remark,
+                }
+            }
             _ if self.thinned > 1 => {
                 Some(format!("thinned to min/max of {} samples", self.thinned))
             }
@@ -213,11 +219,8 @@ impl ReviewScreen {
             .map(|subject| Source {
                 track: &subject.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
-                // While it is read the lines are found again for every fifth of it, not for every piece.
-                version: match subject.is_settled() {
-                    true => u64::MAX,
-                    false => (subject.recording.share() * 5.0) as u64,
-                },
+                rows: [0, subject.recording.track.len()],
+                version: subject.fifths(),
                 id: subject.id,
             })
             .collect();
@@ -240,7 +243,12 @@ impl ReviewScreen {
                 }),
             })
             .collect();
-        let (gesture, pixels) = over_depth_ui(ui, &self.depth_lines, &layers, spans);
+        let drawn = over_depth_ui(ui, &self.depth_lines, &layers, spans);
+        self.follow_over_depth(drawn);
+    }
+
+    /// Moves the axes of depth and force as the pointer did in a plot of so many pixels.
+    pub(super) fn follow_over_depth(&mut self, (gesture, pixels): (Gesture, [f64; 2])) {
         self.depth_pixels = pixels;
         for (axis, span) in [&mut self.depth, &mut self.force].into_iter().enumerate() {
             if gesture.pan[axis] != 0.0 {

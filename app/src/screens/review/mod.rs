@@ -43,7 +43,7 @@ pub enum View {
     OverTime,
     /// Force over depth.
     OverDepth,
-    /// Every cycle and its peak.
+    /// The loops of the cycles over each other, and every peak.
     Cycles,
     /// The fits' parameters.
     Parameters,
@@ -99,6 +99,8 @@ pub struct ReviewScreen {
     prediction_of: Option<[String; 2]>,
     prediction_lines: [crate::plots::stretches::Stretches; 2],
     cycle_rows: cycles::CycleRows,
+    /// Whether of the loops only the first and the last are drawn.
+    has_ends_only: bool,
     path: String,
     next_id: u64,
     /// The most samples that share a lowest and a highest one in the plots over time.
@@ -128,6 +130,7 @@ impl ReviewScreen {
             prediction_of: None,
             prediction_lines: Default::default(),
             cycle_rows: cycles::CycleRows::default(),
+            has_ends_only: false,
             path: String::new(),
             next_id: 0,
             thinned: 1,
@@ -220,6 +223,18 @@ impl ReviewScreen {
                 subject.set_fit(answer.clone());
             }
         }
+    }
+
+    /// Begins to fit the sessions shown, where they can be fitted now.
+    pub fn fit(&mut self, ctx: &Context) {
+        if self.fits.standing().is_none() && self.fit_verdict().is_ok() {
+            self.start_fits(ctx);
+        }
+    }
+
+    /// Ends the fit under way.
+    pub fn cancel_fit(&mut self) {
+        self.fits.cancel();
     }
 
     /// Begins to fit every session shown.

@@ -96,6 +96,15 @@ impl Subject {
         !matches!(self.recording.stage, Stage::Waiting | Stage::Reading)
     }
 
+    /// Changes with every fifth of it that was read, so that lines are not found again for every piece.
+    #[must_use]
+    pub fn fifths(&self) -> u64 {
+        match self.is_settled() {
+            true => u64::MAX,
+            false => (self.recording.share() * 5.0) as u64,
+        }
+    }
+
     /// Takes a fit that was made of it.
     pub fn set_fit(&mut self, fit: Result<Arc<SessionFit>, String>) {
         self.fit = Some(fit);

@@ -1,4 +1,4 @@
-//! The priority of the loop's thread: the best that the system grants.
+//! The priority of a thread that must be in time: the best that the system grants.
 
 use std::fmt;
 use thread_priority::{
