@@ -11,7 +11,7 @@ use std::collections::VecDeque;
 use std::io;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, TrySendError, sync_channel};
-use std::sync::{Arc, Condvar, Mutex, PoisonError};
+use std::sync::{Arc, Condvar, Mutex, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -46,6 +46,24 @@ struct Reports {
     /// Somebody has asked for reports since the thread looked.
     is_attended: bool,
     is_over: bool,
+}
+
+impl Reports {
+    /// Takes over what is new. Where there is no room left the oldest samples go first.
+    fn take(&mut self, events: &mut Vec<RigEvent>, raw: &mut Vec<RawBytes>) {
+        if self.raw.len() + raw.len() > PIECES_MAX {
+            self.raw.clear();
+        }
+        self.raw.append(raw);
+        for event in events.drain(..) {
+            if self.events.len() >= REPORTS_MAX {
+                let is_reading = |event: &RigEvent| matches!(event.body, RigEventBody::Reading(_));
+                let oldest = self.events.iter().position(is_reading).unwrap_or(0);
+                self.events.remove(oldest);
+            }
+            self.events.push_back(event);
+        }
+    }
 }
 
 type Shared = Arc<(Mutex<Reports>, Condvar)>;
@@ -83,6 +101,8 @@ impl Line {
             queued,
             arrived: VecDeque::new(),
             is_real_time: false,
+            events: Vec::new(),
+            raw: Vec::new(),
             reports: Arc::clone(&reports),
         };
         let closing = Arc::clone(&is_closing);
@@ -169,20 +189,24 @@ struct Owner<D> {
     /// Taken out of `queued`, not looked at.
     arrived: VecDeque<Numbered>,
     is_real_time: bool,
+    /// To be handed over.
+    events: Vec<RigEvent>,
+    /// The same of bytes.
+    raw: Vec<RawBytes>,
     reports: Shared,
 }
 
 impl<D> Drop for Owner<D> {
     /// However the thread ends, nobody waits for it.
     fn drop(&mut self) {
-        let (reports, came) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
-        reports.is_over = true;
         if std::thread::panicking() {
             let failed = lost("the driver has failed; open the rig again");
-            let at = (self.clock)();
-            reports.events.push_back(RigEvent::new(at, failed));
+            self.events.push(RigEvent::new((self.clock)(), failed));
         }
+        let (reports, came) = &*self.reports;
+        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        reports.take(&mut self.events, &mut self.raw);
+        reports.is_over = true;
         came.notify_all();
     }
 }
@@ -222,8 +246,8 @@ impl<D: Dialogue> Owner<D> {
                 break why;
             }
         };
-        let at = (self.clock)();
-        self.report(vec![RigEvent::new(at, lost(ending))]);
+        self.events
+            .push(RigEvent::new((self.clock)(), lost(ending)));
     }
 
     /// Commands, lines, bytes: once.
@@ -253,14 +277,13 @@ impl<D: Dialogue> Owner<D> {
             self.tap(now, false, buffer[..count].to_vec());
             self.dialogue.received(now, &buffer[..count]);
         }
-        let mut events = Vec::new();
         while let Some((at, mut body)) = self.dialogue.take_event() {
             if let RigEventBody::Reading(reading) = &mut body {
                 reading.age = reading.age.or_else(|| self.age(at, reading.tick));
             }
-            events.push(RigEvent { at, body });
+            self.events.push(RigEvent { at, body });
         }
-        self.report(events);
+        self.report();
         Ok(())
     }
 
@@ -293,12 +316,7 @@ impl<D: Dialogue> Owner<D> {
     }
 
     fn tap(&mut self, at: Nanos, is_sent: bool, bytes: Vec<u8>) {
-        let (reports, _) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
-        if reports.raw.len() >= PIECES_MAX {
-            reports.raw.clear();
-        }
-        reports.raw.push(RawBytes {
+        self.raw.push(RawBytes {
             at,
             device: Arc::clone(&self.settings.device),
             is_sent,
@@ -306,9 +324,14 @@ impl<D: Dialogue> Owner<D> {
         });
     }
 
-    fn report(&mut self, events: Vec<RigEvent>) {
+    /// Hands over what there is, unless somebody reads at this moment: who is to write a stop waits for no reader.
+    fn report(&mut self) {
         let (reports, came) = &*self.reports;
-        let mut reports = reports.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut reports = match reports.try_lock() {
+            Ok(reports) => reports,
+            Err(TryLockError::Poisoned(err)) => err.into_inner(),
+            Err(TryLockError::WouldBlock) => return,
+        };
         reports.stats = LinkStats {
             is_real_time: self.is_real_time,
             ..self.dialogue.stats()
@@ -316,21 +339,12 @@ impl<D: Dialogue> Owner<D> {
         if std::mem::take(&mut reports.is_attended) {
             self.dialogue.attended((self.clock)());
         }
-        if events.is_empty() {
-            return;
+        let is_news = !self.events.is_empty();
+        reports.take(&mut self.events, &mut self.raw);
+        drop(reports);
+        if is_news {
+            came.notify_all();
         }
-        for event in events {
-            if reports.events.len() >= REPORTS_MAX {
-                let oldest = reports
-                    .events
-                    .iter()
-                    .position(|event| matches!(event.body, RigEventBody::Reading(_)))
-                    .unwrap_or(0);
-                reports.events.remove(oldest);
-            }
-            reports.events.push_back(event);
-        }
-        came.notify_all();
     }
 }
 
