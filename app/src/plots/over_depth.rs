@@ -1,15 +1,19 @@
-//! Force over depth of recorded sessions. Which points are drawn is found beside the window, once for a zoom.
+//! Force over depth of recorded sessions. Which points are drawn is found beside the window, once for a zoom. Lines of more
+//! points than a frame can draw are found as a picture.
 
 use super::navigate::{Gesture, Span, gesture};
 use super::style::quiet;
 use crate::theme::Tokens;
 use crate::workers::Job;
-use eframe::egui::{Color32, Context, Ui, vec2};
-use egui_plot::{Line, Plot, PlotPoint, PlotPoints, Points};
-use palpate_model::signal::polyline::Reducer;
+use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions, Ui, vec2};
+use egui_plot::{Line, Plot, PlotImage, PlotPoint, PlotPoints, Points};
+use palpate_model::signal::polyline::{Coverage, Reducer};
 use palpate_model::signal::track::Track;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+
+/// Points that a frame can draw in a few milliseconds, of all lines together.
+const POINTS_MAX: usize = 30_000;
 
 /// What of one session is drawn.
 #[derive(Clone, Copy, Debug)]
@@ -24,6 +28,8 @@ pub struct Source<'a> {
     pub version: u64,
     /// Number that tells it from the others.
     pub id: u64,
+    /// Its colour.
+    pub color: Color32,
 }
 
 /// What lines were found for.
@@ -32,7 +38,7 @@ struct Key {
     depth: [f64; 2],
     force: [f64; 2],
     pixels: [f64; 2],
-    versions: Vec<(u64, u64, [usize; 2])>,
+    versions: Vec<(u64, u64, [usize; 2], Color32)>,
 }
 
 /// The line of one session.
@@ -44,13 +50,22 @@ struct Reduced {
     points: usize,
 }
 
+/// The lines for a view.
+struct Made {
+    key: Key,
+    lines: Vec<Reduced>,
+    /// Those of too many points, over each other.
+    picture: Option<ColorImage>,
+}
+
 /// The lines last found, and the search for others.
 #[derive(Default)]
 pub struct DepthLines {
-    job: Job<Option<(Key, Vec<Reduced>)>>,
+    job: Job<Option<Made>>,
     is_unwanted: Arc<AtomicBool>,
     sought: Option<Key>,
-    made: Option<(Key, Vec<Reduced>)>,
+    made: Option<Made>,
+    texture: Option<TextureHandle>,
 }
 
 impl DepthLines {
@@ -62,7 +77,10 @@ impl DepthLines {
         [depth, force]: [&Span; 2],
         pixels: [f64; 2],
     ) {
-        if let Some(Some(made)) = self.job.poll() {
+        if let Some(Some(mut made)) = self.job.poll() {
+            let picture = made.picture.take();
+            self.texture = picture
+                .map(|picture| ctx.load_texture("review-loops", picture, TextureOptions::LINEAR));
             self.made = Some(made);
         }
         let key = Key {
@@ -71,10 +89,10 @@ impl DepthLines {
             pixels: pixels.map(f64::round),
             versions: sources
                 .iter()
-                .map(|one| (one.id, one.version, one.rows))
+                .map(|one| (one.id, one.version, one.rows, one.color))
                 .collect(),
         };
-        if self.made.as_ref().is_some_and(|(made, _)| *made == key) {
+        if self.made.as_ref().is_some_and(|made| made.key == key) {
             return;
         }
         if self.job.is_busy() {
@@ -91,7 +109,13 @@ impl DepthLines {
         self.sought = Some(key.clone());
         let own = sources.iter();
         let sources: Vec<Owned> = own
-            .map(|one| (one.track.clone(), one.columns, one.rows, one.id))
+            .map(|one| Owned {
+                track: one.track.clone(),
+                columns: one.columns,
+                rows: one.rows,
+                id: one.id,
+                color: one.color,
+            })
             .collect();
         let (is_unwanted, wake) = (Arc::clone(&self.is_unwanted), ctx.clone());
         // Without a thread the lines there stay; it is tried again in the next frame.
@@ -105,9 +129,14 @@ impl DepthLines {
     /// What a reader must know of the lines: for how many samples how many points are drawn.
     #[must_use]
     pub fn remark(&self) -> Option<String> {
-        let (_, lines) = self.made.as_ref()?;
-        let samples: u64 = lines.iter().map(|line| line.samples).sum();
-        let points: usize = lines.iter().map(|line| line.points).sum();
+        let made = self.made.as_ref()?;
+        let samples: u64 = made.lines.iter().map(|line| line.samples).sum();
+        let points: usize = made.lines.iter().map(|line| line.points).sum();
+        if self.texture.is_some() {
+            return Some(format!(
+                "over depth the pixels that {samples} samples cross are drawn, to a quarter of a pixel"
+            ));
+        }
         (samples > points as u64).then(|| {
             format!(
                 "over depth {points} points stand for {samples} samples; none is more than half a pixel from the line"
@@ -123,36 +152,48 @@ impl DepthLines {
 
     /// The stretches of a session, as they are drawn.
     pub fn stretches(&self, id: u64) -> &[Vec<PlotPoint>] {
-        let lines = self.made.as_ref().map_or(&[][..], |(_, lines)| lines);
+        let lines = self.made.as_ref().map_or(&[][..], |made| &made.lines);
         let own = lines.iter().find(|line| line.id == id);
         own.map_or(&[], |line| &line.stretches)
     }
 }
 
-/// Samples, columns of depth and force, rows, and number of a line.
-type Owned = (Track, [usize; 2], [usize; 2], u64);
+/// The same as [`Source`], for a thread.
+struct Owned {
+    track: Track,
+    columns: [usize; 2],
+    rows: [usize; 2],
+    id: u64,
+    color: Color32,
+}
 
-fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<(Key, Vec<Reduced>)> {
+fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<Made> {
     let [width, height] = key.pixels;
     let [x, y] = [key.depth, key.force];
     let scale = [width / (x[1] - x[0]), height / (y[1] - y[0])];
+    let points_max = POINTS_MAX / sources.len().max(1);
     let mut lines = Vec::with_capacity(sources.len());
-    for (track, columns, rows, id) in sources {
-        let mut reducer = Reducer::new(width, height);
+    let mut picture = None;
+    // The first is in front, so it comes last into the picture.
+    for source in sources.iter().rev() {
+        let mut reducer = Reducer::new(width, height).with_points_max(points_max);
         let mut before = 0;
-        for segment in track.segments() {
+        for segment in source.track.segments() {
             if is_unwanted.load(Ordering::Relaxed) {
                 return None;
             }
             let count = segment.times().len();
-            let [from, to] = rows.map(|row| row.saturating_sub(before).min(count));
+            let [from, to] = source.rows.map(|row| row.saturating_sub(before).min(count));
             before += count;
-            let [depths, forces] =
-                columns.map(|column| &segment.values(column)[from..to.max(from)]);
+            let values = |column: usize| &segment.values(column)[from..to.max(from)];
+            let [depths, forces] = source.columns.map(values);
             for (depth, force) in depths.iter().zip(forces) {
                 let place = [f64::from(*depth) - x[0], f64::from(*force) - y[0]];
                 reducer.push(place[0] * scale[0], place[1] * scale[1]);
             }
+        }
+        if let Some(coverage) = reducer.coverage() {
+            paint(&mut picture, &coverage, source.color);
         }
         let (found, samples) = reducer.finish();
         let point = |[px, py]: [f64; 2]| PlotPoint::new(x[0] + px / scale[0], y[0] + py / scale[1]);
@@ -161,13 +202,29 @@ fn reduce(key: Key, sources: &[Owned], is_unwanted: &AtomicBool) -> Option<(Key,
             .map(|stretch| stretch.into_iter().map(point).collect())
             .collect();
         lines.push(Reduced {
-            id: *id,
+            id: source.id,
             points: stretches.iter().map(Vec::len).sum(),
             stretches,
             samples,
         });
     }
-    Some((key, lines))
+    Some(Made {
+        key,
+        lines,
+        picture,
+    })
+}
+
+/// Lays what a line crosses over the picture.
+fn paint(picture: &mut Option<ColorImage>, coverage: &Coverage, color: Color32) {
+    let picture =
+        picture.get_or_insert_with(|| ColorImage::filled(coverage.size, Color32::TRANSPARENT));
+    // Pictures begin above.
+    let rows = coverage.pixels.chunks_exact(coverage.size[0]).rev();
+    let pixels = picture.pixels.iter_mut().zip(rows.flatten());
+    for (pixel, share) in pixels.filter(|(_, share)| **share > 0) {
+        *pixel = pixel.blend(color.gamma_multiply_u8(*share));
+    }
 }
 
 /// One session's line as it is drawn.
@@ -204,6 +261,14 @@ pub fn over_depth_ui(
     let response = plot.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(x[0]..=x[1]);
         plot_ui.set_plot_bounds_y(y[0]..=y[1]);
+        if let (Some(texture), Some(made)) = (&lines.texture, &lines.made) {
+            // Where it was found, also while another view is still looked for.
+            let (x, y) = (made.key.depth, made.key.force);
+            let middle = PlotPoint::new(0.5 * (x[0] + x[1]), 0.5 * (y[0] + y[1]));
+            let size = vec2((x[1] - x[0]) as f32, (y[1] - y[0]) as f32);
+            let picture = PlotImage::new("loops", texture.id(), middle, size);
+            plot_ui.image(picture.allow_hover(false));
+        }
         for layer in layers {
             for (number, stretch) in lines.stretches(layer.id).iter().enumerate() {
                 let line = Line::new(layer.name, PlotPoints::Borrowed(stretch));

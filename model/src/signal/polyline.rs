@@ -7,6 +7,9 @@
 //! Every sample within the picture is at most [`ERROR_PIXELS`] from the line drawn, and every place on the line
 //! at most that far from the line through all samples: the diagonal of a cell and what is made straight add up
 //! to it. Memory while it works: a bit for each cell, 16 for each pixel.
+//!
+//! Where so much of the picture is crossed that a line would have more points than can be drawn in a frame, the cells
+//! themselves are the picture ([`Reducer::coverage`]).
 
 /// The furthest that a sample left out is from the line drawn, in pixels.
 pub const ERROR_PIXELS: f64 = 0.5;
@@ -29,6 +32,17 @@ pub struct Reducer {
     is_alone: bool,
     done: Vec<Vec<[f64; 2]>>,
     samples: u64,
+    /// Points in `done`, and how many there may be.
+    points: [usize; 2],
+}
+
+/// How much of every pixel is crossed.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Coverage {
+    /// Pixels across and up.
+    pub size: [usize; 2],
+    /// From the corner where both axes begin, row by row: 0 to 255, which is a line straight across and more.
+    pub pixels: Vec<u8>,
 }
 
 impl Reducer {
@@ -46,7 +60,45 @@ impl Reducer {
             is_alone: true,
             done: Vec::new(),
             samples: 0,
+            points: [0, usize::MAX],
         }
+    }
+
+    /// A line of more than so many points becomes a picture.
+    #[must_use]
+    pub fn with_points_max(mut self, points_max: usize) -> Self {
+        self.points[1] = points_max;
+        self
+    }
+
+    /// The picture in the place of a line of too many points.
+    #[must_use]
+    pub fn coverage(&self) -> Option<Coverage> {
+        if !self.is_dense() {
+            return None;
+        }
+        // Cells along a side of a pixel, as many as a straight line across it covers.
+        let side = (1.0 / CELL) as usize;
+        let size = self.size.map(|side| side.ceil() as usize);
+        let crossed = |x: usize, y: usize| {
+            let rows = (side * y..side * (y + 1)).filter(|row| *row < self.cells[1]);
+            let row = |row: usize| {
+                let cells = (side * x..side * (x + 1)).filter(|cell| *cell < self.cells[0]);
+                cells.filter(|cell| self.bit([*cell, row])).count()
+            };
+            rows.map(row).sum::<usize>()
+        };
+        let pixels = (0..size[1]).flat_map(|y| (0..size[0]).map(move |x| (x, y)));
+        Some(Coverage {
+            size,
+            pixels: pixels
+                .map(|(x, y)| (crossed(x, y) * 255 / side).min(255) as u8)
+                .collect(),
+        })
+    }
+
+    fn is_dense(&self) -> bool {
+        self.points[0] > self.points[1]
     }
 
     /// Takes the next sample, in pixels from a corner; one that is no number breaks the line.
@@ -67,6 +119,10 @@ impl Reducer {
             return;
         };
         if self.is_covered(inside) {
+            return;
+        }
+        if self.is_dense() {
+            self.cover(inside);
             return;
         }
         // The pen may be a few samples behind; within one cell that is no more than the cell.
@@ -92,13 +148,14 @@ impl Reducer {
             && !self.bit(cell)
         {
             self.set(cell);
-            self.done.push(vec![place]);
+            self.keep(vec![place]);
         }
         self.is_alone = true;
         self.pen_up();
     }
 
-    /// The stretches to draw, each of one point or more, and how many samples they stand for.
+    /// The stretches to draw, each of one point or more, and how many samples they stand for. There is none where
+    /// [`coverage`](Self::coverage) is to be drawn.
     #[must_use]
     pub fn finish(mut self) -> (Vec<Vec<[f64; 2]>>, u64) {
         self.lift();
@@ -108,7 +165,16 @@ impl Reducer {
     fn pen_up(&mut self) {
         if !self.stretch.is_empty() {
             let stretch = std::mem::take(&mut self.stretch);
-            self.done.push(straighten(&stretch, STRAIGHT));
+            self.keep(straighten(&stretch, STRAIGHT));
+        }
+    }
+
+    fn keep(&mut self, stretch: Vec<[f64; 2]>) {
+        self.points[0] += stretch.len();
+        if self.is_dense() {
+            self.done.clear();
+        } else {
+            self.done.push(stretch);
         }
     }
 
@@ -373,5 +439,50 @@ mod tests {
         assert_eq!(reduced(&across, [10.0, 10.0]), [across.to_vec()]);
         assert!(reduced(&[], [10.0, 10.0]).is_empty());
         assert_eq!(reduced(&[[2.0, 2.0]], [10.0, 10.0]), [vec![[2.0, 2.0]]]);
+    }
+
+    #[test]
+    fn a_line_of_too_many_points_is_a_picture_of_what_it_crosses() {
+        let mut random = SplitMix::seeded(32);
+        let size = [120.0, 80.5];
+        let points = loops(&mut random, 3.0, size);
+        let mut reducer = Reducer::new(size[0], size[1]).with_points_max(100);
+        points.iter().for_each(|[x, y]| reducer.push(*x, *y));
+        let coverage = reducer.coverage().expect("more than 100 points");
+        assert_eq!(coverage.size, [120, 81]);
+        assert!(reducer.finish().0.is_empty());
+        let pixel = |x: usize, y: usize| coverage.pixels[y * coverage.size[0] + x];
+        let inside = |one: &&[f64; 2]| (0..2).all(|axis| (0.0..size[axis]).contains(&one[axis]));
+        for [x, y] in points.iter().filter(inside) {
+            assert!(pixel(*x as usize, *y as usize) > 0, "{x} {y}");
+        }
+        // A pixel that is crossed is at most half its diagonal from the line.
+        let crossed: Vec<[f64; 2]> = (0..81)
+            .flat_map(|y| (0..120).map(move |x| (x, y)))
+            .filter(|(x, y)| pixel(*x, *y) > 0)
+            .map(|(x, y)| [x as f64 + 0.5, y as f64 + 0.5])
+            .collect();
+        assert!(crossed.len() > 500 && crossed.len() < 120 * 81);
+        let away = furthest(&crossed, &lines(&points));
+        assert!(away <= 0.5f64.sqrt() + 1e-9, "{away}");
+        // With room for its points it is a line.
+        let mut reducer = Reducer::new(size[0], size[1]).with_points_max(points.len());
+        points.iter().for_each(|[x, y]| reducer.push(*x, *y));
+        assert_eq!(reducer.coverage(), None);
+        assert_eq!(reducer.finish().0, reduced(&points, size));
+    }
+
+    #[test]
+    fn a_straight_line_fills_its_pixels() {
+        let mut reducer = Reducer::new(10.0, 4.0).with_points_max(1);
+        reducer.push(0.0, 1.5);
+        reducer.push(10.0, 1.5);
+        reducer.lift();
+        let coverage = reducer.coverage().expect("two points");
+        let row = |y: usize| &coverage.pixels[10 * y..10 * (y + 1)];
+        assert_eq!(
+            (row(0), row(1), row(2)),
+            (&[0; 10][..], &[255; 10][..], &[0; 10][..])
+        );
     }
 }

@@ -165,12 +165,13 @@ impl ReviewScreen {
             .collect();
         let sources: Vec<Source<'_>> = drawn
             .iter()
-            .map(|(cycle, _)| Source {
+            .map(|(cycle, color)| Source {
                 track: &front.recording.track,
                 columns: [Quantity::Depth as usize, Quantity::Force as usize],
                 rows: cycle.rows,
                 version: front.fifths(),
                 id: id(cycle),
+                color: *color,
             })
             .collect();
         let spans = [&self.depth, &self.force];

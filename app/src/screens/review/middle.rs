@@ -15,7 +15,7 @@ use eframe::egui::{Button, Label, RichText, Ui, vec2};
 const AXIS_WIDTH: f32 = 58.0;
 const AXIS_HEIGHT: f32 = 34.0;
 /// Sessions that are drawn with two points a pixel each; of more than that, each has fewer.
-const FULL_LINES: usize = 8;
+const FULL_LINES: usize = 6;
 
 impl ReviewScreen {
     pub(super) fn draw_middle(&mut self, ui: &mut Ui) {
@@ -222,6 +222,7 @@ impl ReviewScreen {
                 rows: [0, subject.recording.track.len()],
                 version: subject.fifths(),
                 id: subject.id,
+                color: color_of(tokens, subject.id),
             })
             .collect();
         let spans = [&self.depth, &self.force];
