@@ -86,8 +86,10 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
     while newest < last {
         runner.pass();
         for event in std::mem::take(&mut runner.events) {
-            let RigEventBody::Reading(Reading { tick, age, .. }) = event.body else {
-                continue;
+            let (tick, age) = match event.body {
+                RigEventBody::Reading(Reading { tick, age, .. }) => (tick, age),
+                RigEventBody::Fault(fault) => panic!("{what}: {fault:?}"),
+                _ => continue,
             };
             assert!(tick > newest);
             samples += 1;
