@@ -18,6 +18,7 @@ use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progre
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
+use crate::shell::pace::FramePace;
 use crate::shell::palette::{Action, Palette};
 use crate::shell::rail::Screen;
 use crate::shell::sizes::{STEP, Sizes};
@@ -38,13 +39,6 @@ use palpate_protocols::runner::{Request, RunRequest, Runner, Snapshot, StartErro
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use std::time::Duration;
-
-/// Between two frames while something moves: 30 a second is what an eye needs on a chart.
-const FRAME_RUNNING: Duration = Duration::from_millis(33);
-
-/// Between two frames at rest: live values must not look frozen.
-const FRAME_IDLE: Duration = Duration::from_millis(250);
 
 /// A start that was asked for.
 enum Start {
@@ -93,6 +87,7 @@ pub struct WorkbenchApp {
     are_fonts_warm: bool,
     keys: Keys,
     meter: FrameMeter,
+    pace: FramePace,
 }
 
 impl WorkbenchApp {
@@ -112,11 +107,9 @@ impl WorkbenchApp {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let plots = PlotCache::for_calibration(&options.calibration);
-        let wake = ctx.clone();
-        let runner = Runner::start(options.rig, options.scale, None, move || {
-            wake.request_repaint_after(FRAME_IDLE);
-        })
-        .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
+        let pace = FramePace::default();
+        let runner = Runner::start(options.rig, options.scale, None, pace.waker(ctx))
+            .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
         let mut ports = Ports::new(options.list_ports);
         ports.refresh(ctx);
         let curves_in = match &options.sessions {
@@ -179,6 +172,7 @@ impl WorkbenchApp {
             are_fonts_warm: false,
             keys: Keys::default(),
             meter: FrameMeter::from_environment(),
+            pace,
         })
     }
 
@@ -635,7 +629,8 @@ impl eframe::App for WorkbenchApp {
         let is_quiet = run_in_progress(&self.snapshot).is_none()
             && self.intent() == Intent::None
             && !is_motion_possible(&self.snapshot);
-        ctx.request_repaint_after(if is_quiet { FRAME_IDLE } else { FRAME_RUNNING });
+        // On the rig's screen somebody may press the cell by hand.
+        self.pace.next(ctx, !is_quiet, self.screen == Screen::Rig);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {
