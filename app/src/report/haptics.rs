@@ -135,15 +135,21 @@ pub fn follow_text(followed: &Followed) -> String {
     ));
     lines.push(String::new());
     lines.push(fits_beside_the_body(followed));
-    if followed.fit.is_some() && followed.friction_n > 0.0 {
-        lines.push(FRICTION.to_owned());
+    if followed.fit.is_some() {
+        lines.push(difference(followed).to_owned());
     }
     lines.extend(followed.refusals.iter().cloned());
     lines.join("\n")
 }
 
-/// Why a fit of the measured force is not the body.
-const FRICTION: &str = "XXX";
+/// Why the fit of the measured force is not that of the commanded.
+fn difference(followed: &Followed) -> &'static str {
+    if followed.settings.friction_share > 0.0 {
+        "the drive makes up for friction only while the rack moves: as the hold begins the measured force steps, and its fit takes that for relaxation"
+    } else {
+        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body as it is"
+    }
+}
 
 /// What fits of both forces find, beside the body that was rendered.
 fn fits_beside_the_body(followed: &Followed) -> String {
@@ -174,6 +180,7 @@ fn fits_beside_the_body(followed: &Followed) -> String {
         row("mu2", mu2, "N/mm²"),
         row("mu3", mu3, "N/mm³"),
         row("tau_sig", body.tau_sig, "N·s/mm²"),
+        row("f_offset", 0.0, "N"),
     ])
 }
 
