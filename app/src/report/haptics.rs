@@ -147,7 +147,7 @@ fn difference(followed: &Followed) -> &'static str {
     if followed.settings.friction_share > 0.0 {
         "the drive makes up for friction only while the rack moves: as the hold begins the measured force steps, and its fit takes that for relaxation"
     } else {
-        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body as it is"
+        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body nearly as it is"
     }
 }
 
