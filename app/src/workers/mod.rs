@@ -7,6 +7,7 @@ pub mod exports;
 pub mod extremes;
 pub mod find;
 pub mod fit;
+pub mod follow_session;
 pub mod haptics;
 pub mod imports;
 pub mod latest;
