@@ -5,9 +5,12 @@
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
 mod beat;
+pub mod scene;
+pub mod scene_file;
 mod simulated;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};
 pub use palpate_drivers::priority;
+pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;
