@@ -13,7 +13,7 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.3rem; border-bottom: 1px solid $quie
 table { border-collapse: collapse; margin: 0.6rem 0; font-variant-numeric: tabular-nums; }
 caption { text-align: left; color: $quiet; padding: 0.2rem 0; }
 th, td { text-align: left; vertical-align: top; padding: 0.15rem 0.8rem 0.15rem 0; border-bottom: 1px solid $line; }
-th[scope=row] { font-weight: normal; color: $quiet; }
+th[scope=row] { font-weight: normal; color: $quiet; overflow-wrap: break-word; }
 figure { margin: 1rem 0; } figcaption { color: $quiet; font-size: 0.9rem; }
 pre { overflow-x: auto; font-size: 0.85rem; } code { font-size: 0.85rem; }
 svg { max-width: 100%; height: auto; }
@@ -21,7 +21,7 @@ svg { max-width: 100%; height: auto; }
 @media print {
   body { max-width: none; margin: 0; padding: 0; font-size: 10pt; }
   pre { white-space: pre-wrap; font-size: 7pt; } code { font-size: 7.5pt; }
-  h1, h2, h3, h4 { break-after: avoid; } figure, tr { break-inside: avoid; } thead { display: table-header-group; }
+  h1, h2, h3, h4 { break-after: avoid; } figure, table, tr { break-inside: avoid; } thead { display: table-header-group; }
   section.session + section.session { break-before: page; }
 }";
 

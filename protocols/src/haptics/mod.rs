@@ -7,10 +7,12 @@
 mod beat;
 pub mod scene;
 pub mod scene_file;
+mod led;
 mod simulated;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};
+pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
 pub use palpate_drivers::priority;
 pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;
