@@ -19,6 +19,7 @@ use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progre
 use crate::shell::event_log::EventLog;
 use crate::shell::frame_meter::FrameMeter;
 use crate::shell::keys::Keys;
+use crate::shell::pace::FramePace;
 use crate::shell::palette::{Action, Palette};
 use crate::shell::rail::Screen;
 use crate::shell::sizes::{STEP, Sizes};
@@ -33,19 +34,13 @@ use crate::workers::recovery::Recovery;
 use crate::workers::select::Selected;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
 use palpate_model::extremes::Row;
+use palpate_model::surface::SceneCurves;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, RunRequest, Runner, Snapshot, StartError};
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
-use std::time::Duration;
-
-/// Between two frames while something moves: 30 a second is what an eye needs on a chart.
-const FRAME_RUNNING: Duration = Duration::from_millis(33);
-
-/// Between two frames at rest: live values must not look frozen.
-const FRAME_IDLE: Duration = Duration::from_millis(250);
 
 /// A start that was asked for.
 enum Start {
@@ -95,6 +90,7 @@ pub struct WorkbenchApp {
     are_fonts_warm: bool,
     keys: Keys,
     meter: FrameMeter,
+    pace: FramePace,
 }
 
 impl WorkbenchApp {
@@ -114,11 +110,9 @@ impl WorkbenchApp {
             .curve()
             .map_err(|err| format!("the load cell's calibration cannot be used: {err}"))?;
         let plots = PlotCache::for_calibration(&options.calibration);
-        let wake = ctx.clone();
-        let runner = Runner::start(options.rig, options.scale, None, move || {
-            wake.request_repaint_after(FRAME_IDLE);
-        })
-        .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
+        let pace = FramePace::default();
+        let runner = Runner::start(options.rig, options.scale, None, pace.waker(ctx))
+            .map_err(|err| format!("the runner's thread cannot be started: {err}"))?;
         let mut ports = Ports::new(options.list_ports);
         ports.refresh(ctx);
         let curves_in = match &options.sessions {
@@ -182,6 +176,7 @@ impl WorkbenchApp {
             are_fonts_warm: false,
             keys: Keys::default(),
             meter: FrameMeter::from_environment(),
+            pace,
         })
     }
 
@@ -207,6 +202,12 @@ impl WorkbenchApp {
     #[must_use]
     pub fn trade_curves(&self) -> Option<&TradeCurves> {
         self.trade.curves()
+    }
+
+    /// The curves of a scene.
+    #[must_use]
+    pub fn scene_curves(&self) -> Option<&SceneCurves> {
+        self.trade.scene_curves()
     }
 
     /// What the last test of the extremes found.
@@ -673,7 +674,8 @@ impl eframe::App for WorkbenchApp {
             && self.intent() == Intent::None
             && !is_motion_possible(&self.snapshot)
             && !self.haptics.is_running();
-        ctx.request_repaint_after(if is_quiet { FRAME_IDLE } else { FRAME_RUNNING });
+        // On the rig's screen somebody may press the cell by hand.
+        self.pace.next(ctx, !is_quiet, self.screen == Screen::Rig);
     }
 
     fn ui(&mut self, ui: &mut Ui, _frame: &mut eframe::Frame) {

@@ -1,8 +1,13 @@
-//! The haptic loop as a thread: what it hands over is whole, and a tick neither allocates nor waits.
+//! The haptic loop as a thread: what it hands over is whole, and a tick neither allocates nor waits; nor does one of the
+//! deformable surface.
 
+use palpate_model::Seconds;
 use palpate_model::haptics::Period;
 use palpate_model::haptics::rig::{Hand, HandPath};
 use palpate_model::haptics::simulation::SimulationSettings;
+use palpate_model::surface::{
+    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Shear, Side, Surface,
+};
 use palpate_model::units::MmPerS;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::haptics::{Beat, Led, Simulated, Ticking};
@@ -87,6 +92,59 @@ fn a_tick_waits_for_nobody() {
     std::thread::sleep(std::time::Duration::from_millis(1));
     assert!(waits() > after);
     reader.unwrap().join().unwrap();
+}
+
+/// A surface of a method, and tools that press, pull and slide over it, at times more of them than are worked through
+/// together.
+fn poked(method: Method) -> impl FnMut(usize) {
+    let grid = Grid::new(41, 41, 0.5).expect("a grid");
+    let shear = match method {
+        Method::Sorted => Shear::PerNode(vec![0.05; grid.nodes()].into()),
+        _ => Shear::Uniform(0.05),
+    };
+    let field = HeightField::new(grid, vec![0.0; grid.nodes()], shear).expect("a field");
+    let recovery = Recovery::new(Seconds(0.05), Seconds(1e-3)).expect("a recovery");
+    let mut surface = Surface::new(field, method, recovery, Cut::NONE).expect("a surface");
+    move |tick| {
+        let contacts: [Contact; 20] = std::array::from_fn(|tool| {
+            let [column, row] = [7 * tick + 11 * tool, tick / 3 + 31 * tool].map(|at| at % 41);
+            let node = Node {
+                column: column as u16,
+                row: row as u16,
+            };
+            let (z, side) = match tool % 3 {
+                0 => (1.5, Side::Pull),
+                _ => (-2.0, Side::Push),
+            };
+            Contact::at(&grid, node, z, side)
+        });
+        let told = surface.tick(&contacts[..[0, 1, 3, 20][tick % 4]]);
+        assert!(!told.dirty.is_empty() || tick % 4 == 0);
+    }
+}
+
+#[test]
+fn a_tick_of_the_surface_allocates_nothing() {
+    for method in Method::ALL {
+        let mut tick = poked(method);
+        // From the first tick on: all there is was made before.
+        let counted = allocation_counter::measure(|| (0..400).for_each(&mut tick));
+        assert_eq!(counted.count_total, 0, "{method:?}: {counted:?}");
+    }
+}
+
+#[cfg(target_os = "linux")]
+#[test]
+fn a_tick_of_the_surface_waits_for_nobody() {
+    for method in Method::ALL {
+        let mut tick = poked(method);
+        waits();
+        let before = waits();
+        (0..400).for_each(&mut tick);
+        let after = waits();
+        // Reading the count itself may wait once.
+        assert!(after - before <= 1, "{method:?}: {before} {after}");
+    }
 }
 
 #[test]

@@ -250,7 +250,7 @@ fn the_soak_script_names_its_parts() {
     let told = String::from_utf8_lossy(&help.stdout);
     assert!(help.status.success(), "{told}");
     for part in [
-        "bodies", "select", "coverage", "extremes", "runs", "contact",
+        "bodies", "select", "coverage", "extremes", "haptics", "runs", "contact",
     ] {
         let is_named = told.lines().any(|line| line.trim_start().starts_with(part));
         assert!(is_named, "{part}: {told}");
@@ -292,4 +292,34 @@ fn what_documents_point_to_exists() {
     }
     assert!(gone.is_empty(), "{}", gone.join("\n"));
     assert!(count > 100, "only {count} looked at");
+}
+
+#[test]
+fn tests_that_documents_name_exist() {
+    let sources: Vec<(String, String)> = CRATES
+        .into_iter()
+        .flat_map(|package| files_below(&workspace().join(package), "rs"))
+        .map(|file| {
+            let name = file.file_name().unwrap().to_string_lossy().into_owned();
+            (name, fs::read_to_string(&file).unwrap())
+        })
+        .collect();
+    let (mut gone, mut count) = (Vec::new(), 0);
+    for file in files_below(&workspace().join("docs"), "md") {
+        let text = fs::read_to_string(&file).unwrap();
+        // `file.rs: name` in a code span.
+        for span in text.split('`').skip(1).step_by(2) {
+            let Some((source, name)) = span.split_once(".rs: ") else {
+                continue;
+            };
+            count += 1;
+            let (source, function) = (format!("{source}.rs"), format!("fn {name}("));
+            let is_there = |one: &(String, String)| one.0 == source && one.1.contains(&function);
+            if !sources.iter().any(is_there) {
+                gone.push(format!("{}: {span}", file.display()));
+            }
+        }
+    }
+    assert!(gone.is_empty(), "{}", gone.join("\n"));
+    assert!(count > 50, "only {count} looked at");
 }

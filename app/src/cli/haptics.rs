@@ -8,6 +8,7 @@ use super::scene::told;
 use crate::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
+use crate::workers::follow_session::keep_followed;
 use crate::workers::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
 use crate::workers::haptics_tape::{recorder, replay};
 use clap::{Args, Subcommand, ValueEnum};
@@ -185,6 +186,9 @@ pub struct FollowArgs {
     /// Write the samples as a new table, which 'palpate fit' and 'palpate import' read
     #[arg(long, value_name = "FILE.csv")]
     table: Option<PathBuf>,
+    /// Make a session of the samples in a new folder, as 'palpate import' would of the table
+    #[arg(long, value_name = "FOLDER")]
+    out: Option<PathBuf>,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -279,6 +283,7 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
 fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("picture", args.plot.as_deref())?;
     new_file::check("table", args.table.as_deref())?;
+    new_file::check("session", args.out.as_deref())?;
     let body = body(&args.source, Depth(args.depth), output)?;
     let settings = CheckSettings {
         speed: MmPerS(args.speed),
@@ -302,7 +307,11 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
     new_file::write("picture", args.plot.as_deref(), || {
         follow_plot(&source, &followed)
     })?;
-    new_file::write("table", args.table.as_deref(), || follow_table(&followed))
+    new_file::write("table", args.table.as_deref(), || follow_table(&followed))?;
+    match &args.out {
+        Some(folder) => keep_followed(&followed, &source, folder).map_err(Failure::failed),
+        None => Ok(()),
+    }
 }
 
 fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {

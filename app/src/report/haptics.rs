@@ -2,14 +2,16 @@
 
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
 use super::svg::{Anchor, Ink, Panel, Svg};
-use super::text::parameter_lines;
+use super::text::{ParameterText, in_columns};
 use super::thin::thin;
 use crate::theme::tokens::LIGHT;
 use crate::widgets::uncertain::plain;
 use crate::workers::haptics::{Checked, Followed, Paced, Tried};
+use palpate_model::fit::FitReport;
 use palpate_model::haptics::Flags;
 use palpate_model::haptics::check::CheckSample;
 use palpate_model::haptics::margin::Margin;
+use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_protocols::haptics::timing::Spread;
 
@@ -165,12 +167,59 @@ pub fn follow_text(followed: &Followed) -> String {
             found.slope, found.slope_error, found.rising.line[0], found.rising.line[1]
         ));
     }
-    if let Some(report) = &followed.fit {
-        lines.push("fit of the measured force:".to_owned());
-        lines.extend(parameter_lines(&report.parameters));
+    lines.push(format!(
+        "of that, friction of motor and rack is {:.3} N and the drag of the drive at this speed {:.3} N",
+        followed.friction_n, followed.drag_n
+    ));
+    lines.push(String::new());
+    lines.push(fits_beside_the_body(followed));
+    if followed.fit.is_some() {
+        lines.push(difference(followed).to_owned());
     }
     lines.extend(followed.refusals.iter().cloned());
     lines.join("\n")
+}
+
+/// Why the fit of the measured force is not that of the commanded.
+fn difference(followed: &Followed) -> &'static str {
+    if followed.settings.friction_share > 0.0 {
+        "the drive makes up for friction only while the rack moves: as the hold begins the measured force steps, and its fit takes that for relaxation"
+    } else {
+        "friction and drag push back with one force while the rack moves, and friction keeps it up in the hold: the fit finds it as f_offset and leaves the body nearly as it is"
+    }
+}
+
+/// What fits of both forces find, beside the body that was rendered.
+fn fits_beside_the_body(followed: &Followed) -> String {
+    let body = &followed.body;
+    let [mu1, mu2, mu3] = body.mu;
+    let cell = |report: &Option<FitReport>, name: &str| {
+        let found = report.as_ref().and_then(|report| report.parameter(name));
+        found.map_or("none".to_owned(), |one| ParameterText::of(one).value)
+    };
+    let row = |name: &str, value: f64, unit: &str| {
+        let measured = cell(&followed.fit, name);
+        let commanded = cell(&followed.fit_commanded, name);
+        [name, &plain(value), &commanded, &measured, unit]
+            .map(str::to_owned)
+            .into()
+    };
+    let heads = [
+        "",
+        "body",
+        "fit of the commanded",
+        "fit of the measured force",
+        "",
+    ];
+    in_columns(&[
+        heads.map(str::to_owned).into(),
+        row("tau_eps", body.tau_eps, "s"),
+        row("mu1", mu1, "N/mm"),
+        row("mu2", mu2, "N/mm²"),
+        row("mu3", mu3, "N/mm³"),
+        row("tau_sig", body.tau_sig, "N·s/mm²"),
+        row("f_offset", 0.0, "N"),
+    ])
 }
 
 /// A check of the feedback as a picture: forces over time, and one over the other.
@@ -211,9 +260,10 @@ pub fn follow_plot(source: &str, followed: &Followed) -> String {
 /// The check as a table that palpate fits and imports.
 #[must_use]
 pub fn follow_table(followed: &Followed) -> String {
-    let mut table = "time_s,depth_mm,force_n,commanded_n,torque_nmm,bias_v\n".to_owned();
+    let mut table = "time_s,depth_mm,force_n,commanded_n,torque_nmm,bias_v,phase\n".to_owned();
+    let ramp = followed.settings.ramp();
     for one in &followed.samples {
-        let row = [
+        let numbers = [
             one.t.0,
             one.depth.0,
             one.measured.0,
@@ -221,8 +271,13 @@ pub fn follow_table(followed: &Followed) -> String {
             one.torque,
             one.bias.0,
         ];
-        table.push_str(&row.map(|value| value.to_string()).join(","));
-        table.push('\n');
+        let phase = if one.t <= ramp {
+            Phase::Ramp
+        } else {
+            Phase::Hold
+        };
+        table.push_str(&numbers.map(|value| value.to_string()).join(","));
+        table.push_str(&format!(",{}\n", phase.name()));
     }
     table
 }

@@ -5,6 +5,7 @@ pub mod activity;
 pub mod event_log;
 pub mod frame_meter;
 pub mod keys;
+pub mod pace;
 pub mod palette;
 pub mod rail;
 pub mod run_strip;

@@ -369,9 +369,14 @@ const PART: Duration = Duration::from_millis(100);
 /// The source's check of its feedback, simulated: a slider pushes the rack, a load cell measures.
 #[derive(Clone, Debug, Serialize)]
 pub struct Followed {
+    /// What was done.
+    #[serde(skip)]
+    pub settings: CheckSettings,
     /// What was measured; in a table of its own.
     #[serde(skip)]
     pub samples: Vec<CheckSample>,
+    /// The body rendered.
+    pub body: ModifiedKelvin,
     /// How many.
     #[serde(rename = "samples")]
     pub count: usize,
@@ -383,11 +388,17 @@ pub struct Followed {
     pub offset_n: f64,
     /// See [`Self::offset_n`].
     pub scatter_n: f64,
+    /// Friction of the motor at the rack that the drive does not make up for, in N.
+    pub friction_n: f64,
+    /// Drag of the drive at the slider's speed, in N.
+    pub drag_n: f64,
     /// Torque-force calibration: force at the rack per volt of bias.
     pub calibration: Option<BiasCalibration>,
     /// The body that a fit of the measured force finds, as the slider felt it.
     pub fit: Option<FitReport>,
-    /// Why one of the two is not there, one sentence each.
+    /// The body that a fit of the commanded force finds.
+    pub fit_commanded: Option<FitReport>,
+    /// Why one of these is not there, one sentence each.
     pub refusals: Vec<String>,
 }
 
@@ -396,7 +407,7 @@ pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result
     let mut samples = Vec::new();
     let made = run_check(settings, |one| samples.push(*one), progress);
     made.map_err(|err| err.to_string())?;
-    let until = Seconds(settings.depth.0 / settings.speed.0);
+    let until = settings.ramp();
     let ramp = || samples.iter().filter(|one| one.t <= until);
     let count = ramp().count().max(1) as f64;
     let error = |one: &CheckSample| one.measured.0 - one.commanded.0;
@@ -404,28 +415,37 @@ pub fn follow(settings: &CheckSettings, progress: &mut dyn FnMut(f64)) -> Result
     let squares: f64 = ramp().map(|one| (error(one) - offset).powi(2)).sum();
     let peak = |of: fn(&CheckSample) -> f64| samples.iter().map(of).fold(0.0, f64::max);
     let points = calibration_points(&samples, until);
-    let felt: Vec<FitSample> = samples
-        .iter()
-        .map(|one| FitSample {
-            t: one.t,
-            depth: one.depth,
-            force: one.measured,
-            sigma: Newtons(1.0),
-        })
-        .collect();
     let mut refusals = Vec::new();
     let calibration = BiasCalibration::fit(&points);
     let calibration = calibration.map_err(|err| refusals.push(format!("no calibration: {err}")));
-    let fit = fit(&felt, &FitOptions::default());
-    let fit = fit.map_err(|err| refusals.push(format!("no fit: {err}")));
+    let mut fitted = |force: fn(&CheckSample) -> Newtons, which: &str| {
+        let felt = samples.iter().map(|one| FitSample {
+            t: one.t,
+            depth: one.depth,
+            force: force(one),
+            sigma: Newtons(1.0),
+        });
+        let found = fit(&felt.collect::<Vec<_>>(), &FitOptions::default());
+        let found =
+            found.map_err(|err| refusals.push(format!("no fit of the {which} force: {err}")));
+        found.ok()
+    };
+    let fit = fitted(|one| one.measured, "measured");
+    let fit_commanded = fitted(|one| one.commanded, "commanded");
+    let torque = settings.torque();
     Ok(Followed {
+        settings: *settings,
+        body: settings.body,
         count: samples.len(),
         peak_commanded_n: peak(|one| one.commanded.0),
         peak_measured_n: peak(|one| one.measured.0),
         offset_n: offset,
         scatter_n: (squares / count).sqrt(),
+        friction_n: (1.0 - torque.friction_share) * torque.friction().0,
+        drag_n: torque.damping() * settings.speed.0,
         calibration: calibration.ok(),
-        fit: fit.ok(),
+        fit,
+        fit_commanded,
         refusals,
         samples,
     })

@@ -8,6 +8,7 @@ pub mod extremes;
 pub mod feel;
 pub mod find;
 pub mod fit;
+pub mod follow_session;
 pub mod haptics;
 pub mod haptics_tape;
 pub mod imports;

@@ -150,3 +150,76 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
         stderr(&other)
     );
 }
+
+#[test]
+fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction() {
+    let at = tempfile::tempdir().unwrap();
+    let follow = |words: &[&str]| palpate(at.path(), &[&["haptics", "follow"], words].concat());
+    let found = json(&follow(&["thesis", "--out", "followed", "--json"]));
+    let value = |fit: &serde_json::Value, name: &str| {
+        let all = fit["parameters"].as_array().unwrap().iter();
+        let one = all.clone().find(|one| one["name"] == name).unwrap();
+        (
+            one["value"].as_f64().unwrap(),
+            one["std_error"].as_f64().unwrap(),
+        )
+    };
+    // What the motor's constants say: 8.1 mN m over 10 mm, and 17.6 N s/m at 0.75 mm/s.
+    let [friction, drag] = ["friction_n", "drag_n"].map(|name| found[name].as_f64().unwrap());
+    assert!(
+        (friction - 0.81).abs() < 1e-3 && (drag - 0.0132).abs() < 1e-4,
+        "{found}"
+    );
+    for (name, body) in [
+        ("mu1", 0.05333),
+        ("mu3", 4.345e-4),
+        ("tau_sig", 0.06),
+        ("tau_eps", 1.023),
+    ] {
+        for fit in ["fit", "fit_commanded"] {
+            let (found, error) = value(&found[fit], name);
+            // The slave is where whole pulses put it, so that a fit is a few per cent off.
+            assert!(
+                (found - body).abs() < 6.0 * error,
+                "{fit} {name}: {found} ± {error}"
+            );
+        }
+    }
+    // Friction is all that the two fits differ in.
+    let (commanded, _) = value(&found["fit_commanded"], "f_offset");
+    let (measured, _) = value(&found["fit"], "f_offset");
+    assert!(
+        (measured - commanded - friction).abs() < 0.02,
+        "{measured} {commanded}"
+    );
+
+    // The session is one like any other, says that it is simulated and has that fit.
+    let info = json(&palpate(at.path(), &["info", "followed", "--json"]));
+    assert_eq!(info["samples"], 1800);
+    assert_eq!(info["imported"]["file"], "follow.csv");
+    let notes = info["notes"].to_string();
+    assert!(notes.contains("simulated, no tissue was touched"), "{info}");
+    let fitted = json(&palpate(at.path(), &["fit", "followed", "--json"]));
+    for name in ["mu1", "mu2", "mu3", "tau_sig", "tau_eps", "f_offset"] {
+        let (a, b) = (value(&fitted, name).0, value(&found["fit"], name).0);
+        assert!((a / b - 1.0).abs() < 1e-6, "{name}: {a} {b}");
+    }
+    let exported = palpate(at.path(), &["export", "followed", "--format", "csv"]);
+    assert!(exported.status.success(), "{}", stderr(&exported));
+    // No engine decided anything, so nothing is there to replay; that is said and nothing else.
+    let replayed = palpate(at.path(), &["replay", "followed"]);
+    assert!(stderr(&replayed).contains("no decisions to replay"));
+    // It can be followed in its turn, and words explain the difference.
+    let again = stdout(&follow(&["followed", "--help-friction", "50"]));
+    assert!(
+        again.contains("fit of the commanded") && again.contains("takes that for relaxation"),
+        "{again}"
+    );
+    let taken = follow(&["thesis", "--out", "followed"]);
+    assert_eq!(taken.status.code(), Some(2));
+    assert!(
+        stderr(&taken).contains("followed exists already"),
+        "{}",
+        stderr(&taken)
+    );
+}

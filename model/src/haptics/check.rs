@@ -75,6 +75,22 @@ pub enum CheckError {
 const LONGEST_S: f64 = 86_400.0;
 
 impl CheckSettings {
+    /// The master's motor and what drives it.
+    #[must_use]
+    pub fn torque(&self) -> TorqueSettings {
+        TorqueSettings {
+            drive: self.drive,
+            friction_share: self.friction_share,
+            ..TorqueSettings::default()
+        }
+    }
+
+    /// When the slider is at its end and begins to hold.
+    #[must_use]
+    pub fn ramp(&self) -> Seconds {
+        Seconds(self.depth.0 / self.speed.0)
+    }
+
     /// How long it takes, if it can be made.
     fn seconds(&self) -> Result<f64, CheckError> {
         let above = [
@@ -97,7 +113,7 @@ impl CheckSettings {
         if self.hold.0.is_nan() || self.hold.0 < 0.0 {
             return Err(refusal("hold", self.hold.0, "s", "it is zero or more"));
         }
-        let seconds = self.depth.0 / self.speed.0 + self.hold.0;
+        let seconds = self.ramp().0 + self.hold.0;
         if seconds > LONGEST_S {
             return Err(refusal("duration", seconds, "s", "it is at most a day"));
         }
@@ -145,8 +161,7 @@ pub fn check(
         speed: settings.speed.0,
     };
     let mut all = SimulationSettings::of(settings.body, settings.period, slider(path));
-    all.system.torque.drive = settings.drive;
-    all.system.torque.friction_share = settings.friction_share;
+    all.system.torque = settings.torque();
     let mut simulation = Simulation::new(&all)?;
     let ticks = settings.period.ticks_in(Seconds(seconds));
     let apart = settings.period.ticks_in(Seconds(1.0 / settings.samples_hz));

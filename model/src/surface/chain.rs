@@ -1,6 +1,6 @@
 //! ChainMail, first moved first processed (Gibson, "3D ChainMail: a fast algorithm for deforming
 //! volumetric objects", Symposium on Interactive 3D Graphics 1997, 149-154), on a surface (Li & Brodlie,
-//! "Soft object modelling with generalised ChainMail", Comput. Graph. Forum 22 (2003) 717-727) whose
+//! "Soft object modelling with generalised ChainMail", Comput. Graph. Forum 22 (2003)) whose
 //! nodes move along z alone.
 //!
 //! A moved node offers each of its neighbours a move. A neighbour that is further away in height than

@@ -1,5 +1,5 @@
 //! Enhanced ChainMail (Schill, Gibson, Bender & Männer, "Biomechanical simulation of the vitreous humor
-//! in the eye using an enhanced ChainMail algorithm", MICCAI 1998, LNCS 1496, 679-687) along z: limits
+//! in the eye using an enhanced ChainMail algorithm", MICCAI 1998) along z: limits
 //! that differ from node to node, a link's being the mean of its nodes', and always the largest
 //! violation first, so that a deformation runs ahead where the tissue is stiff.
 //!

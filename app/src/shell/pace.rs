@@ -1,0 +1,102 @@
+//! How often the window is drawn: as often as an eye needs, and hardly ever while nobody looks.
+
+use eframe::egui::Context;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+/// Between two frames while something moves: 30 a second is what an eye needs on a chart.
+const MOVING: Duration = Duration::from_millis(33);
+/// Between two frames at rest: live values must not look frozen.
+const RESTING: Duration = Duration::from_millis(250);
+/// Between two frames at rest with no key or pointer used for [`UNUSED_S`]: what trips by itself is seen soon.
+const UNUSED: Duration = Duration::from_secs(1);
+/// So long after the last key or move of the pointer somebody is still there.
+const UNUSED_S: f64 = 5.0;
+
+/// How often the window is drawn.
+#[derive(Debug, Default)]
+pub struct FramePace {
+    used_at: f64,
+    is_unused: Arc<AtomicBool>,
+}
+
+impl FramePace {
+    /// Asks for the next frame.
+    pub fn next(&mut self, ctx: &Context, is_moving: bool, is_watched: bool) {
+        let (now, is_used) = ctx.input(|input| (input.time, !input.events.is_empty()));
+        if is_used || is_moving || is_watched {
+            self.used_at = now;
+        }
+        let is_unused = now > self.used_at + UNUSED_S;
+        self.is_unused.store(is_unused, Ordering::Relaxed);
+        ctx.request_repaint_after(match is_moving {
+            true => MOVING,
+            false => resting(is_unused),
+        });
+    }
+
+    /// Asks for a frame from another thread, where there is news.
+    pub fn waker(&self, ctx: &Context) -> impl Fn() + Send + 'static {
+        let (ctx, is_unused) = (ctx.clone(), Arc::clone(&self.is_unused));
+        move || ctx.request_repaint_after(resting(is_unused.load(Ordering::Relaxed)))
+    }
+}
+
+const fn resting(is_unused: bool) -> Duration {
+    if is_unused { UNUSED } else { RESTING }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{Event, Key, Modifiers, RawInput, ViewportId};
+
+    /// When the next frame is asked for after one at a time with these events.
+    fn next(
+        pace: &mut FramePace,
+        ctx: &Context,
+        time: f64,
+        events: Vec<Event>,
+        ways: [bool; 2],
+    ) -> Duration {
+        let input = RawInput {
+            time: Some(time),
+            events,
+            ..RawInput::default()
+        };
+        let [is_moving, is_watched] = ways;
+        let output = ctx.run_ui(input, |ui| pace.next(ui.ctx(), is_moving, is_watched));
+        output.viewport_output[&ViewportId::ROOT].repaint_delay
+    }
+
+    #[test]
+    fn an_unused_window_is_drawn_once_a_second_and_a_used_one_at_once_more_often() {
+        let (ctx, mut pace) = (Context::default(), FramePace::default());
+        // The first frames of egui ask for more themselves.
+        for step in 0..4 {
+            next(
+                &mut pace,
+                &ctx,
+                0.1 * f64::from(step),
+                Vec::new(),
+                [false; 2],
+            );
+        }
+        assert!(next(&mut pace, &ctx, 1.0, Vec::new(), [false; 2]) <= RESTING);
+        let unused = next(&mut pace, &ctx, 10.0, Vec::new(), [false; 2]);
+        assert!(unused > RESTING && unused <= UNUSED, "{unused:?}");
+        assert!(next(&mut pace, &ctx, 20.0, Vec::new(), [false, true]) <= RESTING);
+        assert!(next(&mut pace, &ctx, 30.0, Vec::new(), [true, false]) <= MOVING);
+        let key = Event::Key {
+            key: Key::F12,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        };
+        next(&mut pace, &ctx, 40.0, Vec::new(), [false; 2]);
+        assert!(next(&mut pace, &ctx, 41.0, vec![key], [false; 2]) <= RESTING);
+        assert!(next(&mut pace, &ctx, 45.0, Vec::new(), [false; 2]) <= RESTING);
+    }
+}

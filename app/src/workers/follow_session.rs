@@ -1,0 +1,69 @@
+//! The check of the feedback as a session: its table made into one as a foreign file is, and said to be simulated.
+
+use super::haptics::Followed;
+use crate::report::haptics::follow_table;
+use palpate_protocols::runner::wall_now;
+use palpate_sessions::import::{Kept, Told, keep, parse_foreign};
+use palpate_sessions::{Labels, new_session_id};
+use std::path::Path;
+
+/// Name of the table that is kept beside the log.
+const TABLE: &str = "follow.csv";
+
+/// Makes the session in a folder that is new or empty; `source` is where the body is from.
+pub fn keep_followed(followed: &Followed, source: &str, folder: &Path) -> Result<(), String> {
+    let table = follow_table(followed).into_bytes();
+    let foreign = parse_foreign(TABLE, table, &Told::default())?;
+    let at = wall_now().into();
+    for mut part in foreign.parts {
+        part.imported
+            .remarks
+            .insert(0, provenance(followed, source));
+        part.imported.facts = facts(followed, source);
+        let kept = Kept {
+            folder,
+            original: &foreign.bytes,
+            session_id: new_session_id(at),
+            at,
+            software_version: env!("CARGO_PKG_VERSION"),
+            labels: Labels {
+                specimen: format!("simulated master rendering {source}"),
+                indenter: "rack of the master".into(),
+                ..Labels::default()
+            },
+        };
+        keep(&part, kept).map_err(|err| err.to_string())?;
+    }
+    Ok(())
+}
+
+fn provenance(followed: &Followed, source: &str) -> String {
+    format!(
+        "simulated, no tissue was touched: palpate haptics follow pushed the rack of a simulated master, which rendered the body of {source}, and measured its force; friction of {:.3} N and drag of {:.3} N are in it",
+        followed.friction_n, followed.drag_n
+    )
+}
+
+/// What makes the same session again.
+fn facts(followed: &Followed, source: &str) -> Vec<(String, String)> {
+    let settings = &followed.settings;
+    let body = &followed.body;
+    let [mu1, mu2, mu3] = body.mu;
+    let all = [
+        ("made by", "palpate haptics follow".to_owned()),
+        ("body of", source.to_owned()),
+        ("tau_eps (s)", body.tau_eps.to_string()),
+        ("mu1 (N/mm)", mu1.to_string()),
+        ("mu2 (N/mm^2)", mu2.to_string()),
+        ("mu3 (N/mm^3)", mu3.to_string()),
+        ("tau_sig (N*s/mm^2)", body.tau_sig.to_string()),
+        ("speed (mm/s)", settings.speed.0.to_string()),
+        ("depth (mm)", settings.depth.0.to_string()),
+        ("hold (s)", settings.hold.0.to_string()),
+        (
+            "share of friction made up for",
+            settings.friction_share.to_string(),
+        ),
+    ];
+    all.map(|(name, value)| (name.to_owned(), value)).into()
+}
