@@ -42,7 +42,7 @@ fn is_the_surface(frame: &SceneFrame, task: &SceneTask) {
     assert_eq!(frame.heights.len(), frame.nodes * frame.nodes);
     for (index, height) in frame.heights.iter().enumerate() {
         let [x, y] = [index % frame.nodes, index / frame.nodes].map(|steps| steps as f64 * spacing);
-        let node = field.grid().nearest(x, y).unwrap();
+        let node = field.grid().nearest(x, y).expect("a node");
         let right = field.heights()[field.grid().index(node)] as f32;
         assert_eq!(height.to_bits(), right.to_bits(), "{index}");
     }
