@@ -6,10 +6,14 @@
 
 mod beat;
 mod led;
+pub mod scene;
+pub mod scene_file;
 mod simulated;
+pub mod taped;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};
 pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
 pub use palpate_drivers::priority;
+pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;

@@ -1,0 +1,121 @@
+//! What is said of a scene's run, its plan and its curves.
+
+use super::haptics::run_text;
+use crate::workers::scene::Played;
+use crate::workers::scene_bench::Bench;
+use palpate_model::surface::ScenePlan;
+
+/// A run in words.
+#[must_use]
+pub fn played_text(played: &Played) -> String {
+    let mut lines = vec![format!(
+        "scene '{}', {} x {} nodes, path {}: {} ticks, as deep as {:.2} mm, up to {:.2} N",
+        played.name,
+        played.nodes,
+        played.nodes,
+        played.path,
+        played.ticks,
+        played.depth_max_mm,
+        played.force_max_n
+    )];
+    for (why, share) in &played.why {
+        lines.push(format!("{:>4.0} %  {why}", 100.0 * share));
+    }
+    lines.push(run_text(&played.paced));
+    let work = 1e6 * played.paced.kept.work.p99_9.0;
+    lines.push(if played.is_within_budget {
+        format!(
+            "999 ticks in a thousand take {work:.0} us or less, within the budget of {} us",
+            played.tick_us
+        )
+    } else {
+        format!(
+            "one tick in a thousand takes more than {work:.0} us, and the budget is {} us; take fewer nodes, or end other programs",
+            played.tick_us
+        )
+    });
+    lines.push(format!("surface {}", played.surface_hash));
+    lines.join("\n")
+}
+
+/// A plan in words: what is taken, what that costs, what was left out.
+#[must_use]
+pub fn plan_text(plan: &ScenePlan) -> String {
+    let mut lines = vec![format!(
+        "plan: {0} x {0} nodes, {1}, cut {2}: shape within {3:.3} mm, force within {4:.4} N, {5:.1} us a tick",
+        plan.mesh.nodes,
+        plan.step.scheme.name(),
+        match plan.cut.threshold_mm > 0.0 {
+            true => plan.cut.words(),
+            false => "nowhere".to_owned(),
+        },
+        plan.shape_error_mm,
+        plan.force_error_n,
+        plan.cost_us
+    )];
+    for dropped in &plan.dropped {
+        lines.push(format!(
+            "left out: {} (error {:.4} {}, {:.1} us saved)",
+            dropped.what, dropped.error, dropped.unit, dropped.saved_us
+        ));
+    }
+    for (part, why) in plan.inert {
+        lines.push(format!("without effect: {part}, as {why}"));
+    }
+    lines.join("\n")
+}
+
+/// Measured curves in words; a star marks what nothing beats in both error and time.
+#[must_use]
+pub fn bench_text(bench: &Bench) -> String {
+    let star = |is_on: &bool| if *is_on { "*" } else { " " };
+    let machine = &bench.machine;
+    let mut lines = vec![format!(
+        "{}, {} cores, {} build",
+        machine.cpu, machine.cores, machine.profile
+    )];
+    lines.push("mesh: nodes a side, largest error of shape, time of a tick".to_owned());
+    for (mesh, is_on) in bench.curves.meshes.iter().zip(&bench.meshes_on_front) {
+        lines.push(format!(
+            "{} {:>5}  {:>8.4} mm  {:>8.1} us  {:>8.0} Hz at most",
+            star(is_on),
+            mesh.nodes,
+            mesh.error_mm,
+            mesh.cost_us,
+            1e6 / mesh.cost_us
+        ));
+    }
+    lines.push("cut: largest error of shape, share of a mesh's time".to_owned());
+    for cut in &bench.curves.cuts {
+        let words = match (cut.range, cut.threshold_mm > 0.0) {
+            (None, false) => "none".to_owned(),
+            _ => cut.words(),
+        };
+        lines.push(format!(
+            "  {words:<28}  {:>8.4} mm  {:>5.0} %",
+            cut.error_mm,
+            100.0 * cut.cost_share
+        ));
+    }
+    lines.push("integrator: step, largest error of force, time of a tick".to_owned());
+    for (step, is_on) in bench.curves.steps.iter().zip(&bench.steps_on_front) {
+        lines.push(format!(
+            "{} {:<30} {:>6.2} ms  {:>9.2e} N  {:>7.3} us",
+            star(is_on),
+            step.scheme.name(),
+            1e3 * step.step_s,
+            step.error_n,
+            step.cost_us
+        ));
+    }
+    lines.push("nodes moved in a millisecond".to_owned());
+    for one in &bench.methods {
+        lines.push(format!(
+            "  {:<20} {:>5} nodes a side  {:>9.0}",
+            one.method, one.nodes, one.nodes_per_ms
+        ));
+    }
+    lines.extend(bench.plan.as_ref().map(plan_text));
+    lines.extend(bench.no_plan.as_ref().map(|none| none.why.clone()));
+    lines.join("\n")
+}

@@ -1,0 +1,149 @@
+//! A scene in real time, its recording, and the recording computed again.
+
+use super::haptics::{Paced, body_of};
+use super::recorded::{Again, RecordedTicks, Replayed, computed_again};
+use palpate_model::scene::{Scene, ScenePath, WhyNoForce};
+use palpate_protocols::haptics::SceneLoop;
+use palpate_protocols::haptics::scene::{COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row};
+use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_sessions::ticks::{Recording, SETTINGS};
+use serde::Serialize;
+use std::path::Path;
+use std::time::Duration;
+
+/// Between two looks at a scene that runs: half a frame.
+const LOOK: Duration = Duration::from_millis(8);
+
+/// A scene file with its body, and what is to be known of that; without a file the scene that is built in.
+pub fn scene_of(file: Option<&Path>) -> Result<(SceneFile, Vec<String>), String> {
+    let Some(path) = file else {
+        return Ok((SceneFile::default(), Vec::new()));
+    };
+    let called = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|err| format!("cannot read {called} ({err}); give a scene file"))?;
+    let mut scene = SceneFile::parse(&called, &text)?;
+    let mut notes = Vec::new();
+    if let Some(source) = scene.source.take() {
+        // A source is named from where its file is.
+        let folder = path.parent().unwrap_or(Path::new(""));
+        let found = body_of(&folder.join(&source))?;
+        scene.body = found.body;
+        notes = found.notes;
+    }
+    Ok((scene, notes))
+}
+
+/// What a scene did in real time.
+#[derive(Clone, Debug, Serialize)]
+pub struct Played {
+    /// Its name.
+    pub name: String,
+    /// The hand's path.
+    pub path: &'static str,
+    /// Nodes along a side.
+    pub nodes: usize,
+    /// Ticks that the scene made.
+    pub ticks: u64,
+    /// Greatest depth of a frame in mm.
+    pub depth_max_mm: f64,
+    /// Largest force of a frame in N.
+    pub force_max_n: f64,
+    /// What took force away, with its share of the frames.
+    pub why: Vec<(&'static str, f64)>,
+    /// Hash of the surface at the end.
+    pub surface_hash: String,
+    /// The budget of a tick in microseconds, and whether 999 ticks in a thousand kept to it.
+    pub tick_us: f64,
+    /// See [`Self::tick_us`].
+    pub is_within_budget: bool,
+    /// How the loop kept its time.
+    #[serde(flatten)]
+    pub paced: Paced,
+}
+
+/// Runs a scene, its mesh known, in real time along a path, `laps` times, and records it in a new folder if one is given.
+pub fn play(
+    file: &SceneFile,
+    (path, laps): (ScenePath, u32),
+    record: Option<&Path>,
+    progress: &mut dyn FnMut(f64),
+) -> Result<Played, String> {
+    let nodes = file
+        .nodes
+        .ok_or("a scene without nodes was played; this is a mistake in palpate")?;
+    let scene = file.scene(nodes)?;
+    let settings = *scene.settings();
+    let recorder = record.map(|folder| SceneRecorder::start(folder, &file.text(), COLUMNS));
+    let mut live = SceneLoop::start_laps(scene, (Some(path), laps), recorder.transpose()?)?;
+    let priority = live.granted().to_string();
+    let whole = path.seconds() * f64::from(laps);
+    let (mut depth_max_mm, mut force_max_n) = (0.0_f64, 0.0_f64);
+    let mut seen: Vec<(WhyNoForce, u64)> = Vec::new();
+    while !live.is_over() && live.is_alive() {
+        std::thread::sleep(LOOK);
+        let tick = live.view().tick;
+        depth_max_mm = depth_max_mm.max(tick.depth);
+        let [x, y, z] = tick.force;
+        force_max_n = force_max_n.max(x.hypot(y).hypot(z));
+        match seen.iter_mut().find(|(why, _)| *why == tick.why) {
+            Some((_, count)) => *count += 1,
+            None => seen.push((tick.why, 1)),
+        }
+        progress(settings.period.time_of(tick.tick).seconds().0 / whole);
+    }
+    let end = live
+        .stop()
+        .ok_or("the scene's loop failed; this is a mistake in palpate")?;
+    let recorded = end.recorded.transpose()?;
+    seen.sort_by_key(|(_, count)| std::cmp::Reverse(*count));
+    let frames = seen.iter().map(|(_, count)| *count).sum::<u64>().max(1) as f64;
+    let tick_us = file.tolerances.tick_us;
+    Ok(Played {
+        name: file.name.clone(),
+        path: path.name(),
+        nodes: settings.nodes,
+        ticks: end.scene.ticks(),
+        depth_max_mm,
+        force_max_n,
+        why: seen
+            .iter()
+            .map(|(why, count)| (why.words(), *count as f64 / frames))
+            .collect(),
+        surface_hash: format!("{:016x}", end.scene.hash()),
+        tick_us,
+        is_within_budget: 1e6 * end.kept.work.p99_9.0 <= tick_us,
+        paced: Paced {
+            rate_hz: settings.period.hz(),
+            busy_threads: 0,
+            priority,
+            kept: end.kept,
+            recorded: recorded.map(RecordedTicks::from),
+        },
+    })
+}
+
+impl Again<3, 10> for Scene {
+    fn tick(&mut self, row: &SceneRow) -> SceneRow {
+        let (hand, elapsed) = scene_input(row);
+        let told = self.tick_after(hand, elapsed);
+        scene_row(hand, elapsed, &told)
+    }
+
+    fn left(&self) -> u64 {
+        self.hash()
+    }
+}
+
+/// Computes every tick of a recording again from its inputs.
+pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, String> {
+    let found = Recording::read(folder, COLUMNS)?;
+    let called = folder.join(SETTINGS).display().to_string();
+    let file = SceneFile::parse(&called, &found.settings)?;
+    let nodes = file
+        .nodes
+        .ok_or_else(|| format!("{called} leaves its mesh open; a recording names its nodes"))?;
+    let mut scene = file.scene(nodes)?;
+    let name = format!("scene '{}'", file.name);
+    Ok(computed_again(&name, &found, COLUMNS, &mut scene, progress))
+}
