@@ -7,6 +7,7 @@ use crate::screens::approach::Approach;
 use crate::screens::calibration::{CalibrationScreen, Facts};
 use crate::screens::extremes::ExtremesScreen;
 use crate::screens::form::{Bench, ProtocolForm};
+use crate::screens::haptics::HapticsScreen;
 use crate::screens::library::LibraryScreen;
 use crate::screens::models::ModelsScreen;
 use crate::screens::review::ReviewScreen;
@@ -71,6 +72,7 @@ pub struct WorkbenchApp {
     pub(crate) review: ReviewScreen,
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
+    pub(crate) haptics: HapticsScreen,
     pub(crate) trade: TradeScreen,
     pub(crate) calibration: CalibrationScreen,
     pub(crate) events: EventLog,
@@ -157,6 +159,7 @@ impl WorkbenchApp {
             review: ReviewScreen::new(curves_in.clone()),
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
+            haptics: HapticsScreen::default(),
             calibration,
             trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
@@ -206,6 +209,12 @@ impl WorkbenchApp {
         self.extremes.rows()
     }
 
+    /// The haptics screen.
+    #[must_use]
+    pub fn haptics(&self) -> &HapticsScreen {
+        &self.haptics
+    }
+
     /// What the window is in the middle of.
     #[must_use]
     pub fn intent(&self) -> Intent {
@@ -241,10 +250,24 @@ impl WorkbenchApp {
         if run_in_progress(&self.snapshot).is_some() {
             return Err("a run is in progress and would disturb the times".into());
         }
-        if self.models.is_busy() || self.extremes.is_busy() {
+        let others = [
+            self.models.is_busy(),
+            self.extremes.is_busy(),
+            self.haptics.is_busy(),
+            self.trade.is_busy(),
+        ];
+        if others.contains(&true) {
             return Err("other work is under way and would disturb the times".into());
         }
         Ok(())
+    }
+
+    /// Whether the haptic loop may run now, or why not: its priority would disturb a run.
+    pub(crate) fn loop_verdict(&self) -> Result<(), String> {
+        match self.is_busy() {
+            true => Err("a run is in progress and would be disturbed".into()),
+            false => Ok(()),
+        }
     }
 
     /// Does what was asked for.
@@ -254,6 +277,7 @@ impl WorkbenchApp {
                 Command::Start => self.start(),
                 Command::Stop => {
                     self.palette.close();
+                    self.haptics.stop_loop();
                     self.operator(Operator::Stop);
                 }
                 Command::Halt => self.operator(Operator::Halt),
@@ -307,6 +331,7 @@ impl WorkbenchApp {
                         }
                     }
                     Screen::Extremes => self.extremes.start(ctx),
+                    Screen::Haptics => self.haptics.start_check(ctx),
                     Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
@@ -315,7 +340,15 @@ impl WorkbenchApp {
                     Screen::Models => self.models.cancel(),
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),
+                    Screen::Haptics => self.haptics.cancel(),
                 },
+                Command::LoopStart => {
+                    if self.loop_verdict().is_ok() {
+                        self.screen = Screen::Haptics;
+                        self.haptics.start_loop();
+                    }
+                }
+                Command::LoopStop => self.haptics.stop_loop(),
                 Command::Review(sessions) => {
                     self.screen = Screen::Review;
                     self.review.open(sessions, ctx);
@@ -521,6 +554,8 @@ impl WorkbenchApp {
         let view = first_view(&request.plan);
         let (reply, answer) = sync_channel(1);
         self.refusal = None;
+        // Nothing comes between a rig and its runner.
+        self.haptics.stop_loop();
         match self.runner.request(Request::Run(Box::new(request), reply)) {
             Ok(()) => {
                 self.start = Start::Asked(answer);
@@ -587,6 +622,7 @@ impl eframe::App for WorkbenchApp {
         match self.dialog.poll() {
             Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
             Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),
+            Some((Ask::Body, path)) => self.haptics.take(&path),
             Some((Ask::Protocol, path)) => self.read_protocol(|chooser| chooser.read(&path, ctx)),
             None => {}
         }
@@ -604,6 +640,7 @@ impl eframe::App for WorkbenchApp {
         self.review.poll(ctx);
         self.models.poll();
         self.extremes.poll();
+        self.haptics.poll();
         self.trade.poll();
         self.calibration.poll();
         if self.screen == Screen::Library {
@@ -628,7 +665,8 @@ impl eframe::App for WorkbenchApp {
         self.remember(ctx);
         let is_quiet = run_in_progress(&self.snapshot).is_none()
             && self.intent() == Intent::None
-            && !is_motion_possible(&self.snapshot);
+            && !is_motion_possible(&self.snapshot)
+            && !self.haptics.is_running();
         // On the rig's screen somebody may press the cell by hand.
         self.pace.next(ctx, !is_quiet, self.screen == Screen::Rig);
     }

@@ -48,6 +48,10 @@ pub enum Command {
     Work,
     /// End the work of the screen shown.
     CancelWork,
+    /// Start the haptic loop on the body and device that were checked.
+    LoopStart,
+    /// Stop the haptic loop.
+    LoopStop,
     /// Change between the light and the dark theme.
     SwitchTheme,
     /// Look at sessions on the review screen, instead of those there.

@@ -8,6 +8,7 @@ use crate::plots::force_time::{force_time_ui, head_ui};
 use crate::plots::residual::residual_ui;
 use crate::screens::calibration::Facts;
 use crate::screens::form::Checked;
+use crate::screens::haptics::Offered;
 use crate::screens::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
 use crate::screens::results_panel::results_ui;
 use crate::screens::rig::Facts as RigFacts;
@@ -180,6 +181,7 @@ impl WorkbenchApp {
             Screen::Run => self.run_ui(ui, commands),
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
+            Screen::Haptics => self.haptics_ui(ui, commands),
             Screen::Trade => self.trade_ui(ui, commands),
             Screen::Calibration => self.calibration_ui(ui, commands),
         }
@@ -270,6 +272,24 @@ impl WorkbenchApp {
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.extremes.middle_ui(ui));
+    }
+
+    fn haptics_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let verdict = self.loop_verdict();
+        let library = self.catalog.chosen().first().cloned();
+        let offered = Offered {
+            review: self.review.front_session(),
+            library: library.as_deref(),
+        };
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
+            self.haptics.left_ui(ui, &offered, &verdict, commands);
+        });
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.haptics.right_ui(ui)
+        });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.haptics.middle_ui(ui));
     }
 
     fn models_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {

@@ -8,8 +8,9 @@ use palpate_model::haptics::simulation::SimulationSettings;
 use palpate_model::surface::{
     Contact, Cut, Grid, HeightField, Method, Node, Recovery, Shear, Side, Surface,
 };
+use palpate_model::units::MmPerS;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::haptics::{Beat, Simulated, Ticking};
+use palpate_protocols::haptics::{Beat, Led, Simulated, Ticking};
 
 fn device(period: Period) -> Simulated {
     let path = HandPath::RampHold {
@@ -34,6 +35,20 @@ fn a_tick_allocates_nothing() {
     });
     assert_eq!(counted.count_total, 0, "{counted:?}");
     assert!(seen.snapshot.is_whole());
+    // Nor does one whose hand is led from a window.
+    let hand = Hand::firm(HandPath::Still { at: 0.0 });
+    let settings = SimulationSettings::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
+    let mut led = Led::new(&settings, MmPerS(50.0)).expect("a device");
+    let (lead, mut live) = (led.lead(), led.live().clone());
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..20_000_u64 {
+            lead.to((tick / 1_000) as f64);
+            led.tick(1);
+            led.show(&mut live);
+        }
+    });
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+    assert!(live.last.snapshot.is_whole() && live.count() == 5_000);
     // The counter counts.
     let counted = allocation_counter::measure(|| drop(std::hint::black_box(vec![1_u8; 100])));
     assert_eq!(counted.count_total, 1);

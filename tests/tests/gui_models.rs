@@ -2,7 +2,9 @@
 #![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
 
 use eframe::egui::{Key, Modifiers};
+use egui_kittest::kittest::Queryable;
 use palpate_model::families::by_key;
+use palpate_model::haptics::Flags;
 use palpate_model::{Depth, Seconds};
 use palpate_protocols::runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
@@ -134,4 +136,128 @@ fn the_extremes_are_tested_in_the_window() {
     assert!(flow.says("every case is right or refused with its reason"));
     assert!(flow.window.state().extremes_rows().unwrap().len() > 100);
     flow.window.check_accessibility();
+}
+
+/// The device of the guide's example: it buzzes without its guards.
+fn type_buzz(flow: &mut Flow) {
+    flow.click("current");
+    for (name, text) in [("damping", "0.5"), ("friction", "0"), ("delay", "2")] {
+        flow.type_into(name, text);
+    }
+}
+
+fn check_haptics(flow: &mut Flow) {
+    flow.click("Check  F6");
+    flow.wait("the check", |window| {
+        let haptics = window.state().haptics();
+        haptics.looked().is_some() && !haptics.is_busy()
+    });
+    flow.window.run_steps(3);
+}
+
+#[test]
+fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
+    let mut flow = Flow::open(TimeScale::Max);
+    screen(&mut flow, Key::Num9);
+    assert!(flow.says("nothing checked yet") && flow.says("check this setting first"));
+    assert!(!flow.is_enabled("Start the loop"));
+    flow.window.check_accessibility();
+    flow.type_into("rate", "100");
+    assert!(flow.says("choose from 250 Hz to 10000 Hz"));
+    assert!(!flow.is_enabled("Check  F6"));
+    flow.type_into("rate", "1000");
+    type_buzz(&mut flow);
+    check_haptics(&mut flow);
+    let looked = flow.window.state().haptics().looked().unwrap();
+    let checked = &looked.as_ref().unwrap().checked;
+    // The source thesis's body: the model itself returns energy below 0.712 mm.
+    assert!((checked.margin.cycles[0].to.0 - 0.712).abs() < 1e-3);
+    assert!(checked.tried[0].buzz_share > 0.5);
+    let sentences = checked.sentences.clone();
+    for sentence in &sentences {
+        assert!(flow.says(sentence), "{sentence}");
+    }
+    for words in [
+        "the body's lag",
+        "the device has 0.50 N s/m",
+        "the model itself returns energy",
+        "without guards: buzzes",
+        "with guards: ",
+    ] {
+        assert!(flow.says(words), "{words}");
+    }
+    flow.window.check_accessibility();
+    assert!(flow.is_enabled("Start the loop"));
+    // Another device is another check.
+    flow.type_into("delay", "3");
+    assert!(!flow.is_enabled("Start the loop"));
+    flow.type_into("delay", "2");
+    assert!(flow.is_enabled("Start the loop"));
+    // A body that is not there is named.
+    flow.type_into("body", "/nowhere/at-all");
+    check_haptics(&mut flow);
+    assert!(flow.says("/nowhere/at-all"));
+    assert!(!flow.is_enabled("Start the loop"));
+}
+
+/// Depth of the slave and force commanded, as the screen has them.
+fn felt(window: &Window) -> [f64; 2] {
+    let feel = window.state().haptics().feel();
+    feel.map_or([0.0; 2], |feel| {
+        let seen = &feel.last().snapshot;
+        [seen.depth.0, seen.force.0]
+    })
+}
+
+#[test]
+fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
+    let mut flow = Flow::open(TimeScale::Max);
+    screen(&mut flow, Key::Num9);
+    check_haptics(&mut flow);
+    flow.click("Start the loop");
+    flow.wait("the loop", |window| {
+        let feel = window.state().haptics().feel();
+        feel.is_some_and(|feel| feel.kept().work.count > 0)
+    });
+    // Above the surface there is none, and the screen says so.
+    flow.click("Lift off");
+    flow.wait("the words", |window| {
+        window.state().haptics().feel().is_some_and(|feel| {
+            let flags = feel.flags();
+            flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
+        })
+    });
+    flow.window.run_steps(2);
+    assert!(flow.says("Why no force?") && flow.says("the force is zero"));
+    for words in [
+        "force commanded",
+        "p99.9",
+        "ticks a second",
+        "priority",
+        "no buzz",
+    ] {
+        assert!(flow.says(words), "{words}");
+    }
+    flow.window.check_accessibility();
+    // What was checked is what runs: it cannot be changed meanwhile.
+    assert!(!flow.is_enabled("Check  F6"));
+    flow.click("Ramp and hold");
+    flow.wait("a force", |window| felt(window)[1] > 1.0);
+    flow.click("Lift off");
+    flow.wait("none", |window| felt(window)[1] == 0.0);
+    // The slider leads the hand as the buttons do.
+    let at_hand = |flow: &Flow| flow.window.state().haptics().feel().unwrap().place();
+    let before = at_hand(&flow);
+    flow.window.get_all_by_label("hand").next().unwrap().focus();
+    flow.window.run_steps(2);
+    for _ in 0..3 {
+        flow.window.key_press(Key::ArrowRight);
+        flow.window.run_steps(2);
+    }
+    assert!(at_hand(&flow) > before, "{before} {}", at_hand(&flow));
+    // The key that stops a rig stops this too, and what was seen stays.
+    flow.window.key_press(Key::F12);
+    flow.window.run_steps(2);
+    assert!(!flow.window.state().haptics().is_running());
+    assert!(flow.says("the loop does not run") && flow.says("force commanded"));
 }

@@ -130,6 +130,33 @@ fn show(window: &mut Window, session: &Path) {
     window.run_steps(3);
 }
 
+/// Checks the device of the guide's example on the haptics screen, unless that is done.
+fn check_buzz(window: &mut Window) {
+    if window.state().haptics().looked().is_some() {
+        return;
+    }
+    window.get_by_label("current").click_accesskit();
+    window.run_steps(2);
+    for (name, text) in [("damping", "0.5"), ("friction", "0"), ("delay", "2")] {
+        window.get_by_label(name).focus();
+        window.step();
+        window.get_by_label(name).set_text_value_accesskit(text);
+        window.run_steps(2);
+    }
+    window.get_by_label("Check  F6").click_accesskit();
+    for _ in 0..2000 {
+        window.step();
+        if window.state().haptics().looked().is_some() {
+            // A caret in a field would come and go.
+            window.get_by_label("Check  F6").focus();
+            window.run_steps(2);
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("the check never ended");
+}
+
 #[test]
 fn every_screen_looks_as_it_did() {
     if !has_renderer() {
@@ -150,6 +177,9 @@ fn every_screen_looks_as_it_did() {
             window.run_steps(3);
             if screen == Screen::Review {
                 show(&mut window, &library.join("ramp-hold-lab"));
+            }
+            if screen == Screen::Haptics {
+                check_buzz(&mut window);
             }
             settle(&mut window);
             // Who sits at this computer is not in the picture; how long a search took is, in a few digits.

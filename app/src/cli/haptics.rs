@@ -68,7 +68,7 @@ struct DeviceArgs {
     #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "N")]
     friction: Option<f64>,
     /// Ticks from an encoder count to the force made of it
-    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=16), value_name = "TICKS")]
+    #[arg(long, default_value_t = 0, value_parser = clap::value_parser!(u8).range(0..=i64::from(Setting::DELAY_MAX)), value_name = "TICKS")]
     delay: u8,
     /// End of the stroke in mm
     #[arg(long, default_value_t = 30.0, value_parser = number, allow_negative_numbers = true, value_name = "MM")]
@@ -108,8 +108,8 @@ impl DeviceArgs {
             damping: 1e-3 * not_negative("damping", self.damping)?,
             friction: friction.transpose()?.map(Newtons),
             delay: usize::from(self.delay),
-            deepest: Depth(positive("depth", self.depth, 100.0, "mm")?),
-            speed: MmPerS(positive("speed", self.speed, 1000.0, "mm/s")?),
+            deepest: Depth(positive("depth", self.depth, Setting::DEPTH_MAX, "mm")?),
+            speed: MmPerS(positive("speed", self.speed, Setting::SPEED_MAX, "mm/s")?),
         })
     }
 }
@@ -247,7 +247,8 @@ fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     let body = body(&args.source, setting.deepest, output)?;
     let bar = output.share_bar(1000);
     let checked = check(body, &setting, &mut |share| {
-        bar.set_position((1000.0 * share) as u64)
+        bar.set_position((1000.0 * share) as u64);
+        true
     });
     bar.finish_and_clear();
     let checked = checked.map_err(Failure::usage)?;

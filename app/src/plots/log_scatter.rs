@@ -49,14 +49,20 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
             .map(|mark| place(mark.at))
             .collect()
     };
-    let all = of(&mut (0..scatter.marks.len()));
-    let front = match scatter.has_front {
+    let best: Vec<usize> = match scatter.has_front {
         true => {
             let places: Vec<[f64; 2]> = scatter.marks.iter().map(|mark| mark.at).collect();
-            of(&mut front(&places).into_iter())
+            front(&places)
         }
         false => Vec::new(),
     };
+    let front = of(&mut best.iter().copied());
+    // Where there is a front, a point beside it is hollow.
+    let is_hollow = |i: &usize| scatter.has_front && !best.contains(i);
+    let parts = [false, true].map(|hollow| {
+        let count = scatter.marks.len();
+        of(&mut (0..count).filter(|i| is_hollow(i) == hollow))
+    });
     let chosen = of(&mut scatter.chosen.into_iter());
     let names: Vec<(PlotPoint, String)> = scatter
         .marks
@@ -88,11 +94,14 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
             let line = Line::new("best for its cost", PlotPoints::Owned(ends.to_vec()));
             plot_ui.line(line.color(tokens.text_quiet).allow_hover(false));
         }
-        plot_ui.points(
-            Points::new("measured", PlotPoints::Owned(all))
-                .radius(3.5)
-                .color(tokens.series),
-        );
+        for (points, is_filled) in parts.into_iter().zip([true, false]) {
+            plot_ui.points(
+                Points::new("measured", PlotPoints::Owned(points))
+                    .radius(3.5)
+                    .filled(is_filled)
+                    .color(tokens.series),
+            );
+        }
         plot_ui.points(
             Points::new("recommended", PlotPoints::Owned(chosen))
                 .radius(7.0)

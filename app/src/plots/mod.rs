@@ -5,12 +5,14 @@ pub mod course;
 pub mod force_depth;
 pub mod force_time;
 pub mod log_scatter;
+pub mod margin;
 pub mod navigate;
 pub mod over_depth;
 pub mod over_time;
 mod points;
 pub mod residual;
 pub mod stretches;
+pub mod strip;
 pub(crate) mod style;
 
 pub use points::{CycleLoop, PlotCache};

@@ -8,6 +8,9 @@ use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
 const STEPS_ACROSS: f64 = 9.0;
 const STEPS_UP: f64 = 6.0;
 
+/// Between two labelled steps, at least: closer ones lose their labels.
+const POINTS_PER_STEP: f32 = 75.0;
+
 /// Unlabelled lines between two labelled ones.
 const MINOR_PER_MAJOR: f64 = 5.0;
 
@@ -35,6 +38,11 @@ pub(crate) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
             }
             HoverPosition::Elsewhere { .. } => None,
         })
+}
+
+/// Labelled steps that a plot of a width in points has room for.
+pub(super) fn steps_across(width: f32) -> f64 {
+    f64::from(width / POINTS_PER_STEP).clamp(2.0, STEPS_ACROSS)
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.

@@ -8,7 +8,9 @@ use crate::theme::tokens::LIGHT;
 use crate::widgets::uncertain::plain;
 use crate::workers::haptics::{Checked, Followed, Paced, Tried};
 use palpate_model::fit::FitReport;
+use palpate_model::haptics::Flags;
 use palpate_model::haptics::check::CheckSample;
+use palpate_model::haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_protocols::haptics::timing::Spread;
@@ -40,7 +42,9 @@ pub fn check_text(checked: &Checked) -> String {
     lines.join("\n")
 }
 
-fn tried_text(tried: &Tried) -> String {
+/// What the simulated device did, in words.
+#[must_use]
+pub fn tried_text(tried: &Tried) -> String {
     let guards = if tried.is_guarded { "with" } else { "without" };
     let buzz = match (tried.buzz, tried.buzz_until_s) {
         (Some((frequency, amplitude)), Some(until)) => format!(
@@ -57,6 +61,39 @@ fn tried_text(tried: &Tried) -> String {
         "{guards} guards: {buzz}; the place swings by {:.3} mm in the last second, force up to {:.2} N, damping added up to {:.1} N s/m, {returned}",
         tried.swing_mm, tried.force_max_n, tried.damping_added_max
     )
+}
+
+/// Why less force is felt than the model has, one sentence for each cause, the loop's own lateness last; empty if
+/// nothing takes any away. `missed` counts ticks that were lately due while the loop was away.
+#[must_use]
+pub fn why_less(flags: Flags, missed: u64) -> Vec<String> {
+    let bounds = [Flags::FORCE_MAX, Flags::SLEW].map(|bound| bound.when(flags.has(bound)));
+    let causes = std::iter::once(flags.less_force()).chain(bounds);
+    let mut causes: Vec<String> = causes
+        .flat_map(|flags| flags.sentences().map(str::to_owned))
+        .collect();
+    if missed > 0 {
+        let ticks = if missed == 1 { "tick" } else { "ticks" };
+        causes.push(format!(
+            "the loop was late: {missed} {ticks} passed without it; the force held"
+        ));
+    }
+    causes
+}
+
+/// The margin at the depth of the moment, in words.
+#[must_use]
+pub fn margin_text(margin: &Margin) -> String {
+    let depth = margin.depth;
+    match margin.ratio() {
+        None => format!("At {depth:.2} the body brings all the damping it needs."),
+        Some(ratio) if margin.is_enough() => {
+            format!("At {depth:.2} the device has {ratio:.1} times the damping needed.")
+        }
+        Some(ratio) => format!(
+            "At {depth:.2} the device has {ratio:.2} of the damping needed; the guard adds the rest."
+        ),
+    }
 }
 
 /// A run of the loop in words.
@@ -242,4 +279,46 @@ pub fn follow_table(followed: &Followed) -> String {
         table.push_str(&format!(",{}\n", phase.name()));
     }
     table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::haptics::margin::Cause;
+    use palpate_model::units::{Depth, Newtons};
+
+    #[test]
+    fn what_takes_force_away_is_told_and_nothing_else() {
+        assert!(why_less(Flags::NONE, 0).is_empty());
+        // These are told elsewhere: they take no force.
+        assert!(why_less(Flags::BUZZ | Flags::MARGIN | Flags::PASSIVITY, 0).is_empty());
+        let all = why_less(Flags::NO_CONTACT | Flags::SOFT_START | Flags::FORCE_MAX, 1);
+        assert_eq!(all.len(), 4);
+        for words in [
+            "no contact",
+            "after the start",
+            "at its limit",
+            "1 tick passed",
+        ] {
+            assert!(
+                all.iter().any(|one| one.contains(words)),
+                "{words}: {all:?}"
+            );
+        }
+    }
+
+    #[test]
+    fn a_margin_in_words_says_which_side_of_enough_it_is_on() {
+        let margin = |needed, has| Margin {
+            depth: Depth(10.0),
+            needed,
+            has,
+            cause: Cause::Tick,
+            friction_needed: Newtons(0.0),
+            friction: Newtons(0.0),
+        };
+        assert!(margin_text(&margin(-0.1, 0.0)).contains("all the damping"));
+        assert!(margin_text(&margin(0.002, 0.008)).contains("4.0 times"));
+        assert!(margin_text(&margin(0.002, 0.001)).contains("0.50 of"));
+    }
 }

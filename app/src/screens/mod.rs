@@ -6,6 +6,7 @@ pub mod calibration;
 pub mod exact_fit;
 pub mod extremes;
 pub mod form;
+pub mod haptics;
 pub mod library;
 pub mod models;
 pub mod parameters;

@@ -46,6 +46,10 @@ impl WorkbenchApp {
             Some(_) => Ok(()),
             None => Err("the link is there".to_owned()),
         };
+        let is_felt = match self.haptics.is_running() {
+            true => Ok(()),
+            false => Err("the loop does not run".to_owned()),
+        };
         actions.extend([
             Action::new("Retract after a stop", "F8", Command::Retract).if_ok(can_retract),
             Action::new("Close the session after a stop", "", Command::CloseSession).if_ok(is_held),
@@ -55,6 +59,8 @@ impl WorkbenchApp {
             Action::new("List the serial ports again", "", Command::ListPorts),
             Action::new("Begin the work of this screen", "F6", Command::Work),
             Action::new("Cancel the work of this screen", "", Command::CancelWork),
+            Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(self.loop_verdict()),
+            Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(is_felt),
         ]);
         for screen in Screen::ALL {
             let keys = format!("Ctrl+{}", screen.key().symbol_or_name());

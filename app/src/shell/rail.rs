@@ -26,11 +26,13 @@ pub enum Screen {
     Trade,
     /// What happens at the ends of every range.
     Extremes,
+    /// A body felt through a device.
+    Haptics,
 }
 
 impl Screen {
     /// All, in the order of a day's work.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::Rig,
         Self::Calibration,
         Self::Run,
@@ -39,6 +41,7 @@ impl Screen {
         Self::Models,
         Self::Trade,
         Self::Extremes,
+        Self::Haptics,
     ];
 
     /// Name on the rail.
@@ -53,6 +56,7 @@ impl Screen {
             Self::Models => "Models",
             Self::Trade => "Trade",
             Self::Extremes => "Extremes",
+            Self::Haptics => "Haptics",
         }
     }
 
@@ -74,6 +78,7 @@ impl Screen {
             Self::Models => "how much model a recording needs",
             Self::Trade => "what accuracy costs on this machine",
             Self::Extremes => "what is right and what is refused at the ends of every range",
+            Self::Haptics => "feel a body through a device: margin, buzz and loop",
         }
     }
 
@@ -89,6 +94,7 @@ impl Screen {
             Self::Models => Key::Num6,
             Self::Trade => Key::Num7,
             Self::Extremes => Key::Num8,
+            Self::Haptics => Key::Num9,
         }
     }
 }

@@ -15,6 +15,9 @@ const RUN: usize = 256;
 /// Speed of the thesis protocol in mm/s.
 const THESIS_SPEED: f64 = 0.75;
 
+/// Name of the first target.
+pub(super) const THESIS: &str = "thesis body";
+
 /// What rows of one target stand for, and how.
 struct Target {
     /// In words.
@@ -34,7 +37,7 @@ struct Target {
 /// decades; a Fung spectrum of two and a half decades.
 const TARGETS: [Target; 5] = [
     Target {
-        name: "thesis body",
+        name: THESIS,
         body: ("series-3", &[1.023], &[0.05333, -0.0086, 0.000_434_5, 0.06]),
         is_fitted: true,
         comes_back: false,

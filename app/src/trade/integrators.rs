@@ -76,7 +76,7 @@ pub(super) fn job_of(row: &IntegratorRow) -> usize {
     scheme.unwrap_or(0) * Precision::ALL.len() + precision.unwrap_or(0)
 }
 
-fn job<'a, R: Real + 'a>(scheme: Scheme) -> Job<'a> {
+pub(super) fn job<'a, R: Real + 'a>(scheme: Scheme) -> Job<'a> {
     let depths: Vec<R> = (0..RUN)
         .map(|i| R::of(30.0 * i as f64 / RUN as f64))
         .collect();

@@ -10,11 +10,13 @@ mod live;
 mod machine;
 mod paths;
 mod picture;
+mod scene;
 pub(crate) mod text;
 mod timing;
 
 pub use machine::{age_days, this_machine, version};
 pub use picture::svg;
+pub use scene::{SCENE_PEAK, measure_scene};
 pub use text::text;
 
 use chrono::{DateTime, SecondsFormat, Utc};

@@ -2,6 +2,8 @@
 //! how the loop keeps its time on this computer.
 
 use super::fit::fit_source;
+use super::margin::{MarginPoint, margin_curve};
+use crate::report::thin::thin;
 use palpate_model::fit::{FitOptions, FitReport, FitSample, fit};
 use palpate_model::haptics::check::{
     CheckSample, CheckSettings, calibration_points, check as run_check,
@@ -106,6 +108,13 @@ pub struct Setting {
 }
 
 impl Setting {
+    /// Longest stroke offered, in mm.
+    pub const DEPTH_MAX: f64 = 100.0;
+    /// Fastest hand offered, in mm/s.
+    pub const SPEED_MAX: f64 = 1000.0;
+    /// Most ticks of delay offered.
+    pub const DELAY_MAX: u8 = 16;
+
     /// The source's device: a voltage drive, its motor's friction, a stroke of 30 mm.
     #[must_use]
     pub fn source(period: Period) -> Self {
@@ -155,6 +164,12 @@ impl Setting {
 /// How long the hand holds at the end of the stroke in s: a buzz of a few hertz shows within one.
 const HOLD: f64 = 3.0;
 
+/// How long before the hand arrives a trace begins, in s.
+const BEFORE: f64 = 0.5;
+
+/// Columns that a trace is thinned for: more than half a screen is wide.
+const COLUMNS: usize = 1000;
+
 /// What the simulated device did.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Tried {
@@ -176,6 +191,9 @@ pub struct Tried {
     pub damping_added_max: f64,
     /// What was special on the way, one sentence each.
     pub flags: Vec<&'static str>,
+    /// Place of the device in mm over time in s from when the hand arrived, thinned; for pictures.
+    #[serde(skip)]
+    pub trace: Vec<[f64; 2]>,
 }
 
 /// What is known of a body on a device before play.
@@ -189,28 +207,30 @@ pub struct Checked {
     pub sentences: Vec<String>,
     /// Without guards, then with them.
     pub tried: [Tried; 2],
+    /// Damping needed over depth, in its parts; for pictures.
+    #[serde(skip)]
+    pub curve: Vec<MarginPoint>,
 }
 
-/// Looks at a body on a device: the margin, and the simulated device without guards and with them.
+/// Looks at a body on a device: the margin, and the simulated device without guards and with them. `is_going` hears
+/// the share done and ends it early.
 pub fn check(
     body: ModifiedKelvin,
     setting: &Setting,
-    progress: &mut dyn FnMut(f64),
+    is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Checked, String> {
-    let guarded = setting.simulation(body, true);
-    let margin = guarded
-        .system
-        .watch()
-        .before_play(setting.deepest, setting.speed);
-    let without = try_out(body, setting, false, &mut |share| progress(0.5 * share))?;
+    let watch = setting.simulation(body, true).system.watch();
+    let margin = watch.before_play(setting.deepest, setting.speed);
+    let without = try_out(body, setting, false, &mut |share| is_going(0.5 * share))?;
     let with = try_out(body, setting, true, &mut |share| {
-        progress(0.5 + 0.5 * share)
+        is_going(0.5 + 0.5 * share)
     })?;
     Ok(Checked {
         body,
         sentences: margin.sentences(),
         margin,
         tried: [without, with],
+        curve: margin_curve(&watch, setting.deepest, setting.speed),
     })
 }
 
@@ -218,7 +238,7 @@ fn try_out(
     body: ModifiedKelvin,
     setting: &Setting,
     is_guarded: bool,
-    progress: &mut dyn FnMut(f64),
+    is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Tried, String> {
     let settings = setting.simulation(body, is_guarded);
     let mut device = Simulated::new(&settings).map_err(|err| err.to_string())?;
@@ -228,7 +248,7 @@ fn try_out(
     let mut buzz: Option<Buzz> = None;
     let (mut buzzed, mut held, mut until) = (0_u64, 0_u64, None);
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    let mut flags = Flags::NONE;
+    let (mut flags, mut trace) = (Flags::NONE, Vec::new());
     let (mut force_max, mut energy_min, mut damping_max) = (0.0_f64, 0.0_f64, 0.0_f64);
     for tick in 0..ticks {
         device.tick(1);
@@ -238,6 +258,9 @@ fn try_out(
         force_max = force_max.max(seen.force.0.abs());
         energy_min = energy_min.min(seen.energy);
         damping_max = damping_max.max(seen.damping);
+        if one.t.0 > arrives - BEFORE {
+            trace.push([one.t.0 - arrives, one.x]);
+        }
         if one.t.0 > arrives {
             held += 1;
             if seen.buzz.is_some() {
@@ -252,8 +275,8 @@ fn try_out(
         if tick >= last_second {
             (low, high) = (low.min(one.x), high.max(one.x));
         }
-        if tick.is_multiple_of(100) {
-            progress(tick as f64 / ticks as f64);
+        if tick.is_multiple_of(100) && !is_going(tick as f64 / ticks as f64) {
+            return Err("ended before it was done".into());
         }
     }
     Ok(Tried {
@@ -266,6 +289,7 @@ fn try_out(
         energy_min_mj: energy_min,
         damping_added_max: 1e3 * damping_max,
         flags: flags.sentences().collect(),
+        trace: thin(trace.iter().copied(), COLUMNS),
     })
 }
 

@@ -15,6 +15,8 @@ pub enum Ask {
     Table,
     /// A protocol to run.
     Protocol,
+    /// A recorded session to feel.
+    Body,
 }
 
 /// A dialog that may be open.
@@ -34,7 +36,7 @@ impl PathDialog {
         let dialog = rfd::FileDialog::new();
         let pick = move || match ask {
             Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-            Ask::Session => dialog.set_title("Folder of a session").pick_folder(),
+            Ask::Session | Ask::Body => dialog.set_title("Folder of a session").pick_folder(),
             Ask::Table => dialog
                 .set_title("Table of a recording")
                 .add_filter("tables", &["csv", "tsv", "txt"])

@@ -9,10 +9,10 @@ use super::controller::{ControllerSettings, PassivityController};
 use super::force::ForceLaw;
 use super::guard::{ForceGuard, GuardSettings};
 use super::rig::{
-    Drive, Hand, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
+    Drive, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
 };
 use super::{BuzzDetector, BuzzSettings, DELAY_MAX, Flags, PassivityObserver, Period};
-use crate::units::{Depth, Newtons, Seconds};
+use crate::units::{Depth, MmPerS, Newtons, Seconds};
 
 /// A device and the hand on it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -92,6 +92,8 @@ pub struct Plant {
     thermal: ThermalState,
     queue: [Command; DELAY_MAX + 1],
     tick: u64,
+    /// The tick at which the hand's path began.
+    begun: u64,
     hand_force: f64,
     motor_force: f64,
 }
@@ -111,9 +113,26 @@ impl Plant {
             thermal: thermal.thermal.cold(),
             queue: [Command::Force(settings.held); DELAY_MAX + 1],
             tick: 0,
+            begun: 0,
             hand_force: 0.0,
             motor_force: 0.0,
         }
+    }
+
+    /// From the next tick on the hand goes from where it wants to be now to another place, at `speed` above zero.
+    pub fn lead(&mut self, to: f64, speed: MmPerS) {
+        let from = self.settings.hand.path.at(self.path_time());
+        self.begun = self.tick;
+        self.settings.hand.path = HandPath::RampHold {
+            from,
+            to,
+            speed: speed.0,
+        };
+    }
+
+    /// How long the hand has been on its path at the begin of a tick, in s.
+    fn path_time(&self) -> f64 {
+        (self.tick - self.begun) as f64 * self.settings.period.seconds().0
     }
 
     /// What its encoder says.
@@ -180,7 +199,7 @@ impl Plant {
         };
         let parts = settings.parts.max(1);
         let dt = settings.period.seconds().0 / f64::from(parts);
-        let begun = self.tick as f64 * settings.period.seconds().0;
+        let begun = self.path_time();
         for part in 0..parts {
             let t = begun + (f64::from(part) + 0.5) * dt;
             let path = &settings.hand.path;

@@ -163,6 +163,11 @@ impl Simulation {
         &self.plant
     }
 
+    /// The hand goes to another place: see [`Plant::lead`].
+    pub fn lead(&mut self, to: f64, speed: MmPerS) {
+        self.plant.lead(to, speed);
+    }
+
     /// The system.
     #[must_use]
     pub fn system(&self) -> &MasterSlave {

@@ -5,9 +5,11 @@
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
 mod beat;
+mod led;
 mod simulated;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};
+pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
 pub use palpate_drivers::priority;
 pub use simulated::Simulated;

@@ -3,6 +3,7 @@
 use super::Ticking;
 use palpate_model::haptics::MasterSlaveError;
 use palpate_model::haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
+use palpate_model::units::MmPerS;
 
 /// Ticks of a stall that the device is led through; after longer ones it stands where it was.
 const LED_MAX: u64 = 1000;
@@ -20,6 +21,11 @@ impl Simulated {
         let mut simulation = Simulation::new(settings)?;
         let last = simulation.tick();
         Ok(Self { simulation, last })
+    }
+
+    /// The hand goes to another place in mm, at a speed above zero.
+    pub fn lead(&mut self, place_mm: f64, speed: MmPerS) {
+        self.simulation.lead(place_mm, speed);
     }
 
     /// The newest tick.

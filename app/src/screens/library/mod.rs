@@ -221,7 +221,7 @@ impl LibraryScreen {
     }
 
     /// Folders of the sessions chosen.
-    fn chosen(&mut self) -> Rc<Vec<PathBuf>> {
+    pub(crate) fn chosen(&mut self) -> Rc<Vec<PathBuf>> {
         if self.chosen.0 != self.list.choice()
             && let Ok(library) = &self.library
         {

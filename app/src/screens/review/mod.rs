@@ -24,7 +24,7 @@ use crate::workers::review::{Leader, Quantity};
 use crate::workers::task::Task;
 use analyses::AnalysesPanel;
 use eframe::egui::{Context, Ui};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 /// A session as it is looked at.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -165,6 +165,12 @@ impl ReviewScreen {
         self.subjects.push(Subject::new(looked, self.next_id));
         self.next_id += 1;
         self.poll(ctx);
+    }
+
+    /// The folder of the session in front.
+    #[must_use]
+    pub fn front_session(&self) -> Option<&Path> {
+        Some(&self.front()?.looked.session)
     }
 
     /// Shows another view of them.

@@ -1,21 +1,26 @@
 //! What accuracy costs on this machine: what is wanted on the left, error over time in the middle, what to
 //! use on the right.
 
+mod shown;
+
 use crate::command::{Command, Commands};
-use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
+use crate::plots::log_scatter::{Scatter, log_scatter_ui};
 use crate::report::text::capital;
 use crate::theme::Tokens;
-use crate::trade::text::{advice, digits, percent, plain, terms, time};
-use crate::trade::{self, Extent};
+use crate::trade::text::{advice, percent, terms};
+use crate::trade::{self, Extent, SCENE_PEAK};
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
-use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::table::table_ui;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::task::Task;
 use eframe::egui::{Context, Label, RichText, TextEdit, Ui, vec2};
+use palpate_model::surface::{Needs, NoPlan, SceneCurves, ScenePlan, plan};
 use palpate_model::tolerance::{BadTolerance, Tolerance};
 use palpate_model::trade::{Recommendation, TradeCurves};
+use palpate_model::units::Newtons;
 use palpate_sessions::trade::{read_trade, trade_file, write_trade};
+use shown::{Shown, cuts, families, fits, integrators, meshes, plan_lines, steps};
 use std::path::PathBuf;
 
 /// Share of the height that the plot gets.
@@ -23,19 +28,36 @@ const PLOT_SHARE: f32 = 0.5;
 /// Updates a second that can be asked for, as on the command line.
 const RATE_MAX: f64 = 1e9;
 
+/// Largest error of shape in mm and longest tick in us that can be asked for.
+const SHAPE_MAX: f64 = 1e3;
+const BUDGET_MAX: f64 = 1e6;
+
 /// What is shown.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum View {
     Integrators,
     Families,
     Fit,
+    Mesh,
+    Cut,
+    Step,
 }
 
-const VIEWS: [(View, &str); 3] = [
+const VIEWS: [(View, &str); 6] = [
     (View::Integrators, "Integrators"),
     (View::Families, "Families"),
     (View::Fit, "Fit"),
+    (View::Mesh, "Scene: mesh"),
+    (View::Cut, "Scene: influence"),
+    (View::Step, "Scene: step"),
 ];
+
+impl View {
+    /// Whether it shows curves of a scene.
+    const fn is_scene(self) -> bool {
+        matches!(self, Self::Mesh | Self::Cut | Self::Step)
+    }
+}
 
 /// Curves measured or read.
 pub struct Known {
@@ -56,6 +78,9 @@ pub struct TradeScreen {
     view: View,
     task: Task<Known>,
     is_read: bool,
+    shape: QuantityField,
+    budget: QuantityField,
+    scene: Task<SceneCurves>,
 }
 
 impl TradeScreen {
@@ -71,6 +96,9 @@ impl TradeScreen {
             view: View::Integrators,
             task: Task::default(),
             is_read: false,
+            shape: QuantityField::new(0.5),
+            budget: QuantityField::new(100.0),
+            scene: Task::default(),
         }
     }
 
@@ -79,6 +107,9 @@ impl TradeScreen {
         self.task.poll();
         self.rate.check(|rate| in_range(rate, RATE_MAX));
         self.share.check(|share| in_range(share, 100.0));
+        self.scene.poll();
+        self.shape.check(|shape| in_range(shape, SHAPE_MAX));
+        self.budget.check(|budget| in_range(budget, BUDGET_MAX));
     }
 
     /// The curves on the screen.
@@ -86,6 +117,12 @@ impl TradeScreen {
     pub fn curves(&self) -> Option<&TradeCurves> {
         let known = self.task.answer()?.as_ref().ok()?;
         Some(&known.curves)
+    }
+
+    /// The curves of a scene.
+    #[must_use]
+    pub fn scene_curves(&self) -> Option<&SceneCurves> {
+        self.scene.answer()?.as_ref().ok()
     }
 
     /// Reads the stored curves of this machine, the first time the screen is shown.
@@ -110,13 +147,21 @@ impl TradeScreen {
         });
     }
 
-    /// Measures.
+    /// Measures what is shown.
     pub fn start(&mut self, ctx: &Context) {
         let extent = if self.is_quick {
             Extent::Quick
         } else {
             Extent::Full
         };
+        if self.view.is_scene() {
+            self.scene.start("scene-curves", ctx, move |progress| {
+                let tell = |done, of, what: &str| progress.tell(done, of, what);
+                trade::measure_scene(extent, &tell)?
+                    .ok_or_else(|| "ended before it was done".to_owned())
+            });
+            return;
+        }
         let library = self.library.clone();
         self.task.start("trade", ctx, move |progress| {
             let tell = |done, of, what: &str| progress.tell(done, of, what);
@@ -133,7 +178,28 @@ impl TradeScreen {
 
     /// Ends a measurement under way.
     pub fn cancel(&self) {
-        self.task.cancel();
+        match self.view.is_scene() {
+            true => self.scene.cancel(),
+            false => self.task.cancel(),
+        }
+    }
+
+    /// Whether a measurement is under way.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some() || self.scene.standing().is_some()
+    }
+
+    /// The plan for what is wanted of a scene; none before its curves are measured.
+    fn planned(&self) -> Option<Result<ScenePlan, NoPlan>> {
+        let curves = self.scene_curves()?;
+        let needs = Needs {
+            force: self.tolerance.parse().ok()?,
+            peak: SCENE_PEAK,
+            shape_mm: self.shape.value.clone().ok()?,
+            budget_us: self.budget.value.clone().ok()?,
+        };
+        Some(plan(&needs, curves, 1.0))
     }
 
     fn wanted(&self) -> Result<(Tolerance, f64, f64), String> {
@@ -174,15 +240,28 @@ impl TradeScreen {
                 ui.add(Label::new(text.small()).wrap());
             }
         }
-        quantity_ui(ui, "rate", "updates a second", &mut self.rate);
-        quantity_ui(ui, "share", "% of each period", &mut self.share);
+        let is_scene = self.view.is_scene();
+        if is_scene {
+            quantity_ui(ui, "shape", "mm of error", &mut self.shape);
+            quantity_ui(ui, "budget", "us of each tick", &mut self.budget);
+        } else {
+            quantity_ui(ui, "rate", "updates a second", &mut self.rate);
+            quantity_ui(ui, "share", "% of each period", &mut self.share);
+        }
         section_ui(ui, "Measure");
         ui.checkbox(&mut self.is_quick, "few rows, rough times");
         ui.add_space(4.0);
-        match task_ui(ui, "Measure here  F6", &self.task, verdict) {
+        let pressed = match is_scene {
+            true => task_ui(ui, "Measure here  F6", &self.scene, verdict),
+            false => task_ui(ui, "Measure here  F6", &self.task, verdict),
+        };
+        match pressed {
             Some(Pressed::Start) => commands.push(Command::Work),
             Some(Pressed::Cancel) => commands.push(Command::CancelWork),
             None => {}
+        }
+        if is_scene {
+            return;
         }
         let Some(Ok(known)) = self.task.answer() else {
             return;
@@ -222,36 +301,25 @@ impl TradeScreen {
                 ui.selectable_value(&mut self.view, view, name);
             }
         });
-        let curves = match self.task.answer() {
-            Some(Ok(known)) => &known.curves,
-            Some(Err(reason)) => {
-                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
-                return;
-            }
-            None => {
+        let (shown, level) = match self.drawn() {
+            Ok(Some(shown)) => shown,
+            Ok(None) => {
                 let text = "nothing measured on this machine yet";
                 ui.label(RichText::new(text).color(tokens.text_quiet));
                 return;
             }
+            Err(reason) => {
+                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+                return;
+            }
         };
-        let shown = match self.view {
-            View::Integrators => integrators(curves),
-            View::Families => families(curves),
-            View::Fit => fits(curves),
-        };
-        let level = match (self.view, self.wanted()) {
-            (View::Integrators, Ok((tolerance, ..))) => Some(tolerance),
-            _ => None,
-        };
-        let peak = palpate_model::Newtons(curves.peak.ramp_hold_n);
-        let level = level.map(|tolerance| 100.0 * tolerance.in_newtons(peak).0 / peak.0);
         let height = ui.available_height() * PLOT_SHARE;
         ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
             let scatter = Scatter {
                 axes: shown.axes,
                 marks: &shown.marks,
                 has_front: self.view != View::Families,
-                chosen: None,
+                chosen: shown.chosen,
                 level,
             };
             log_scatter_ui(ui, shown.axes[0], &scatter);
@@ -259,10 +327,77 @@ impl TradeScreen {
         table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
     }
 
+    /// What the view shows and the level not to exceed in it, once that is measured.
+    fn drawn(&self) -> Result<Option<(Shown, Option<f64>)>, String> {
+        if self.view.is_scene() {
+            let planned = self.planned().and_then(Result::ok);
+            let curves = self.scene.answer().map(|answer| answer.as_ref());
+            let Some(curves) = curves.transpose().map_err(Clone::clone)? else {
+                return Ok(None);
+            };
+            let planned = planned.as_ref();
+            let shape = self.shape.value.clone().ok();
+            let force = self.tolerance.parse::<Tolerance>().ok();
+            let force = force.map(|tolerance| tolerance.in_newtons(SCENE_PEAK).0);
+            return Ok(Some(match self.view {
+                View::Cut => (cuts(curves, planned), shape),
+                View::Step => (steps(curves, planned), force),
+                _ => (meshes(curves, planned), shape),
+            }));
+        }
+        let known = self.task.answer().map(|answer| answer.as_ref());
+        let Some(known) = known.transpose().map_err(Clone::clone)? else {
+            return Ok(None);
+        };
+        let curves = &known.curves;
+        let peak = Newtons(curves.peak.ramp_hold_n);
+        let level = self.tolerance.parse::<Tolerance>().ok();
+        let level = level.map(|tolerance| 100.0 * tolerance.in_newtons(peak).0 / peak.0);
+        Ok(Some(match self.view {
+            View::Families => (families(curves), None),
+            View::Fit => (fits(curves), None),
+            _ => (integrators(curves), level),
+        }))
+    }
+
+    /// What a scene is to be made of.
+    fn plan_ui(&self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let quiet = |ui: &mut Ui, words: &str| {
+            ui.label(RichText::new(words).color(tokens.text_quiet));
+        };
+        let lines = |ui: &mut Ui, plan: &ScenePlan| {
+            for line in plan_lines(plan) {
+                ui.add(Label::new(line).wrap());
+                ui.add_space(4.0);
+            }
+        };
+        match self.planned() {
+            None if self.scene_curves().is_none() => quiet(ui, "measure first"),
+            None => quiet(ui, "the tolerance, shape or budget cannot be read"),
+            Some(Ok(plan)) => {
+                ui.label(RichText::new("the cheapest that holds both").strong());
+                lines(ui, &plan);
+            }
+            Some(Err(none)) => {
+                let why = format!("no plan: {}", none.why);
+                ui.add(Label::new(RichText::new(why).color(tokens.alarm_text)).wrap());
+                if let Some(plan) = &none.nearest {
+                    section_ui(ui, "Nearest within the budget");
+                    lines(ui, plan);
+                }
+            }
+        }
+    }
+
     /// What to use.
     pub fn right_ui(&self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "What to use");
+        if self.view.is_scene() {
+            self.plan_ui(ui);
+            return;
+        }
         let Some(recommendation) = self.recommendation() else {
             let text = match self.wanted() {
                 Err(_) => "the tolerance, rate or share cannot be read",
@@ -293,126 +428,4 @@ fn doubts(curves: &TradeCurves) -> Vec<String> {
         trade::version(),
         trade::age_days(curves),
     )
-}
-
-/// One table as points and rows.
-struct Shown {
-    axes: [&'static str; 2],
-    marks: Vec<Mark>,
-    columns: Vec<Column>,
-    rows: Vec<Row>,
-}
-
-impl Shown {
-    fn new(axes: [&'static str; 2], heads: &[&str]) -> Self {
-        let column = |(index, head): (usize, &&str)| match index {
-            0 => Column::words(head, 250.0),
-            _ => Column::numbers(head, 96.0),
-        };
-        Self {
-            axes,
-            marks: Vec::new(),
-            columns: heads.iter().enumerate().map(column).collect(),
-            rows: Vec::new(),
-        }
-    }
-
-    /// Adds a row, and its point where it has an error in percent.
-    fn add(
-        &mut self,
-        at: [Option<f64>; 2],
-        is_front: bool,
-        cells: Vec<String>,
-        hint: Option<String>,
-    ) {
-        if let [Some(cost), Some(error)] = at {
-            self.marks.push(Mark {
-                at: [cost, error],
-                name: cells.join("\n"),
-            });
-        }
-        let look = match (is_front, at[1]) {
-            (true, _) => RowLook::Marked,
-            (false, None) => RowLook::Quiet,
-            (false, Some(_)) => RowLook::Plain,
-        };
-        self.rows.push(Row { cells, look, hint });
-    }
-
-    /// With the front's rows first.
-    fn finished(mut self) -> Self {
-        self.rows.sort_by_key(|row| row.look != RowLook::Marked);
-        self
-    }
-}
-
-fn integrators(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
-        ["ns a second of simulated time", "error (% of peak force)"],
-        &["integrator", "step (ms)", "a step", "error (%)"],
-    );
-    for row in &curves.integrators {
-        let error = row.error.map(|error| 100.0 * error.share_of(&curves.peak));
-        let cells = vec![
-            format!("{}, {}", row.scheme.name(), row.precision.name()),
-            plain(1e3 * row.step_s),
-            time(row.cost.ns),
-            error.map_or("unstable".into(), digits),
-        ];
-        shown.add(
-            [Some(row.second_ns), error],
-            row.front,
-            cells,
-            row.refused.clone(),
-        );
-    }
-    shown.finished()
-}
-
-fn families(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
-        ["ns a step", "error (% of peak force)"],
-        &["family and what it stands for", "a step", "error (%)"],
-    );
-    for row in &curves.families {
-        let error = 100.0 * row.error_n / row.peak_n;
-        let cells = vec![
-            format!("{}, {}", row.family, row.target),
-            time(row.cost.ns),
-            digits(error),
-        ];
-        // Fronts belong to one target each and would cross in one picture.
-        shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
-        if let Some(last) = shown.rows.last_mut().filter(|_| row.front) {
-            last.look = RowLook::Marked;
-        }
-    }
-    shown.finished()
-}
-
-fn fits(curves: &TradeCurves) -> Shown {
-    let mut shown = Shown::new(
-        ["ns a fit", "error of tau (%)"],
-        &["recording or live fit", "time", "tau (%)"],
-    );
-    for row in &curves.fit {
-        let error = 100.0 * row.tau_error;
-        let cells = vec![
-            format!("{} Hz, {} samples", plain(row.rate_hz), row.samples),
-            time(row.cost.ns),
-            digits(error),
-        ];
-        shown.add([Some(row.cost.ns), Some(error)], row.front, cells, None);
-    }
-    for row in &curves.live {
-        let error = row.tau_error.map(|error| 100.0 * error);
-        let cells = vec![
-            format!("live, {} relaxation times, a sample", row.nodes),
-            time(row.cost.ns),
-            error.map_or("no answer".into(), digits),
-        ];
-        // A sample of the live fit is no fit: it has a row and no point.
-        shown.add([None, error], row.front, cells, None);
-    }
-    shown.finished()
 }

@@ -1,0 +1,147 @@
+//! The margin and the buzz, or the loop as it runs.
+
+use super::{HapticsScreen, Looked};
+use crate::plots::margin::{MarginPicture, margin_ui};
+use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
+use crate::theme::Tokens;
+use crate::workers::feel::{Feel, PAST_S};
+use crate::workers::haptics::Tried;
+use eframe::egui::{Color32, Label, RichText, Ui, vec2};
+use palpate_protocols::haptics::TrailPoint;
+
+/// What the middle shows.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub(super) enum View {
+    /// What was found before play.
+    #[default]
+    Margin,
+    /// The loop.
+    Live,
+}
+
+/// Room for a heading, its legend and the spaces between.
+const HEAD: f32 = 52.0;
+
+impl HapticsScreen {
+    /// The plots.
+    pub fn middle_ui(&mut self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            for (view, name) in [(View::Margin, "Before play"), (View::Live, "Live")] {
+                ui.selectable_value(&mut self.view, view, name);
+            }
+        });
+        let quiet = |ui: &mut Ui, words: &str| {
+            ui.label(RichText::new(words).color(tokens.text_quiet));
+        };
+        match (self.view, self.task.answer(), &self.feel) {
+            (View::Live, _, Some(feel)) => live_ui(ui, feel),
+            (View::Live, _, None) => quiet(ui, "the loop has not run yet"),
+            (View::Margin, Some(Ok(looked)), feel) => {
+                let running = feel.as_ref().filter(|feel| feel.is_running());
+                before_ui(ui, looked, running);
+            }
+            (View::Margin, Some(Err(reason)), _) => {
+                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+            }
+            (View::Margin, None, _) => quiet(ui, "nothing checked yet"),
+        }
+    }
+}
+
+fn before_ui(ui: &mut Ui, looked: &Looked, running: Option<&Feel>) {
+    let checked = &looked.checked;
+    let height = (ui.available_height() - 2.0 * HEAD) / 2.0;
+    ui.label(
+        RichText::new("Damping needed over depth")
+            .heading()
+            .strong(),
+    );
+    ui.allocate_ui(vec2(ui.available_width(), height + HEAD * 0.5), |ui| {
+        let picture = MarginPicture {
+            curve: &checked.curve,
+            has: 1e3 * checked.margin.worst.has,
+            cycles: &checked.margin.cycles,
+            now: running.map(|feel| feel.last().snapshot.depth.0),
+        };
+        margin_ui(ui, &picture);
+    });
+    ui.label(
+        RichText::new("Show the buzz: the device simulated")
+            .heading()
+            .strong(),
+    );
+    // The same heights in both, so that they compare.
+    let places = checked.tried.iter().flat_map(|tried| &tried.trace);
+    let ends = places.fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], point| {
+        [low.min(point[1]), high.max(point[1])]
+    });
+    ui.columns_const(|columns: &mut [Ui; 2]| {
+        for (ui, tried) in columns.iter_mut().zip(&checked.tried) {
+            tried_ui(ui, tried, ends);
+        }
+    });
+}
+
+fn tried_ui(ui: &mut Ui, tried: &Tried, [low, high]: [f64; 2]) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let (id, words, ink) = match tried.is_guarded {
+        false => ("unguarded", "without guards", tokens.limit),
+        true => ("guarded", "with guards", tokens.series),
+    };
+    let buzz = match tried.buzz_until_s {
+        Some(until) => format!("{words}: buzzes, last at {until:.2} s"),
+        None => format!("{words}: no buzz"),
+    };
+    ui.horizontal(|ui| legend_ui(ui, ink, &buzz));
+    let from = tried.trace.first().map_or(0.0, |point| point[0]);
+    let to = tried.trace.last().map_or(1.0, |point| point[0]);
+    let strip = Strip {
+        id,
+        axes: ["time from when the hand arrives (s)", "place (mm)"],
+        shown: from..=to,
+        least: low..=high,
+        curves: vec![Curve {
+            name: words,
+            ink,
+            points: tried.trace.clone(),
+        }],
+    };
+    strip_ui(ui, strip);
+}
+
+fn live_ui(ui: &mut Ui, feel: &Feel) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let end = feel.last().t.0.max(PAST_S);
+    let curve = |name, ink: Color32, of: fn(&TrailPoint) -> f64| Curve {
+        name,
+        ink,
+        points: feel.trail().map(|point| [point.t, of(point)]).collect(),
+    };
+    let model = curve("force of the model", tokens.text_quiet, |point| point.model);
+    let force = curve("force commanded", tokens.series, |point| point.force);
+    let torque = curve("torque commanded", tokens.limit, |point| point.torque);
+    let depth = curve("depth of the slave", tokens.series, |point| point.depth);
+    let height = (ui.available_height() - 3.0 * 0.7 * HEAD) / 3.0;
+    let strips = [
+        ("live_force", ["", "force (N)"], vec![model, force]),
+        ("live_torque", ["", "torque (N mm)"], vec![torque]),
+        ("live_depth", ["time (s)", "depth (mm)"], vec![depth]),
+    ];
+    for (id, axes, curves) in strips {
+        ui.horizontal(|ui| {
+            for curve in curves.iter().rev() {
+                legend_ui(ui, curve.ink, curve.name);
+            }
+        });
+        let strip = Strip {
+            id,
+            axes,
+            shown: end - PAST_S..=end,
+            // A loop at rest is a line at zero and no noise.
+            least: 0.0..=0.5,
+            curves,
+        };
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| strip_ui(ui, strip));
+    }
+}

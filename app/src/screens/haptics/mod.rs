@@ -1,0 +1,244 @@
+//! From model to touch: what damping a body needs of a device, and the loop itself with a hand led from here.
+
+mod form;
+mod middle;
+mod right;
+
+use crate::command::{Command, Commands};
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
+use crate::widgets::quantity_input::form_label;
+use crate::widgets::reason_button::reason_button;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::feel::Feel;
+use crate::workers::haptics::{Checked, Setting, body_of, check};
+use crate::workers::path_dialog::Ask;
+use crate::workers::task::Task;
+use eframe::egui::{Button, Context, Label, RichText, Slider, Ui, vec2};
+use form::HapticsForm;
+use middle::View;
+use std::path::{Path, PathBuf};
+
+/// How far above the surface a hand can be led, in mm.
+const ABOVE: f64 = 2.0;
+
+/// Sessions that other screens have in front.
+#[derive(Clone, Copy, Debug)]
+pub struct Offered<'a> {
+    /// On the review screen.
+    pub review: Option<&'a Path>,
+    /// In the library.
+    pub library: Option<&'a Path>,
+}
+
+/// A body on a device, looked at.
+pub struct Looked {
+    source: PathBuf,
+    setting: Setting,
+    notes: Vec<String>,
+    /// What was found.
+    pub checked: Checked,
+}
+
+/// The screen's state.
+#[derive(Default)]
+pub struct HapticsScreen {
+    form: HapticsForm,
+    is_open: bool,
+    task: Task<Looked>,
+    feel: Option<Feel>,
+    refusal: Option<String>,
+    view: View,
+}
+
+impl HapticsScreen {
+    /// Whether times measured now would be disturbed.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some() || self.is_running()
+    }
+
+    /// Whether the loop runs.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.feel.as_ref().is_some_and(Feel::is_running)
+    }
+
+    /// What was found of the body and device checked last.
+    #[must_use]
+    pub fn looked(&self) -> Option<&Result<Looked, String>> {
+        self.task.answer()
+    }
+
+    /// The loop that runs or ran last.
+    #[must_use]
+    pub fn feel(&self) -> Option<&Feel> {
+        self.feel.as_ref()
+    }
+
+    /// Takes a session or a table as the body's.
+    pub fn take(&mut self, path: &Path) {
+        self.form.take(path);
+    }
+
+    /// Fetches what is new.
+    pub fn poll(&mut self) {
+        self.task.poll();
+        self.form.check();
+        if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
+            self.refusal = Some(reason);
+        }
+    }
+
+    /// Checks what stands in the form.
+    pub fn start_check(&mut self, ctx: &Context) {
+        let Ok((source, setting)) = self.form.wanted() else {
+            return;
+        };
+        self.view = View::Margin;
+        self.task.start("haptics-check", ctx, move |progress| {
+            let tell = |share: f64, what: &str| {
+                progress
+                    .tell((1000.0 * share) as usize, 1000, what)
+                    .is_continue()
+            };
+            tell(0.0, "the body's fit");
+            let body = body_of(&source)?;
+            let checked = check(body.body, &setting, &mut |share| {
+                tell(share, "the simulated device")
+            })?;
+            let mut notes = body.notes.clone();
+            notes.extend(body.beyond(setting.deepest));
+            Ok(Looked {
+                source,
+                setting,
+                notes,
+                checked,
+            })
+        });
+    }
+
+    /// Ends a check under way.
+    pub fn cancel(&self) {
+        self.task.cancel();
+    }
+
+    /// The check of what stands in the form, or why the loop may not start.
+    fn checked(&self) -> Result<&Looked, String> {
+        let wanted = self.form.wanted()?;
+        match self.task.answer() {
+            Some(Ok(looked)) if (&looked.source, &looked.setting) == (&wanted.0, &wanted.1) => {
+                Ok(looked)
+            }
+            _ => Err("check this setting first".into()),
+        }
+    }
+
+    /// Starts the loop, unless it runs.
+    pub fn start_loop(&mut self) {
+        if self.is_running() {
+            return;
+        }
+        let started = self.checked().and_then(|looked| {
+            let setting = &looked.setting;
+            let settings = setting.simulation(looked.checked.body, !self.is_open);
+            Feel::start(&settings, setting.speed)
+        });
+        match started {
+            Ok(feel) => {
+                self.feel = Some(feel);
+                self.view = View::Live;
+                self.refusal = None;
+            }
+            Err(reason) => self.refusal = Some(reason),
+        }
+    }
+
+    /// Stops the loop.
+    pub fn stop_loop(&mut self) {
+        if let Some(feel) = &mut self.feel {
+            feel.stop();
+        }
+    }
+
+    /// What is asked for. `verdict` says whether the loop would disturb something.
+    pub fn left_ui(
+        &mut self,
+        ui: &mut Ui,
+        offered: &Offered<'_>,
+        verdict: &Result<(), String>,
+        commands: &mut Commands,
+    ) {
+        // What runs is what was checked: it is not to be changed under a hand.
+        let is_running = self.is_running();
+        ui.add_enabled_ui(!is_running, |ui| {
+            if self.form.ui(ui, offered) {
+                commands.push(Command::Choose(Ask::Body));
+            }
+        });
+        ui.add_space(6.0);
+        let wanted = match is_running {
+            true => Err("the loop runs".into()),
+            false => self.form.wanted().map(|_| ()),
+        };
+        match task_ui(ui, "Check  F6", &self.task, &wanted) {
+            Some(Pressed::Start) => commands.push(Command::Work),
+            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
+            None => {}
+        }
+        self.feel_ui(ui, verdict, commands);
+    }
+
+    fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        section_ui(ui, "Feel");
+        let is_running = self.is_running();
+        ui.add_enabled_ui(!is_running, |ui| {
+            ui.checkbox(&mut self.is_open, "without guards and controller");
+        });
+        if let Some(reason) = &self.refusal {
+            ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+        }
+        let size = vec2(170.0, 34.0);
+        if is_running {
+            let stop = Button::new("Stop the loop").min_size(size);
+            if ui.add(stop).place("Stop the loop").clicked() {
+                commands.push(Command::LoopStop);
+            }
+        } else {
+            let may = verdict.clone().and_then(|()| self.checked().map(|_| ()));
+            if reason_button(ui, "Start the loop", size, &may) {
+                commands.push(Command::LoopStart);
+            }
+        }
+        let (Some(feel), Some(Ok(looked))) = (&self.feel, self.task.answer()) else {
+            return;
+        };
+        if !is_running {
+            return;
+        }
+        let deepest = looked.setting.deepest.0;
+        let mut place = feel.place();
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "hand");
+            let slider = Slider::new(&mut place, -ABOVE..=deepest)
+                .step_by(0.1)
+                .suffix(" mm");
+            let slider = ui.add(slider).labelled_by(label.id).place("hand");
+            if slider.changed() {
+                feel.lead(place);
+            }
+        });
+        ui.horizontal(|ui| {
+            for (name, place) in [("Ramp and hold", deepest), ("Lift off", -ABOVE)] {
+                if ui.button(name).place(name).clicked() {
+                    feel.lead(place);
+                }
+            }
+        });
+        let words =
+            "the hand goes there at its speed; arrow keys move the slider when it has the focus";
+        ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+    }
+}

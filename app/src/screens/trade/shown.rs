@@ -1,0 +1,281 @@
+//! Tables of what was measured, as points and as rows.
+
+use crate::plots::log_scatter::Mark;
+use crate::trade::text::{digits, plain, time};
+use crate::widgets::table::{Column, Row, RowLook};
+use palpate_model::surface::{SceneCurves, ScenePlan};
+use palpate_model::trade::{TradeCurves, front};
+
+/// One table as points and rows.
+pub(super) struct Shown {
+    pub axes: [&'static str; 2],
+    pub marks: Vec<Mark>,
+    pub columns: Vec<Column>,
+    pub rows: Vec<Row>,
+    /// The mark of what is recommended.
+    pub chosen: Option<usize>,
+}
+
+impl Shown {
+    fn new(axes: [&'static str; 2], heads: &[&str]) -> Self {
+        let column = |(index, head): (usize, &&str)| match index {
+            0 => Column::words(head, 250.0),
+            _ => Column::numbers(head, 96.0),
+        };
+        Self {
+            axes,
+            marks: Vec::new(),
+            columns: heads.iter().enumerate().map(column).collect(),
+            rows: Vec::new(),
+            chosen: None,
+        }
+    }
+
+    /// Adds a row, and its point where it has an error in percent.
+    fn add(
+        &mut self,
+        at: [Option<f64>; 2],
+        is_front: bool,
+        cells: Vec<String>,
+        hint: Option<String>,
+    ) {
+        if let [Some(cost), Some(error)] = at {
+            self.marks.push(Mark {
+                at: [cost, error],
+                name: cells.join("\n"),
+            });
+        }
+        let look = match (is_front, at[1]) {
+            (true, _) => RowLook::Marked,
+            (false, None) => RowLook::Quiet,
+            (false, Some(_)) => RowLook::Plain,
+        };
+        self.rows.push(Row { cells, look, hint });
+    }
+
+    /// With the front's rows first.
+    fn finished(mut self) -> Self {
+        self.rows.sort_by_key(|row| row.look != RowLook::Marked);
+        self
+    }
+}
+
+pub(super) fn integrators(curves: &TradeCurves) -> Shown {
+    let mut shown = Shown::new(
+        ["ns a second of simulated time", "error (% of peak force)"],
+        &["integrator", "step (ms)", "a step", "error (%)"],
+    );
+    for row in &curves.integrators {
+        let error = row.error.map(|error| 100.0 * error.share_of(&curves.peak));
+        let cells = vec![
+            format!("{}, {}", row.scheme.name(), row.precision.name()),
+            plain(1e3 * row.step_s),
+            time(row.cost.ns),
+            error.map_or("unstable".into(), digits),
+        ];
+        shown.add(
+            [Some(row.second_ns), error],
+            row.front,
+            cells,
+            row.refused.clone(),
+        );
+    }
+    shown.finished()
+}
+
+pub(super) fn families(curves: &TradeCurves) -> Shown {
+    let mut shown = Shown::new(
+        ["ns a step", "error (% of peak force)"],
+        &["family and what it stands for", "a step", "error (%)"],
+    );
+    for row in &curves.families {
+        let error = 100.0 * row.error_n / row.peak_n;
+        let cells = vec![
+            format!("{}, {}", row.family, row.target),
+            time(row.cost.ns),
+            digits(error),
+        ];
+        // Fronts belong to one target each and would cross in one picture.
+        shown.add([Some(row.cost.ns), Some(error)], false, cells, None);
+        if let Some(last) = shown.rows.last_mut().filter(|_| row.front) {
+            last.look = RowLook::Marked;
+        }
+    }
+    shown.finished()
+}
+
+pub(super) fn fits(curves: &TradeCurves) -> Shown {
+    let mut shown = Shown::new(
+        ["ns a fit", "error of tau (%)"],
+        &["recording or live fit", "time", "tau (%)"],
+    );
+    for row in &curves.fit {
+        let error = 100.0 * row.tau_error;
+        let cells = vec![
+            format!("{} Hz, {} samples", plain(row.rate_hz), row.samples),
+            time(row.cost.ns),
+            digits(error),
+        ];
+        shown.add([Some(row.cost.ns), Some(error)], row.front, cells, None);
+    }
+    for row in &curves.live {
+        let error = row.tau_error.map(|error| 100.0 * error);
+        let cells = vec![
+            format!("live, {} relaxation times, a sample", row.nodes),
+            time(row.cost.ns),
+            error.map_or("no answer".into(), digits),
+        ];
+        // A sample of the live fit is no fit: it has a row and no point.
+        shown.add([None, error], row.front, cells, None);
+    }
+    shown.finished()
+}
+
+/// One curve of a scene: what each point is, its cost and error, and whether it is the plan's.
+struct ScenePoint {
+    words: String,
+    cost: f64,
+    error: f64,
+    is_planned: bool,
+}
+
+/// Draws points of a scene: those exact to the last digit have no place over a logarithm and stand in the table alone.
+fn scene_shown(axes: [&'static str; 2], head: &str, points: &[ScenePoint]) -> Shown {
+    let mut shown = Shown::new(axes, &[head, axes[0], axes[1]]);
+    let places: Vec<[f64; 2]> = points.iter().map(|one| [one.cost, one.error]).collect();
+    let best = front(&places);
+    for (index, one) in points.iter().enumerate() {
+        let is_drawn = one.error > 0.0;
+        let cells = vec![one.words.clone(), digits(one.cost), digits(one.error)];
+        let at = [Some(one.cost), is_drawn.then_some(one.error)];
+        shown.add(at, best.contains(&index), cells, None);
+        if one.is_planned && is_drawn {
+            shown.chosen = Some(shown.marks.len() - 1);
+        }
+        if let (true, Some(last)) = (one.is_planned, shown.rows.last_mut()) {
+            last.cells[0].push_str(" (planned)");
+        }
+    }
+    shown.finished()
+}
+
+/// Meshes of a scene.
+pub(super) fn meshes(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+    let points = curves.meshes.iter().map(|point| ScenePoint {
+        words: format!("{0} x {0} nodes", point.nodes),
+        cost: point.cost_us,
+        error: point.error_mm,
+        is_planned: planned.is_some_and(|plan| plan.mesh == *point),
+    });
+    let points: Vec<ScenePoint> = points.collect();
+    scene_shown(["us a tick", "error of shape (mm)"], "mesh", &points)
+}
+
+/// Cuts of the influence of a contact.
+pub(super) fn cuts(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+    let points = curves.cuts.iter().map(|point| ScenePoint {
+        words: match (point.range, point.threshold_mm > 0.0) {
+            (None, false) => "no cut".to_owned(),
+            _ => point.words(),
+        },
+        cost: 100.0 * point.cost_share,
+        error: point.error_mm,
+        is_planned: planned.is_some_and(|plan| plan.cut == *point),
+    });
+    let points: Vec<ScenePoint> = points.collect();
+    scene_shown(
+        ["% of the time", "error of shape (mm)"],
+        "influence ends",
+        &points,
+    )
+}
+
+/// Integrators and steps of a scene.
+pub(super) fn steps(curves: &SceneCurves, planned: Option<&ScenePlan>) -> Shown {
+    let points = curves.steps.iter().map(|point| ScenePoint {
+        words: format!("{}, {} ms", point.scheme.name(), plain(1e3 * point.step_s)),
+        cost: point.cost_us,
+        error: point.error_n,
+        is_planned: planned.is_some_and(|plan| plan.step == *point),
+    });
+    let points: Vec<ScenePoint> = points.collect();
+    scene_shown(
+        ["us a tick", "error of force (N)"],
+        "integrator and step",
+        &points,
+    )
+}
+
+/// A plan in words: what is used, what it costs, what was left out, what has no effect.
+pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
+    let cut = match (plan.cut.range, plan.cut.threshold_mm > 0.0) {
+        (None, false) => "without a cut".to_owned(),
+        _ => format!("cut at {}", plan.cut.words()),
+    };
+    let mut lines = vec![
+        format!("{0} x {0} nodes, {cut}", plan.mesh.nodes),
+        format!(
+            "{} at {} ms, family {}",
+            plan.step.scheme.name(),
+            plain(1e3 * plan.step.step_s),
+            plan.family.family
+        ),
+        format!(
+            "a tick takes {} us; the shape is off by {} mm and the force by {} N at most",
+            digits(plan.cost_us),
+            digits(plan.shape_error_mm),
+            digits(plan.force_error_n)
+        ),
+    ];
+    lines.extend(plan.dropped.iter().map(|one| {
+        format!(
+            "left out: {}: {} {} of error, {} us saved",
+            one.what,
+            digits(one.error),
+            one.unit,
+            digits(one.saved_us)
+        )
+    }));
+    let inert = plan.inert.iter();
+    lines.extend(inert.map(|(part, why)| format!("{part} has no effect: {why}")));
+    lines
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::surface::MeshPoint;
+
+    fn curves(points: &[(u32, f64, f64)]) -> SceneCurves {
+        let mesh = |&(nodes, error_mm, cost_us): &(u32, f64, f64)| MeshPoint {
+            nodes,
+            error_mm,
+            cost_us,
+        };
+        SceneCurves {
+            meshes: points.iter().map(mesh).collect(),
+            ..SceneCurves::default()
+        }
+    }
+
+    #[test]
+    fn the_front_stands_first_and_what_is_exact_is_told_but_not_drawn() {
+        // The second is dearer and worse than the third; the last is exact.
+        let all = curves(&[
+            (51, 0.5, 1.0),
+            (101, 0.4, 5.0),
+            (201, 0.2, 4.0),
+            (401, 0.0, 9.0),
+        ]);
+        let shown = meshes(&all, None);
+        assert_eq!(shown.marks.len(), 3);
+        let looks: Vec<RowLook> = shown.rows.iter().map(|row| row.look).collect();
+        let marked = looks
+            .iter()
+            .filter(|look| **look == RowLook::Marked)
+            .count();
+        assert_eq!(marked, 3, "{:?}", shown.rows);
+        assert!(shown.rows[3].cells[0].starts_with("101 x 101"));
+        assert_eq!(shown.chosen, None);
+    }
+}

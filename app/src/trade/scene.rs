@@ -1,0 +1,221 @@
+//! What exactness costs in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
+
+use super::timing::{self, Job};
+use super::{Extent, Progress, families, integrators, paths};
+use palpate_model::integrators::Scheme;
+use palpate_model::surface::{
+    Contact, Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Method, PokeScene, REFERENCE_NODES,
+    Recovery, SceneCurves, Side, StepPoint, Surface,
+};
+use palpate_model::trade::Cost;
+use palpate_model::units::{Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use std::hint::black_box;
+
+/// Tick of the scene in s.
+const TICK: f64 = 1e-3;
+
+/// Nodes along a side, and those of the mesh that stands for the truth.
+const MESHES: [usize; 5] = [51, 101, 201, 401, 801];
+const MESHES_QUICK: [usize; 3] = [51, 101, 201];
+const REFERENCE_QUICK: usize = 401;
+
+/// Nodes along a side of the mesh on which cuts are tried.
+const CUT_NODES: usize = 201;
+
+/// Cuts by steps from the contact, then by least movement in mm; the absence of one first.
+const CUTS: [(Option<u32>, f64); 8] = [
+    (None, 0.0),
+    (Some(60), 0.0),
+    (Some(50), 0.0),
+    (Some(40), 0.0),
+    (Some(20), 0.0),
+    (None, 0.01),
+    (None, 0.1),
+    (None, 0.5),
+];
+
+/// Steps in s.
+const STEPS: [f64; 5] = [0.25e-3, 0.5e-3, 1e-3, 2e-3, 4e-3];
+
+/// The poke that forces are compared on: 10 mm and back in 2 s.
+const POKE: HandPoke = HandPoke {
+    depth: 10.0,
+    duration: 2.0,
+};
+
+/// Largest force along it, of the body of the source thesis; a scene's tolerance of force is meant at it.
+pub const SCENE_PEAK: Newtons = Newtons(2.19);
+
+/// 40 mm of flat tissue, 5 mm deep pokes on and off the nodes, with a slope that lets a poke reach 12.5 mm.
+fn pokes() -> PokeScene {
+    PokeScene {
+        extent: 40.0,
+        slope: 0.4,
+        depth: 5.0,
+        rest: |_, _| 0.0,
+        places: vec![[20.0, 20.0], [13.37, 24.81], [29.13, 17.77], [3.21, 38.55]],
+    }
+}
+
+/// A surface whose tool stays in its middle, so that every tick recovers and pushes all that a poke reaches.
+fn job<'a>(scene: &PokeScene, nodes: usize, cut: Cut) -> Result<Job<'a>, String> {
+    let field = scene.field(nodes).map_err(|err| err.to_string())?;
+    let tau = Seconds(ModifiedKelvin::THESIS.tau_eps);
+    let recovery = Recovery::new(tau, Seconds(TICK)).map_err(|err| err.to_string())?;
+    let surface = Surface::new(field, Method::Envelope, recovery, cut);
+    let mut surface = surface.map_err(|err| err.to_string())?;
+    let contact = [Contact {
+        x: 0.5 * scene.extent,
+        y: 0.5 * scene.extent,
+        z: -scene.depth,
+        side: Side::Push,
+    }];
+    Ok(Job {
+        per_call: 1.0,
+        call: Box::new(move || {
+            black_box(surface.tick(black_box(&contact)));
+        }),
+    })
+}
+
+/// The curves of this machine; none if `progress` ended it.
+pub fn measure_scene(
+    extent: Extent,
+    progress: &Progress<'_>,
+) -> Result<Option<SceneCurves>, String> {
+    let (meshes, reference) = match extent {
+        Extent::Full => (&MESHES[..], REFERENCE_NODES),
+        Extent::Quick => (&MESHES_QUICK[..], REFERENCE_QUICK),
+    };
+    let total = meshes.len() + 2 + timing::rounds(extent);
+    let mut done = 0;
+    let mut goes_on = |what: &str| {
+        done += 1;
+        progress(done - 1, total, what).is_continue()
+    };
+    let scene = pokes();
+    let mut curves = SceneCurves::default();
+    let mut jobs = Vec::new();
+    for &nodes in meshes {
+        if !goes_on(&format!("shape on {nodes} x {nodes} nodes")) {
+            return Ok(None);
+        }
+        let error = scene.mesh_error_against(nodes, reference);
+        curves.meshes.push(MeshPoint {
+            nodes: nodes as u32,
+            error_mm: error.map_err(|err| err.to_string())?.linf_mm,
+            cost_us: 0.0,
+        });
+        jobs.push(job(&scene, nodes, Cut::NONE)?);
+    }
+    if !goes_on("shape with a cut") {
+        return Ok(None);
+    }
+    for (range, threshold_mm) in CUTS {
+        let cut = Cut::new(range, threshold_mm).map_err(|err| err.to_string())?;
+        let error = scene.cut_error(CUT_NODES, cut);
+        curves.cuts.push(CutPoint {
+            range,
+            threshold_mm,
+            error_mm: error.map_err(|err| err.to_string())?.linf_mm,
+            cost_share: 1.0,
+        });
+        jobs.push(job(&scene, CUT_NODES, cut)?);
+    }
+    if !goes_on("force of integrators and families") {
+        return Ok(None);
+    }
+    let body = ModifiedKelvin::THESIS.into();
+    for scheme in Scheme::ALL {
+        for step_s in STEPS {
+            // Where a scheme is unstable it has no place in the picture.
+            if let Ok([error_n, _]) = POKE.force_error::<3>(&body, scheme, step_s) {
+                curves.steps.push(StepPoint {
+                    scheme,
+                    step_s,
+                    error_n,
+                    cost_us: 0.0,
+                });
+            }
+        }
+        jobs.push(integrators::job::<f64>(scheme));
+    }
+    let mut rows = families::rows(extent, &paths::Paths::new()?)?;
+    rows.retain(|row| row.target == families::THESIS);
+    jobs.extend(families::jobs(&rows)?);
+    let costs = timing::measure(&mut jobs, extent, &mut || {
+        done += 1;
+        progress(done - 1, total, "times")
+    });
+    let Some(costs) = costs else {
+        return Ok(None);
+    };
+    let mut micros = costs.iter().map(|cost: &Cost| 1e-3 * cost.ns);
+    let of_meshes = micros.by_ref().take(curves.meshes.len());
+    let slots = curves.meshes.iter_mut().map(|point| &mut point.cost_us);
+    slots.zip(of_meshes).for_each(|(slot, cost)| *slot = cost);
+    let of_cuts: Vec<f64> = micros.by_ref().take(CUTS.len()).collect();
+    for (point, cost) in curves.cuts.iter_mut().zip(&of_cuts) {
+        // Other work may have made a cut look dearer than none.
+        point.cost_share = (cost / of_cuts[0]).min(1.0);
+    }
+    let of_schemes: Vec<f64> = micros.by_ref().take(Scheme::ALL.len()).collect();
+    for point in &mut curves.steps {
+        let scheme = Scheme::ALL.iter().position(|one| *one == point.scheme);
+        // A step longer than a tick is made in one tick of several, which must have the time.
+        point.cost_us = of_schemes[scheme.unwrap_or(0)] * (TICK / point.step_s).max(1.0);
+    }
+    curves.families = rows
+        .iter()
+        .zip(micros)
+        .map(|(row, cost_us)| FamilyPoint {
+            family: row.family.clone(),
+            error_n: row.error_n,
+            cost_us,
+        })
+        .collect();
+    Ok(Some(curves))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::surface::{Needs, plan};
+    use palpate_model::tolerance::Tolerance;
+    use std::ops::ControlFlow;
+
+    #[test]
+    fn what_is_measured_can_be_planned_from_and_finer_is_more_exact_and_dearer() {
+        let go_on = |_: usize, _: usize, _: &str| ControlFlow::Continue(());
+        let curves = measure_scene(Extent::Quick, &go_on).unwrap().unwrap();
+        for pair in curves.meshes.windows(2) {
+            assert!(pair[1].error_mm < pair[0].error_mm, "{pair:?}");
+            // Four times the nodes, and the rest of a busy machine.
+            assert!(pair[1].cost_us > 1.2 * pair[0].cost_us, "{pair:?}");
+        }
+        assert_eq!(
+            (curves.cuts[0].error_mm, curves.cuts[0].cost_share),
+            (0.0, 1.0)
+        );
+        assert!(curves.cuts.iter().skip(1).all(|cut| cut.error_mm <= 5.0));
+        let exact = curves
+            .steps
+            .iter()
+            .filter(|one| one.scheme == Scheme::Exact);
+        assert_eq!(exact.count(), STEPS.len());
+        let body = ModifiedKelvin::THESIS.into();
+        let [_, peak] = POKE.force_error::<3>(&body, Scheme::Exact, 1e-3).unwrap();
+        assert!((peak - SCENE_PEAK.0).abs() < 0.01, "{peak}");
+        let needs = Needs {
+            force: Tolerance::PercentOfPeak(50.0),
+            peak: SCENE_PEAK,
+            shape_mm: 10.0,
+            budget_us: 1e6,
+        };
+        let chosen = plan(&needs, &curves, 1.0).unwrap();
+        assert_eq!(chosen.mesh.nodes, 51);
+        let ended = measure_scene(Extent::Quick, &|_, _, _| ControlFlow::Break(()));
+        assert!(ended.unwrap().is_none());
+    }
+}

@@ -1,0 +1,153 @@
+//! The haptic loop as the window runs it: a thread of its own that ticks, and what was seen of it so far.
+
+use palpate_model::haptics::Flags;
+use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
+use palpate_model::units::MmPerS;
+use palpate_protocols::haptics::timing::Kept;
+use palpate_protocols::haptics::{Beat, Lead, Led, TrailPoint};
+use std::collections::VecDeque;
+
+/// How much of the past is kept for the plots, in s.
+pub const PAST_S: f64 = 10.0;
+
+/// Between two looks at how the loop keeps its time, in s: numbers that change faster cannot be read.
+const LOOK_S: f64 = 0.5;
+
+/// For how long a cause of less force stays on the screen, in s.
+const CAUSE_S: f64 = 0.3;
+
+/// A loop that runs or ran, and what was seen of it.
+pub struct Feel {
+    beat: Option<Beat<Led>>,
+    lead: Lead,
+    known: u64,
+    trail: VecDeque<TrailPoint>,
+    last: SimulationTick,
+    kept: Kept,
+    looked: f64,
+    /// Ticks missed between the last two looks.
+    missed: u64,
+    rate_hz: f64,
+    priority: String,
+}
+
+impl Feel {
+    /// Starts the loop; the hand moves at `speed` where it is led.
+    pub fn start(settings: &SimulationSettings, speed: MmPerS) -> Result<Self, String> {
+        let device = Led::new(settings, speed).map_err(|err| err.to_string())?;
+        let (lead, first) = (device.lead(), device.live().clone());
+        let last = first.last;
+        let period = settings.system.law.period;
+        let beat = Beat::start(device, period, first)
+            .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
+        Ok(Self {
+            lead,
+            known: 0,
+            trail: VecDeque::new(),
+            last,
+            kept: beat.kept(),
+            looked: 0.0,
+            missed: 0,
+            rate_hz: period.hz(),
+            priority: beat.granted().to_string(),
+            beat: Some(beat),
+        })
+    }
+
+    /// Takes over what is new. An error: the loop has ended by itself.
+    pub fn poll(&mut self) -> Result<(), String> {
+        let Some(beat) = &mut self.beat else {
+            return Ok(());
+        };
+        let live = beat.seen();
+        self.trail.extend(live.since(self.known).copied());
+        self.known = live.count();
+        self.last = live.last;
+        let now = self.last.t.0;
+        while self
+            .trail
+            .front()
+            .is_some_and(|point| point.t < now - PAST_S)
+        {
+            self.trail.pop_front();
+        }
+        if now - self.looked >= LOOK_S {
+            let kept = beat.kept();
+            self.missed = kept.missed - self.kept.missed;
+            self.kept = kept;
+            self.looked = now;
+        }
+        if beat.is_alive() {
+            return Ok(());
+        }
+        self.beat = None;
+        Err("the loop ended unexpectedly; start it again, and report it if it happens twice".into())
+    }
+
+    /// Whether it ticks.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.beat.is_some()
+    }
+
+    /// Ends it after the tick under way; what was seen stays.
+    pub fn stop(&mut self) {
+        if let Some(beat) = self.beat.take() {
+            self.kept = beat.kept();
+        }
+    }
+
+    /// Leads the hand to a place in mm.
+    pub fn lead(&self, place_mm: f64) {
+        self.lead.to(place_mm);
+    }
+
+    /// Where it is led, in mm.
+    #[must_use]
+    pub fn place(&self) -> f64 {
+        self.lead.place()
+    }
+
+    /// The past, 250 points a second.
+    pub fn trail(&self) -> impl Iterator<Item = &TrailPoint> + Clone {
+        self.trail.iter()
+    }
+
+    /// The newest tick.
+    #[must_use]
+    pub fn last(&self) -> &SimulationTick {
+        &self.last
+    }
+
+    /// How the loop kept its time.
+    #[must_use]
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// Ticks missed in the last half second or so.
+    #[must_use]
+    pub fn missed(&self) -> u64 {
+        self.missed
+    }
+
+    /// Ticks a second that are wanted.
+    #[must_use]
+    pub fn rate_hz(&self) -> f64 {
+        self.rate_hz
+    }
+
+    /// The priority that the system gave.
+    #[must_use]
+    pub fn priority(&self) -> &str {
+        &self.priority
+    }
+
+    /// What was special a moment ago and is still worth saying.
+    #[must_use]
+    pub fn flags(&self) -> Flags {
+        let late = self.trail.iter().rev();
+        late.take_while(|point| point.t > self.last.t.0 - CAUSE_S)
+            .fold(self.last.output.flags, |all, point| all | point.flags)
+    }
+}

@@ -1,0 +1,99 @@
+//! The damping that a body needs over the depths of a stroke, in its parts.
+
+use palpate_model::haptics::margin::{Device, Linear, Watch};
+use palpate_model::units::{Depth, MmPerS};
+
+/// Depths looked at: as many as a plot is wide.
+const DEPTHS: u32 = 600;
+
+/// Damping needed at a depth, in N s/m; each part stands on the one before.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct MarginPoint {
+    /// Where, in mm.
+    pub depth: f64,
+    /// What the body's own lag asks for.
+    pub lag: f64,
+    /// With what the tick asks for besides.
+    pub tick: f64,
+    /// With what the delay asks for besides: all that is needed.
+    pub delay: f64,
+}
+
+/// Over a stroke entered at a speed, with the criterion that the check has.
+#[must_use]
+pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginPoint> {
+    let prompt = Watch {
+        device: Device {
+            delay_ticks: 0.0,
+            ..watch.device
+        },
+        ..*watch
+    };
+    let point = |i: u32| {
+        // Closer together near the surface, where most changes.
+        let share = f64::from(i) / f64::from(DEPTHS);
+        let depth = Depth(deepest.0 * share * share);
+        // A body that brings its own damping needs none.
+        let lag = Linear::of(&watch.body, depth).lag().max(0.0);
+        let tick = prompt.exactly_at(depth, speed).needed.max(lag);
+        let delay = watch.exactly_at(depth, speed).needed.max(tick);
+        // N s/m, as catalogues have it.
+        MarginPoint {
+            depth: depth.0,
+            lag: 1e3 * lag,
+            tick: 1e3 * tick,
+            delay: 1e3 * delay,
+        }
+    };
+    (0..=DEPTHS).map(point).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::workers::haptics::Setting;
+    use palpate_model::haptics::Period;
+    use palpate_model::viscoelastic::ModifiedKelvin;
+
+    fn curve(rate: f64, delay: usize) -> (Vec<MarginPoint>, f64) {
+        let setting = Setting {
+            delay,
+            ..Setting::source(Period::of_rate(rate).unwrap())
+        };
+        let watch = setting
+            .simulation(ModifiedKelvin::THESIS, true)
+            .system
+            .watch();
+        let verdict = watch.before_play(setting.deepest, setting.speed);
+        let curve = margin_curve(&watch, setting.deepest, setting.speed);
+        (curve, 1e3 * verdict.worst.needed)
+    }
+
+    #[test]
+    fn the_top_of_the_curve_is_the_damping_that_the_check_names() {
+        for (rate, delay) in [(1000.0, 0), (500.0, 2), (5000.0, 4)] {
+            let (curve, worst) = curve(rate, delay);
+            let top = curve.iter().map(|one| one.delay).fold(0.0, f64::max);
+            // The check looks at other depths.
+            assert!(
+                (top - worst).abs() < 0.01 * worst,
+                "{rate} {delay}: {top} {worst}"
+            );
+            for one in &curve {
+                assert!(one.lag <= one.tick && one.tick <= one.delay, "{one:?}");
+            }
+        }
+    }
+
+    #[test]
+    fn a_faster_loop_takes_from_the_tick_and_leaves_the_lag() {
+        let ([slow, fast], depth) = ([curve(500.0, 0).0, curve(5000.0, 0).0], 300);
+        assert_eq!(slow[depth].lag, fast[depth].lag);
+        let of_tick = |one: &MarginPoint| one.tick - one.lag;
+        // Half a tick of stiffness: a tenth at ten times the rate.
+        let ratio = of_tick(&slow[depth]) / of_tick(&fast[depth]);
+        assert!((ratio - 10.0).abs() < 0.5, "{ratio}");
+        // Without a delay nothing stands on the tick's part.
+        assert!(slow.iter().all(|one| one.delay == one.tick));
+    }
+}

@@ -1,0 +1,225 @@
+//! The simulated device with a hand that is led from outside, and the trail of what was felt.
+
+use super::{Simulated, Ticking};
+use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
+use palpate_model::haptics::{Flags, MasterSlaveError, Period};
+use palpate_model::units::{MmPerS, Seconds};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// Points of a trail that are handed over together: whoever looks four times a second misses none.
+pub const TRAIL: usize = 64;
+
+/// Time between two points: 250 Hz shows every buzz of a hand on a handle, which is below 100 Hz.
+const APART: Seconds = Seconds(0.004);
+
+/// Where a hand is to go; as many hold it as like, and the loop never waits for them.
+#[derive(Clone, Debug)]
+pub struct Lead(Arc<AtomicU64>);
+
+impl Lead {
+    fn at(place_mm: f64) -> Self {
+        Self(Arc::new(AtomicU64::new(place_mm.to_bits())))
+    }
+
+    /// The hand goes to this place in mm from the next tick on. What is no number is no place.
+    pub fn to(&self, place_mm: f64) {
+        if place_mm.is_finite() {
+            self.0.store(place_mm.to_bits(), Ordering::Relaxed);
+        }
+    }
+
+    /// Where it was told to go last, in mm.
+    #[must_use]
+    pub fn place(&self) -> f64 {
+        f64::from_bits(self.0.load(Ordering::Relaxed))
+    }
+}
+
+/// The device at one moment.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TrailPoint {
+    /// When, in s.
+    pub t: f64,
+    /// Depth of the slave in mm.
+    pub depth: f64,
+    /// Force of the model in N.
+    pub model: f64,
+    /// Force commanded in N.
+    pub force: f64,
+    /// Torque commanded in N mm.
+    pub torque: f64,
+    /// All that was special since the point before.
+    pub flags: Flags,
+}
+
+/// What is seen of it: the newest tick and the way to it.
+#[derive(Clone, Debug)]
+pub struct Live {
+    /// The newest tick.
+    pub last: SimulationTick,
+    /// Points made so far.
+    count: u64,
+    /// The last of them; the one with number n at n modulo [`TRAIL`].
+    trail: [TrailPoint; TRAIL],
+}
+
+impl Live {
+    /// Points made so far.
+    #[must_use]
+    pub fn count(&self) -> u64 {
+        self.count
+    }
+
+    /// Those made after the first `known`, as far as they are still there, in order.
+    pub fn since(&self, known: u64) -> impl Iterator<Item = &TrailPoint> {
+        let first = known.max(self.count.saturating_sub(TRAIL as u64));
+        (first..self.count).map(|number| &self.trail[(number % TRAIL as u64) as usize])
+    }
+}
+
+/// The simulated master-slave system with a hand that goes where its [`Lead`] says.
+#[derive(Clone, Debug)]
+pub struct Led {
+    device: Simulated,
+    lead: Lead,
+    place: f64,
+    speed: MmPerS,
+    /// Ticks between two points.
+    apart: u64,
+    /// Ticks since the last point.
+    ticks: u64,
+    flags: Flags,
+    live: Live,
+}
+
+impl Led {
+    /// At its start, the hand at rest where its path begins; it moves at `speed` above zero.
+    pub fn new(settings: &SimulationSettings, speed: MmPerS) -> Result<Self, MasterSlaveError> {
+        let place = settings.plant.hand.path.at(0.0);
+        let mut device = Simulated::new(settings)?;
+        device.lead(place, speed);
+        let period: Period = settings.system.law.period;
+        let live = Live {
+            last: *device.last(),
+            count: 0,
+            trail: [TrailPoint::default(); TRAIL],
+        };
+        Ok(Self {
+            device,
+            lead: Lead::at(place),
+            place,
+            speed,
+            apart: period.ticks_in(APART).max(1),
+            ticks: 0,
+            flags: Flags::NONE,
+            live,
+        })
+    }
+
+    /// What leads its hand.
+    #[must_use]
+    pub fn lead(&self) -> Lead {
+        self.lead.clone()
+    }
+
+    /// What is seen of it.
+    #[must_use]
+    pub fn live(&self) -> &Live {
+        &self.live
+    }
+}
+
+impl Ticking for Led {
+    type View = Live;
+
+    fn tick(&mut self, elapsed: u64) {
+        let place = self.lead.place();
+        if place != self.place {
+            self.place = place;
+            self.device.lead(place, self.speed);
+        }
+        self.device.tick(elapsed);
+        let last = *self.device.last();
+        self.flags |= last.output.flags;
+        self.live.last = last;
+        self.ticks += 1;
+        if self.ticks >= self.apart {
+            self.ticks = 0;
+            let seen = &last.snapshot;
+            self.live.trail[(self.live.count % TRAIL as u64) as usize] = TrailPoint {
+                t: last.t.0,
+                depth: seen.depth.0,
+                model: seen.model.0,
+                force: seen.force.0,
+                torque: seen.torque,
+                flags: std::mem::take(&mut self.flags),
+            };
+            self.live.count += 1;
+        }
+    }
+
+    fn show(&self, view: &mut Live) {
+        view.clone_from(&self.live);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::haptics::rig::{Hand, HandPath};
+    use palpate_model::viscoelastic::ModifiedKelvin;
+
+    fn led() -> Led {
+        let hand = Hand::firm(HandPath::Still { at: 0.0 });
+        let settings = SimulationSettings::of(ModifiedKelvin::THESIS, Period::MILLISECOND, hand);
+        Led::new(&settings, MmPerS(50.0)).unwrap()
+    }
+
+    #[test]
+    fn the_hand_goes_where_it_is_led_at_its_speed_and_back() {
+        let mut led = led();
+        let lead = led.lead();
+        let run = |led: &mut Led, ticks: u64| (0..ticks).for_each(|_| led.tick(1));
+        run(&mut led, 500);
+        assert_eq!(led.live().last.snapshot.force.0, 0.0);
+        lead.to(20.0);
+        // 20 mm at 50 mm/s take 0.4 s; by a quarter of it the hand has not even led it half the way.
+        run(&mut led, 100);
+        assert!(led.live().last.x < 10.0, "{}", led.live().last.x);
+        run(&mut led, 2_900);
+        let pressed = led.live().last;
+        assert!(pressed.x > 8.0 && pressed.x < 20.0, "{}", pressed.x);
+        assert!(pressed.snapshot.force.0 > 0.5);
+        // Turned on the way, without a jump.
+        lead.to(-2.0);
+        run(&mut led, 50);
+        lead.to(f64::NAN);
+        let before = led.live().last.x;
+        run(&mut led, 1);
+        assert!((led.live().last.x - before).abs() < 0.2);
+        run(&mut led, 3_000);
+        assert!(led.live().last.x < 0.5, "{}", led.live().last.x);
+        assert_eq!(led.live().last.snapshot.force.0, 0.0);
+    }
+
+    #[test]
+    fn a_trail_looked_at_often_enough_has_every_point_once() {
+        let mut led = led();
+        led.lead().to(20.0);
+        let (mut known, mut times) = (0, Vec::new());
+        for tick in 1..=2_000_u64 {
+            led.tick(1);
+            if tick % 250 == 0 {
+                times.extend(led.live().since(known).map(|point| point.t));
+                known = led.live().count();
+            }
+        }
+        assert_eq!(times.len(), 500);
+        let apart = |pair: &[f64]| (pair[1] - pair[0] - APART.0).abs() < 1e-9;
+        assert!(times.windows(2).all(apart));
+        // Looked at late, the last ones are there.
+        let late: Vec<f64> = led.live().since(0).map(|point| point.t).collect();
+        assert_eq!(late, times[times.len() - TRAIL..]);
+    }
+}
