@@ -21,6 +21,7 @@ pub mod quantity;
 pub mod random;
 pub mod reference;
 pub mod rig;
+pub mod scene;
 pub mod select;
 pub mod signal;
 pub mod surface;

@@ -1,0 +1,331 @@
+//! A piece of tissue that is seen and felt: the [surface](crate::surface) that follows a stylus, the
+//! [force law](crate::haptics::ForceLaw) that answers it, and the device between them and a hand.
+//!
+//! One [`Scene::tick`] is: the device moves under the force held; the contact point follows it on the surface at rest, so
+//! that the force does not see its own deformation; the law makes a force of depth; guards bound it along the normal; the
+//! surface follows the stylus. It allocates nothing, takes no lock, reads no clock and gives the same bits for the same hands.
+
+mod device;
+mod path;
+mod settings;
+mod why;
+
+pub use device::{DeviceSettings, Hand6, Pose, SimulatedDevice};
+pub use path::ScenePath;
+pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
+pub use why::WhyNoForce;
+
+use crate::haptics::{
+    BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
+    PassivityObserver,
+};
+use crate::surface::{
+    Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, Touch, TouchState,
+};
+use crate::units::{Depth, Newtons, Seconds};
+use device::length;
+
+/// Ticks of a stall that device and law are led through; after longer ones they stand where they were.
+const LED_MAX: u64 = 1000;
+
+/// What a tick did.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct SceneTick {
+    /// Ticks since the start.
+    pub tick: u64,
+    /// Sensed place of the stylus in mm.
+    pub device: [f64; 3],
+    /// Its sensed yaw, pitch and roll in rad.
+    pub turn: [f64; 3],
+    /// The contact point on the surface at rest in mm; where the stylus is without contact.
+    pub proxy: [f64; 3],
+    /// Unit normal of the surface there.
+    pub normal: [f64; 3],
+    /// Depth of the stylus below the contact point along the normal in mm; zero without contact.
+    pub depth: f64,
+    /// How fast the stylus goes in along the normal, in mm/s.
+    pub speed: f64,
+    /// Force on the hand in N.
+    pub force: [f64; 3],
+    /// Whether the device gives less than it was asked for.
+    pub is_saturated: bool,
+    /// What takes force away.
+    pub why: WhyNoForce,
+    /// Damping added by the passivity controller in N s/mm.
+    pub injected_damping: f64,
+    /// Energy that the force along the normal has absorbed in N mm; below zero it has returned more.
+    pub energy: f64,
+    /// Whether the loop swings by itself.
+    pub is_buzzing: bool,
+    /// Nodes that the contact moved.
+    pub moved: usize,
+    /// Hash of one row of the surface, of the next row in every tick: a look at all of it in as many ticks as it has rows.
+    pub row_hash: u64,
+    /// What was special.
+    pub flags: Flags,
+}
+
+impl SceneTick {
+    /// Whether the stylus touches.
+    #[must_use]
+    pub fn is_contact(&self) -> bool {
+        self.depth > 0.0
+    }
+}
+
+/// A scene with its state.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    settings: SceneSettings,
+    device: SimulatedDevice,
+    surface: Surface,
+    proxy: Proxy,
+    law: ForceLaw,
+    guard: ForceGuard,
+    controller: Option<PassivityController>,
+    observer: PassivityObserver,
+    buzz: BuzzDetector,
+    /// How far the stylus is below the surface at rest; above it less than zero.
+    below: f64,
+    last: SceneTick,
+    dirty: Rect,
+    moved: usize,
+}
+
+impl Scene {
+    /// At rest, the stylus over the middle. Everything that ticks need is allocated here.
+    pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
+        let period = settings.period;
+        let start = settings.start();
+        let device = SimulatedDevice::new(settings.device, period, settings.middle(), start)?;
+        let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
+        let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
+        let law = LawSettings {
+            scheme: settings.scheme,
+            ..LawSettings::of(settings.body, period)
+        };
+        let below = -start[2];
+        let pose = device.pose();
+        let heard = BuzzSettings::of(settings.device.step_mm);
+        Ok(Self {
+            device,
+            surface,
+            proxy: Proxy::new(settings.friction, f64::INFINITY)?,
+            law: ForceLaw::new(law, Depth(below))?,
+            guard: ForceGuard::new(&settings.guard, period),
+            controller: settings
+                .controller
+                .map(|one| PassivityController::new(&one, period)),
+            observer: PassivityObserver::default(),
+            buzz: BuzzDetector::new(&heard, period, below),
+            below,
+            last: SceneTick {
+                device: pose.at,
+                turn: pose.turn,
+                proxy: pose.at,
+                normal: [0.0, 0.0, 1.0],
+                ..SceneTick::default()
+            },
+            dirty: Rect::EMPTY,
+            moved: 0,
+            settings,
+        })
+    }
+
+    /// What it is made of.
+    #[must_use]
+    pub fn settings(&self) -> &SceneSettings {
+        &self.settings
+    }
+
+    /// The device.
+    #[must_use]
+    pub fn device(&self) -> &SimulatedDevice {
+        &self.device
+    }
+
+    /// The surface.
+    #[must_use]
+    pub fn field(&self) -> &HeightField {
+        self.surface.field()
+    }
+
+    /// Every node that may be elsewhere than at rest, now or before the last tick.
+    #[must_use]
+    pub fn dirty(&self) -> Rect {
+        self.dirty
+    }
+
+    /// The last tick.
+    #[must_use]
+    pub fn last(&self) -> SceneTick {
+        self.last
+    }
+
+    /// Ticks since the start.
+    #[must_use]
+    pub fn ticks(&self) -> u64 {
+        self.last.tick
+    }
+
+    /// Hash of all heights' bits, in place of comparing them.
+    #[must_use]
+    pub fn hash(&self) -> u64 {
+        hash(self.field().heights())
+    }
+
+    /// One tick, led by a hand.
+    pub fn tick(&mut self, hand: Hand6) -> SceneTick {
+        self.tick_after(hand, 1)
+    }
+
+    /// The tick that comes `elapsed` ticks after the last: one, unless the loop was away. Device and law are led through what was
+    /// missed; the surface stood still meanwhile.
+    pub fn tick_after(&mut self, hand: Hand6, elapsed: u64) -> SceneTick {
+        let elapsed = elapsed.max(1);
+        self.device
+            .follow(hand, self.last.force, elapsed.min(LED_MAX));
+        let pose = self.device.pose();
+        self.feel(pose, elapsed)
+    }
+
+    /// The tick of a device that was sensed at `pose`, which [`SceneTick::force`] is for.
+    pub fn feel(&mut self, pose: Pose, elapsed: u64) -> SceneTick {
+        let elapsed = elapsed.max(1);
+        let tick = self.last.tick.saturating_add(elapsed);
+        let touch = self.proxy.follow(self.surface.field().at_rest(), pose.at);
+        let is_contact = touch.is_contact();
+        let before = self.below;
+        self.below = match touch.state {
+            TouchState::Sticks | TouchState::Slides => touch.depth,
+            TouchState::Free => {
+                let [x, y, z] = pose.at;
+                let rest = self.field().at_rest().at(x, y);
+                rest.map_or(before, |(height, _)| height - z).min(0.0)
+            }
+            // Nothing is below it beside the mesh, and nothing is known of it without a place.
+            TouchState::Outside => before.min(0.0),
+            TouchState::NotANumber => before,
+        };
+        let (wanted, mut flags) = self.led(before, elapsed);
+        let guarded = self.guard.tick(wanted, is_contact, elapsed);
+        flags |= guarded.flags;
+        // What the loop makes of it, along the normal.
+        let counts = ((self.below - before) / self.settings.device.step_mm).round() as i64;
+        self.observer.moved(self.below - before);
+        let energy = self.observer.energy();
+        let buzz = self.buzz.tick(self.below, elapsed, energy);
+        flags |= Flags::BUZZ.when(buzz.is_some());
+        let mut along = guarded.force;
+        let mut injected_damping = 0.0;
+        if let Some(controller) = &mut self.controller {
+            if buzz.is_some() {
+                controller.heard_buzz();
+            }
+            let step = self.settings.device.step_mm;
+            let one = controller.tick((counts, step), elapsed, along, is_contact);
+            along = one.force;
+            injected_damping = one.damping;
+            flags |= one.flags;
+        }
+        let asked = self.felt(&touch, along);
+        let (force, is_saturated) = self.settings.device.given(asked);
+        let given = Newtons(dot(force, touch.normal));
+        if let Some(controller) = &mut self.controller {
+            controller.rendered(given);
+        }
+        self.observer.hold(given.0);
+        self.press(&touch);
+        let is_saturated = is_saturated || flags.has(Flags::FORCE_MAX);
+        let device = &self.settings.device;
+        let why = WhyNoForce::of(touch.state, flags, is_saturated, length(force), device);
+        let span = self.settings.period.seconds().0 * elapsed as f64;
+        self.last = SceneTick {
+            tick,
+            device: pose.at,
+            turn: pose.turn,
+            proxy: touch.point,
+            normal: touch.normal,
+            depth: touch.depth,
+            speed: (self.below - before) / span,
+            force,
+            is_saturated,
+            why,
+            injected_damping,
+            energy,
+            is_buzzing: buzz.is_some(),
+            moved: self.moved,
+            row_hash: self.row_hash(tick),
+            flags,
+        };
+        self.last
+    }
+
+    /// The law's force, after it was led straight through what was missed.
+    fn led(&mut self, before: f64, elapsed: u64) -> (Newtons, Flags) {
+        let steps = elapsed.min(LED_MAX);
+        let way = (self.below - before) / steps as f64;
+        let mut flags = Flags::NONE;
+        let mut force = Newtons(0.0);
+        for step in 1..=steps {
+            let depth = if step == steps {
+                self.below
+            } else {
+                before + way * step as f64
+            };
+            let one = self.law.tick(Depth(depth));
+            flags |= one.flags;
+            force = one.force;
+        }
+        (force, flags)
+    }
+
+    /// The force on the hand where `along` is what there is along the normal: friction goes with what the model gives, and damping
+    /// has none.
+    fn felt(&self, touch: &Touch, along: Newtons) -> [f64; 3] {
+        let push = along.0.max(0.0);
+        let with_friction = touch.force(push);
+        let pull = along.0 - if touch.is_contact() { push } else { 0.0 };
+        [0, 1, 2].map(|axis| with_friction[axis] + pull * touch.normal[axis])
+    }
+
+    /// The surface follows the stylus from the contact point down.
+    fn press(&mut self, touch: &Touch) {
+        let [x, y, z] = touch.point;
+        let contact = Contact {
+            x,
+            y,
+            z: z - touch.depth,
+            side: Side::Push,
+        };
+        let contacts = [contact];
+        let contacts = if touch.is_contact() {
+            &contacts[..]
+        } else {
+            &[]
+        };
+        let told = self.surface.tick(contacts);
+        self.dirty = told.dirty;
+        self.moved = told.moved.moved;
+    }
+
+    fn row_hash(&self, tick: u64) -> u64 {
+        let columns = self.settings.nodes;
+        let row = (tick % self.settings.nodes as u64) as usize;
+        hash(&self.field().heights()[row * columns..(row + 1) * columns])
+    }
+}
+
+/// FNV-1a over the bits of whole numbers instead of bytes.
+fn hash(heights: &[f64]) -> u64 {
+    let mix = |hash: u64, z: &f64| {
+        (hash ^ z.to_bits())
+            .wrapping_mul(0x0100_0000_01b3)
+            .rotate_left(23)
+    };
+    heights.iter().fold(0xcbf2_9ce4_8422_2325, mix)
+}
+
+fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}

@@ -1,0 +1,139 @@
+//! What a scene is made of.
+
+use super::device::DeviceSettings;
+use crate::haptics::{ControllerSettings, GuardSettings, LawError, Period};
+use crate::integrators::Scheme;
+use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, RecoveryError};
+use crate::surface::{ProxyError, Shear};
+use crate::units::Newtons;
+use crate::viscoelastic::ModifiedKelvin;
+use thiserror::Error;
+
+/// Height above the surface at rest at which a scene begins, over the middle of the mesh, in mm.
+pub const START_HEIGHT_MM: f64 = 10.0;
+
+/// A piece of tissue, a device over it, and the loop between them.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SceneSettings {
+    /// The tissue's force over depth.
+    pub body: ModifiedKelvin,
+    /// Length of a side in mm.
+    pub side_mm: f64,
+    /// Nodes along a side.
+    pub nodes: usize,
+    /// MaxShear: how far neighbouring nodes may be apart in height, in mm.
+    pub max_shear_mm: f64,
+    /// Time constant in s with which the surface returns; zero: at once, infinite: never.
+    pub recovery_s: f64,
+    /// Friction coefficient between stylus and tissue.
+    pub friction: f64,
+    /// The device.
+    pub device: DeviceSettings,
+    /// From tick to tick.
+    pub period: Period,
+    /// How the force law is stepped.
+    pub scheme: Scheme,
+    /// How the surface is found.
+    pub method: Method,
+    /// How far a contact's effect on the surface is followed.
+    pub cut: Cut,
+    /// Bounds of the force along the normal; those of the device come after.
+    pub guard: GuardSettings,
+    /// Damping that takes back what the loop makes; `None` for none.
+    pub controller: Option<ControllerSettings>,
+}
+
+impl Default for SceneSettings {
+    /// The body of the source thesis as 60 mm of flat tissue on 201 by 201 nodes, which gives way along a slope of 45 degrees, returns with
+    /// the body's own time constant and is felt through an Omni-class device a thousand times a second.
+    fn default() -> Self {
+        let body = ModifiedKelvin::THESIS;
+        let device = DeviceSettings::default();
+        Self {
+            body,
+            side_mm: 60.0,
+            nodes: 201,
+            max_shear_mm: 0.3,
+            recovery_s: body.tau_eps,
+            friction: 0.2,
+            device,
+            period: Period::MILLISECOND,
+            scheme: Scheme::Exact,
+            method: Method::Envelope,
+            cut: Cut::NONE,
+            guard: GuardSettings {
+                force_max: Newtons(device.force_max_n),
+                ..GuardSettings::default()
+            },
+            controller: Some(ControllerSettings {
+                force_max: Newtons(device.force_max_n),
+                ..ControllerSettings::of(device.mass_kg)
+            }),
+        }
+    }
+}
+
+impl SceneSettings {
+    /// The middle of the surface at rest in mm.
+    #[must_use]
+    pub fn middle(&self) -> [f64; 3] {
+        [0.5 * self.side_mm, 0.5 * self.side_mm, 0.0]
+    }
+
+    /// Where the stylus is at the start, in mm.
+    #[must_use]
+    pub fn start(&self) -> [f64; 3] {
+        let [x, y, _] = self.middle();
+        [x, y, START_HEIGHT_MM]
+    }
+
+    /// Another device, and bounds of force that go with it.
+    #[must_use]
+    pub fn with_device(mut self, device: DeviceSettings) -> Self {
+        self.device = device;
+        self.guard.force_max = Newtons(device.force_max_n);
+        if let Some(controller) = &mut self.controller {
+            controller.force_max = Newtons(device.force_max_n);
+            controller.mass_kg = device.mass_kg;
+        }
+        self
+    }
+
+    pub(super) fn field(&self) -> Result<HeightField, SceneError> {
+        // A spacing that is none is refused with the grid.
+        let spacing = self.side_mm / self.nodes.saturating_sub(1) as f64;
+        let grid = Grid::new(self.nodes, self.nodes, spacing)?;
+        let shear = Shear::Uniform(self.max_shear_mm);
+        Ok(HeightField::new(grid, vec![0.0; grid.nodes()], shear)?)
+    }
+}
+
+/// A scene that cannot be.
+#[derive(Clone, Debug, PartialEq, Error)]
+pub enum SceneError {
+    /// Its mesh.
+    #[error(transparent)]
+    Mesh(#[from] MeshError),
+    /// Its force law.
+    #[error(transparent)]
+    Law(#[from] LawError),
+    /// Its contact point.
+    #[error(transparent)]
+    Proxy(#[from] ProxyError),
+    /// Its way back to rest.
+    #[error(transparent)]
+    Recovery(#[from] RecoveryError),
+    /// How its surface is found.
+    #[error(transparent)]
+    Method(#[from] MethodError),
+    /// Its device.
+    #[error("a device with {name} = {value} is not possible; {name} is {wanted}")]
+    Device {
+        /// Which number.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        wanted: &'static str,
+    },
+}

@@ -1,0 +1,81 @@
+//! Why a hand feels nothing, or less than the model says.
+
+use super::device::DeviceSettings;
+use crate::haptics::Flags;
+use crate::surface::TouchState;
+use serde::Serialize;
+
+/// What takes force away in a tick; the first that applies.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum WhyNoForce {
+    /// Nothing does.
+    None,
+    /// The stylus is above the surface.
+    #[default]
+    NoContact,
+    /// The stylus is beside the mesh.
+    Outside,
+    /// The place is no number.
+    NotANumber,
+    /// The model has no force.
+    NoModel,
+    /// The tissue follows more slowly than the stylus leaves.
+    Leaving,
+    /// The force rises after start, stall or contact.
+    RampingIn,
+    /// The device gives all it has.
+    Saturated,
+    /// A guard changes the force: it changes too fast, or the loop made energy.
+    Guarded,
+    /// The force is less than the device's friction.
+    BelowThreshold,
+}
+
+impl WhyNoForce {
+    /// In words.
+    #[must_use]
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::None => "the force is the model's",
+            Self::NoContact => "the stylus is above the surface",
+            Self::Outside => "the stylus is beside the tissue",
+            Self::NotANumber => "the device reports no place",
+            Self::NoModel => "the model has no force for this move",
+            Self::Leaving => {
+                "the stylus leaves faster than the tissue follows; tissue does not pull"
+            }
+            Self::RampingIn => "the force rises slowly after start, stall or contact",
+            Self::Saturated => "the device gives its largest force; the model asks for more",
+            Self::Guarded => {
+                "a guard holds the force: it would change too fast, or the loop made energy"
+            }
+            Self::BelowThreshold => {
+                "the force is less than the device's own friction, so it cannot be felt"
+            }
+        }
+    }
+
+    pub(super) fn of(
+        state: TouchState,
+        flags: Flags,
+        is_saturated: bool,
+        force: f64,
+        device: &DeviceSettings,
+    ) -> Self {
+        let ramps = Flags::SOFT_START | Flags::STALL | Flags::CONTACT_RAMP;
+        let guards = Flags::SLEW | Flags::PASSIVITY | Flags::DAMPING_LIMIT;
+        match state {
+            TouchState::Free => Self::NoContact,
+            TouchState::Outside => Self::Outside,
+            TouchState::NotANumber => Self::NotANumber,
+            _ if flags.has(Flags::NO_FORCE) => Self::NoModel,
+            _ if flags.has(Flags::PULL) => Self::Leaving,
+            _ if flags.has_any(ramps) => Self::RampingIn,
+            _ if is_saturated => Self::Saturated,
+            _ if flags.has_any(guards) => Self::Guarded,
+            _ if force < device.friction_n => Self::BelowThreshold,
+            _ => Self::None,
+        }
+    }
+}

@@ -1,0 +1,373 @@
+//! The virtual scene: its device against closed forms, its tick against its parts, and the same hands give the same bits.
+
+use palpate_model::haptics::{Flags, Period};
+use palpate_model::random::SplitMix;
+use palpate_model::scene::{
+    DeviceSettings, Hand6, Pose, Scene, SceneError, ScenePath, SceneSettings, SceneTick,
+    SimulatedDevice, WhyNoForce,
+};
+use palpate_model::units::Depth;
+
+fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, SceneTick)) -> Scene {
+    let mut scene = Scene::new(settings).expect("a scene");
+    let ticks = settings.period.hz() * path.seconds();
+    for _ in 0..ticks as u64 {
+        let t = settings.period.time_of(scene.ticks() + 1).seconds();
+        let tick = scene.tick(path.at(t.0, &settings));
+        seen(&scene, tick);
+    }
+    scene
+}
+
+/// A place, and no turn.
+fn at(x: f64, y: f64, z: f64) -> Hand6 {
+    Hand6 {
+        at: [x, y, z],
+        turn: [0.0; 3],
+    }
+}
+
+fn pose(x: f64, y: f64, z: f64) -> Pose {
+    let Hand6 { at, turn } = at(x, y, z);
+    Pose { at, turn }
+}
+
+/// No hand, and nothing of friction.
+fn loose() -> DeviceSettings {
+    DeviceSettings {
+        friction_n: 0.0,
+        hand_mass_kg: 0.0,
+        hand_stiffness_n_per_mm: 0.0,
+        hand_damping_n_s_per_mm: 0.0,
+        ..DeviceSettings::default()
+    }
+}
+
+#[test]
+fn a_device_under_a_constant_force_moves_as_mass_and_damping_say() {
+    let settings = loose();
+    let mut device =
+        SimulatedDevice::new(settings, Period::MILLISECOND, [0.0; 3], [0.0; 3]).unwrap();
+    let (m, b, force) = (1e-3 * settings.mass_kg, settings.damping_n_s_per_mm, 0.02);
+    for tick in 1..=300_u32 {
+        device.follow(Hand6::default(), [force, 0.0, -2.0 * force], 1);
+        let t = f64::from(tick) * 1e-3;
+        let decayed = 1.0 - (-b * t / m).exp();
+        let place = force / b * (t - m / b * decayed);
+        let [x, _] = device.motion();
+        assert!(
+            (x[0] - place).abs() < 1e-4 * place.abs().max(1e-3),
+            "{t}: {x:?} {place}"
+        );
+        assert!(
+            (x[2] + 2.0 * place).abs() < 2e-4 * place.abs().max(1e-3),
+            "{t}"
+        );
+        assert_eq!(x[1], 0.0);
+        // Sensed within half a step, in whole steps.
+        let sensed = device.pose().at[0];
+        assert!((sensed - x[0]).abs() <= 0.5 * settings.step_mm + 1e-12);
+        let steps = sensed / settings.step_mm;
+        assert!((steps - steps.round()).abs() < 1e-9, "{steps}");
+    }
+}
+
+#[test]
+fn a_hand_settles_where_its_spring_balances_the_force_and_friction_holds() {
+    let settings = DeviceSettings {
+        friction_n: 0.0,
+        ..DeviceSettings::default()
+    };
+    let settled = |settings: DeviceSettings| {
+        let mut device =
+            SimulatedDevice::new(settings, Period::MILLISECOND, [0.0; 3], [0.0; 3]).unwrap();
+        device.follow(at(10.0, 0.0, 0.0), [0.0, 0.0, 1.0], 5000);
+        device.motion()[0]
+    };
+    let [x, y, z] = settled(settings);
+    let lifted = 1.0 / settings.hand_stiffness_n_per_mm;
+    assert!(
+        (x - 10.0).abs() < 1e-6 && y == 0.0 && (z - lifted).abs() < 1e-6,
+        "{x} {z}"
+    );
+    // With friction it stays short by no more than what friction holds.
+    let rough = DeviceSettings::default();
+    let [x, _, z] = settled(rough);
+    let short = rough.friction_n / rough.hand_stiffness_n_per_mm;
+    assert!(
+        (x - 10.0).abs() <= short + 1e-9 && (z - lifted).abs() <= short + 1e-9,
+        "{x} {z}"
+    );
+    assert!((z - lifted).abs() > 1e-3, "{z}");
+}
+
+#[test]
+fn energy_never_comes_out_of_a_device_whatever_it_is_told() {
+    let mut random = SplitMix::seeded(5);
+    let settings = DeviceSettings::default();
+    let mut device =
+        SimulatedDevice::new(settings, Period::MILLISECOND, [0.0; 3], [0.0; 3]).unwrap();
+    let mut taken = 0.0;
+    for _ in 0..20_000 {
+        let [x, y, z] = [0; 3].map(|_| 20.0 * random.normal());
+        let force = [0; 3].map(|_| 2.0 * random.normal());
+        device.follow(at(x, y, z), force, 1);
+        let now = device.energies();
+        // What went in and was not taken is motion.
+        let put_in = now.hand + now.motor;
+        let left = put_in - now.damping - now.friction - device.kinetic();
+        assert!(left.abs() < 1e-9 * now.friction.max(1.0), "{left:e}");
+        assert!(now.damping + now.friction >= taken);
+        taken = now.damping + now.friction;
+    }
+    assert!(taken > 100.0);
+}
+
+#[test]
+fn a_force_beyond_the_device_keeps_its_direction_and_is_told() {
+    let settings = DeviceSettings::default();
+    let (force, is_less) = settings.given([3.0, 4.0, 12.0]);
+    assert!(is_less);
+    for (part, of) in force.iter().zip([3.0, 4.0, 12.0]) {
+        assert!((part - of * 3.3 / 13.0).abs() < 1e-12);
+    }
+    assert_eq!(settings.given([1.0, -2.0, 2.0]), ([1.0, -2.0, 2.0], false));
+    assert_eq!(settings.given([f64::NAN; 3]), ([0.0; 3], true));
+}
+
+#[test]
+fn the_same_hands_give_the_same_bits_and_one_bit_more_does_not() {
+    let settings = SceneSettings::default();
+    for path in ScenePath::ALL {
+        let mut all = Vec::new();
+        let first = run(settings, path, |_, tick| all.push(tick));
+        let mut index = 0;
+        let again = run(settings, path, |_, tick| {
+            assert_eq!(tick, all[index], "{path:?}");
+            index += 1;
+        });
+        assert_eq!(first.hash(), again.hash());
+        assert!(all.iter().any(SceneTick::is_contact), "{path:?}");
+        let last = first.last();
+        let end = settings.start();
+        assert!(
+            !last.is_contact() && (last.device[2] - end[2]).abs() < 1.0,
+            "{path:?} {last:?}"
+        );
+    }
+    let other = SceneSettings {
+        max_shear_mm: f64::from_bits(settings.max_shear_mm.to_bits() + 1),
+        ..settings
+    };
+    let [one, two] = [settings, other].map(|one| run(one, ScenePath::Poke, |_, _| {}).hash());
+    assert_ne!(one, two);
+}
+
+#[test]
+fn the_force_of_a_long_hold_is_the_bodys_own() {
+    let settings = SceneSettings {
+        controller: None,
+        ..SceneSettings::default()
+    };
+    let mut scene = Scene::new(settings).unwrap();
+    let mut last = scene.last();
+    for _ in 0..25_000 {
+        last = scene.feel(pose(30.0, 30.0, -20.0), 1);
+    }
+    let elastic = settings.body.elastic(Depth(20.0)).0;
+    assert!((last.depth - 20.0).abs() < 1e-12 && elastic > 1.0);
+    assert!((last.force[2] - elastic).abs() < 1e-6, "{last:?} {elastic}");
+    assert_eq!([last.force[0], last.force[1]], [0.0; 2]);
+    assert_eq!(last.why, WhyNoForce::None);
+}
+
+#[test]
+fn the_surface_follows_the_stylus_within_its_limits_and_returns() {
+    let settings = SceneSettings {
+        recovery_s: 0.1,
+        ..SceneSettings::default()
+    };
+    let mut scene = Scene::new(settings).unwrap();
+    let flat = scene.hash();
+    for tick in 0..200 {
+        let x = 20.0 + 0.1 * f64::from(tick);
+        let told = scene.feel(pose(x, 31.2, -3.0), 1);
+        let node = scene
+            .field()
+            .grid()
+            .nearest(told.proxy[0], told.proxy[1])
+            .unwrap();
+        let height = scene.field().heights()[scene.field().grid().index(node)];
+        assert!(
+            (height - (told.proxy[2] - told.depth)).abs() < 1e-12,
+            "{told:?} {height}"
+        );
+        assert!(told.moved > 0, "{told:?}");
+        assert!(scene.field().worst_excess() < 1e-9);
+    }
+    assert_ne!(scene.hash(), flat);
+    for _ in 0..2000 {
+        scene.feel(pose(30.0, 30.0, 5.0), 1);
+    }
+    assert_eq!(scene.hash(), flat);
+    assert!(scene.dirty().is_empty());
+}
+
+#[test]
+fn a_fast_poke_never_pops_through() {
+    let mut random = SplitMix::seeded(6);
+    for _ in 0..50 {
+        let mut scene = Scene::new(SceneSettings::default()).unwrap();
+        let [x, y] = [0; 2].map(|_| 5.0 + random.below(500) as f64 * 0.1);
+        let speed = 0.01 * 10_f64.powf(random.below(4) as f64);
+        let mut depth = 0.0;
+        for tick in 0..200 {
+            let z = 1.0 - speed * f64::from(tick);
+            let told = scene.feel(pose(x, y, z), 1);
+            assert!(
+                told.depth >= depth && (told.depth - (-z).max(0.0)).abs() < 1e-9,
+                "{told:?}"
+            );
+            depth = told.depth;
+        }
+    }
+}
+
+#[test]
+fn the_force_is_bounded_and_its_part_across_is_within_friction() {
+    let settings = SceneSettings::default();
+    for path in ScenePath::ALL {
+        let mut across_most = 0.0_f64;
+        run(settings, path, |_, tick| {
+            let [fx, fy, fz] = tick.force;
+            let total = fx.hypot(fy).hypot(fz);
+            assert!(
+                total <= settings.device.force_max_n * (1.0 + 1e-12),
+                "{tick:?}"
+            );
+            let across = fx.hypot(fy);
+            across_most = across_most.max(across);
+            assert!(
+                across <= settings.friction * fz.max(0.0) + 1e-9 || tick.injected_damping > 0.0,
+                "{tick:?}"
+            );
+        });
+        // Only a drag has something across.
+        assert_eq!(
+            across_most > 0.05,
+            path == ScenePath::Drag,
+            "{path:?} {across_most}"
+        );
+    }
+}
+
+#[test]
+fn why_there_is_no_force_is_told() {
+    let settings = SceneSettings::default();
+    let mut scene = Scene::new(settings).unwrap();
+    let mut why = |x: f64, z: f64, ticks: u32| {
+        let mut last = scene.last();
+        for _ in 0..ticks {
+            last = scene.feel(pose(x, 30.0, z), 1);
+        }
+        assert!(!last.why.words().is_empty());
+        (last.why, last.force[2])
+    };
+    assert_eq!(why(30.0, 1.0, 1), (WhyNoForce::NoContact, 0.0));
+    assert_eq!(why(70.0, -1.0, 1), (WhyNoForce::Outside, 0.0));
+    assert_eq!(why(30.0, 1.0, 2000).0, WhyNoForce::NoContact);
+    assert_eq!(why(30.0, -4.0, 1).0, WhyNoForce::RampingIn);
+    // After its ramp and its memory: 0.1 N, which 0.26 N of friction hide.
+    assert_eq!(why(30.0, -4.0, 9000).0, WhyNoForce::BelowThreshold);
+    assert_eq!(why(30.0, -3.0, 3).0, WhyNoForce::Leaving);
+    assert_eq!(why(30.0, 5.0, 9000).0, WhyNoForce::NoContact);
+    let (deep, force) = why(30.0, -29.0, 200);
+    assert_eq!(deep, WhyNoForce::Saturated);
+    assert!((force - 3.3).abs() < 1e-9, "{force}");
+    assert_eq!(why(30.0, f64::NAN, 1).0, WhyNoForce::NotANumber);
+}
+
+#[test]
+fn a_stall_is_led_through_and_the_force_rises_again_from_zero() {
+    let settings = SceneSettings::default();
+    let mut scene = Scene::new(settings).unwrap();
+    for _ in 0..3000 {
+        scene.tick(at(30.0, 30.0, -12.0));
+    }
+    let before = scene.last();
+    let after = scene.tick_after(at(30.0, 30.0, -12.0), 50);
+    assert_eq!(after.tick, before.tick + 50);
+    assert!(
+        after.flags.has(Flags::STALL) && after.why == WhyNoForce::RampingIn,
+        "{after:?}"
+    );
+    for _ in 0..20 {
+        scene.tick(at(30.0, 30.0, -12.0));
+    }
+    assert!(
+        scene.last().force[2] < 0.2 * before.force[2],
+        "{:?}",
+        scene.last()
+    );
+}
+
+#[test]
+fn scenes_that_cannot_be_are_refused_in_words() {
+    let usual = SceneSettings::default();
+    let device = |change: fn(&mut DeviceSettings)| {
+        let mut device = DeviceSettings::default();
+        change(&mut device);
+        usual.with_device(device)
+    };
+    let refused = |settings: SceneSettings| {
+        let refused: Option<SceneError> = Scene::new(settings).err();
+        refused.expect("refused").to_string()
+    };
+    for (settings, word) in [
+        (SceneSettings { nodes: 1, ..usual }, "not possible"),
+        (
+            SceneSettings {
+                side_mm: f64::NAN,
+                ..usual
+            },
+            "not possible",
+        ),
+        (
+            SceneSettings {
+                max_shear_mm: -1.0,
+                ..usual
+            },
+            "MaxShear",
+        ),
+        (
+            SceneSettings {
+                recovery_s: -1.0,
+                ..usual
+            },
+            "recovery",
+        ),
+        (
+            SceneSettings {
+                friction: 11.0,
+                ..usual
+            },
+            "friction",
+        ),
+        (device(|one| one.mass_kg = 0.0), "mass_kg"),
+        (device(|one| one.friction_n = -1.0), "friction_n"),
+        (
+            device(|one| one.workspace_mm[1] = f64::INFINITY),
+            "workspace_mm",
+        ),
+    ] {
+        let said = refused(settings);
+        assert!(said.contains(word), "{said}");
+    }
+    assert!("poke".parse::<ScenePath>().is_ok());
+    assert!(
+        "pork"
+            .parse::<ScenePath>()
+            .unwrap_err()
+            .contains("poke, press, drag, taps")
+    );
+}
