@@ -36,6 +36,7 @@ pub mod recover;
 mod schema;
 pub mod shelf;
 pub mod text;
+pub mod ticks;
 pub mod trade;
 
 pub use about::{About, AboutError, Labels};

@@ -29,6 +29,7 @@ mod report;
 mod review;
 mod rig;
 mod run;
+mod scene;
 mod select;
 mod shell;
 mod trade;
@@ -125,6 +126,9 @@ enum Command {
     /// Feel a fitted body through a master-slave device: check it, run it, time its loop
     #[command(subcommand)]
     Haptics(haptics::HapticsCommand),
+    /// See and feel a piece of tissue: run a scene, record it, compute a recording again
+    #[command(subcommand)]
+    Scene(scene::SceneCommand),
     /// Answer like a controller on a wire, with the simulated bench behind it
     #[command(subcommand)]
     Emulate(emulate::EmulateCommand),
@@ -253,6 +257,7 @@ pub fn main() -> ExitCode {
         Some(Command::Haptics(command)) => {
             with(command.is_json(), |out| haptics::run(&command, out))
         }
+        Some(Command::Scene(command)) => with(command.is_json(), |out| scene::run(&command, out)),
         Some(Command::Emulate(command)) => {
             with(command.is_json(), |out| emulate::run(&command, out))
         }

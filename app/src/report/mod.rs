@@ -20,6 +20,7 @@ pub mod plan_picture;
 pub mod programme;
 mod raster;
 pub mod said;
+pub mod scene;
 pub mod selection;
 mod selection_plot;
 pub mod session;

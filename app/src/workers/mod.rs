@@ -19,6 +19,7 @@ pub mod pool;
 pub mod ports;
 pub mod recovery;
 pub mod review;
+pub mod scene;
 pub mod select;
 pub mod task;
 

@@ -15,6 +15,16 @@ pub struct Mistake {
     pub message: String,
 }
 
+/// All mistakes of a file in one sentence each; `file` is what it is called.
+#[must_use]
+pub fn in_words(file: &str, mistakes: &[Mistake]) -> String {
+    let one = |mistake: &Mistake| match mistake.line {
+        0 => format!("{file}: {}", mistake.message),
+        line => format!("{file}, line {line}: {}", mistake.message),
+    };
+    mistakes.iter().map(one).collect::<Vec<_>>().join("; ")
+}
+
 #[derive(Clone, Debug)]
 enum Value {
     Text(String),

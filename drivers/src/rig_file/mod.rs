@@ -4,7 +4,7 @@
 //! described in `docs/guide/galil.md`, `grbl.md` and `mark10.md`.
 
 mod cell;
-mod fields;
+pub mod fields;
 mod galil;
 mod grbl;
 mod place;
@@ -68,16 +68,7 @@ pub struct RigFileError {
 
 impl fmt::Display for RigFileError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        for (at, mistake) in self.mistakes.iter().enumerate() {
-            if at > 0 {
-                f.write_str("; ")?;
-            }
-            match mistake.line {
-                0 => write!(f, "{}: {}", self.file, mistake.message)?,
-                line => write!(f, "{}, line {line}: {}", self.file, mistake.message)?,
-            }
-        }
-        Ok(())
+        f.write_str(&fields::in_words(&self.file, &self.mistakes))
     }
 }
 

@@ -99,6 +99,14 @@ impl SceneSettings {
         self
     }
 
+    /// The same without guards and controller, to show what they are for. The device still gives no more than it has.
+    #[must_use]
+    pub fn unguarded(mut self) -> Self {
+        self.guard = GuardSettings::OPEN;
+        self.controller = None;
+        self
+    }
+
     pub(super) fn field(&self) -> Result<HeightField, SceneError> {
         // A spacing that is none is refused with the grid.
         let spacing = self.side_mm / self.nodes.saturating_sub(1) as f64;

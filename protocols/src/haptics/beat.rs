@@ -18,6 +18,11 @@ pub trait Ticking: Send + 'static {
     /// So many ticks are due: one, unless the loop was away. Neither allocates, locks nor waits.
     fn tick(&mut self, elapsed: u64);
 
+    /// Whether this tick is shown.
+    fn is_shown(&self) -> bool {
+        true
+    }
+
     /// Copies what is to be seen into its place, without allocating.
     fn show(&self, view: &mut Self::View);
 }
@@ -120,8 +125,10 @@ fn run<T: Ticking>(
         let begun = metronome.now();
         let elapsed = 1 + (begun.saturating_sub(due)) / period.nanos();
         task.tick(elapsed);
-        task.show(shown.input_buffer_mut());
-        shown.publish();
+        if task.is_shown() {
+            task.show(shown.input_buffer_mut());
+            shown.publish();
+        }
         let ended = metronome.now();
         done += elapsed;
         timing.late.count(begun.saturating_sub(due));

@@ -5,6 +5,8 @@
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
 mod beat;
+pub mod scene;
+pub mod scene_file;
 mod led;
 mod simulated;
 pub mod timing;
@@ -12,4 +14,5 @@ pub mod timing;
 pub use beat::{Beat, Ticking};
 pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
 pub use palpate_drivers::priority;
+pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;

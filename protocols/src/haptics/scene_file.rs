@@ -1,0 +1,475 @@
+//! Scene files: which tissue, mesh, device, loop and tolerances a scene has, as TOML.
+
+use palpate_drivers::rig_file::fields::{Fields, Mistake, in_words};
+use palpate_model::haptics::Period;
+use palpate_model::integrators::Scheme;
+use palpate_model::scene::{DeviceSettings, Scene, SceneSettings};
+use palpate_model::surface::{Cut, Method};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use std::fmt::Write;
+
+/// Longest text of a scene file.
+const BYTES_MAX: usize = 65_536;
+
+/// The source of a body that needs no session.
+pub const THESIS: &str = "thesis";
+
+/// Nodes along a side that a scene may have: 1601 stand for the truth in comparisons.
+const NODES: [u64; 2] = [3, 1601];
+
+/// What a scene tolerates.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Tolerances {
+    /// Error of force in percent of the smallest change that a hand notices.
+    pub force_percent: f64,
+    /// Error of shape in mm.
+    pub shape_mm: f64,
+    /// Time of a tick's own work in microseconds.
+    pub tick_us: f64,
+}
+
+impl Default for Tolerances {
+    /// A fifth of what a hand notices, half a millimetre, half of a millisecond.
+    fn default() -> Self {
+        Self {
+            force_percent: 20.0,
+            shape_mm: 0.5,
+            tick_us: 500.0,
+        }
+    }
+}
+
+/// A scene as its file has it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneFile {
+    /// What it is called.
+    pub name: String,
+    /// The session or table whose fit is the body; [`Self::body`] is, where there is none.
+    pub source: Option<String>,
+    /// The body.
+    pub body: ModifiedKelvin,
+    /// Length of a side in mm.
+    pub side_mm: f64,
+    /// MaxShear over the distance of nodes: the steepest slope of the tissue, the same on every mesh.
+    pub slope: f64,
+    /// Time constant of recovery in s; that of the body without it.
+    pub recovery_s: Option<f64>,
+    /// Friction coefficient.
+    pub friction: f64,
+    /// Nodes along a side; planned from the tolerances without it.
+    pub nodes: Option<usize>,
+    /// Most nodes from a contact to one that it moves; no end without it.
+    pub cut_nodes: Option<u32>,
+    /// Least movement in mm.
+    pub cut_mm: f64,
+    /// Ticks a second.
+    pub rate_hz: f64,
+    /// How the force law is stepped.
+    pub scheme: Scheme,
+    /// Whether guards and passivity controller are at work.
+    pub is_guarded: bool,
+    /// The device.
+    pub device: DeviceSettings,
+    /// What it tolerates.
+    pub tolerances: Tolerances,
+}
+
+impl Default for SceneFile {
+    /// The scene that is there without a file.
+    fn default() -> Self {
+        let usual = SceneSettings::default();
+        Self {
+            name: "thesis body".to_owned(),
+            source: None,
+            body: usual.body,
+            side_mm: usual.side_mm,
+            slope: 1.0,
+            recovery_s: None,
+            friction: usual.friction,
+            nodes: Some(usual.nodes),
+            cut_nodes: None,
+            cut_mm: 0.0,
+            rate_hz: usual.period.hz(),
+            scheme: usual.scheme,
+            is_guarded: true,
+            device: usual.device,
+            tolerances: Tolerances::default(),
+        }
+    }
+}
+
+impl SceneFile {
+    /// Reads the text of a scene file, which `file` is called.
+    pub fn parse(file: &str, text: &str) -> Result<Self, String> {
+        let one = |mistake: Mistake| in_words(file, &[mistake]);
+        if text.len() > BYTES_MAX {
+            let message = format!("more than {BYTES_MAX} bytes are no scene file");
+            return Err(one(Mistake { line: 0, message }));
+        }
+        let mut fields = Fields::read(text).map_err(one)?;
+        let read = read(&mut fields);
+        let mistakes = fields.finish();
+        if mistakes.is_empty() {
+            Ok(read)
+        } else {
+            Err(in_words(file, &mistakes))
+        }
+    }
+
+    /// As a text that reads back to the same bits.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let mut text = String::new();
+        let mut put = |line: String| {
+            text.push_str(&line);
+            text.push('\n');
+        };
+        let ModifiedKelvin {
+            tau_eps,
+            mu: [mu1, mu2, mu3],
+            tau_sig,
+        } = self.body;
+        put(format!("name = \"{}\"", plain(&self.name)));
+        put("\n[tissue]".to_owned());
+        match &self.source {
+            Some(source) => put(format!("source = \"{}\"", plain(source))),
+            None => {
+                let body = [tau_eps, mu1, mu2, mu3, tau_sig];
+                for (name, value) in BODY.into_iter().zip(body) {
+                    put(format!("{name} = {value:?}"));
+                }
+            }
+        }
+        put(format!("side_mm = {:?}", self.side_mm));
+        put(format!("slope = {:?}", self.slope));
+        if let Some(recovery) = self.recovery_s {
+            put(format!("recovery_s = {recovery:?}"));
+        }
+        put(format!("friction = {:?}", self.friction));
+        put("\n[mesh]".to_owned());
+        match self.nodes {
+            Some(nodes) => put(format!("nodes = {nodes}")),
+            None => put("auto = true".to_owned()),
+        }
+        if let Some(range) = self.cut_nodes {
+            put(format!("cut_nodes = {range}"));
+        }
+        put(format!("cut_mm = {:?}", self.cut_mm));
+        put("\n[loop]".to_owned());
+        put(format!("rate_hz = {:?}", self.rate_hz));
+        let scheme = SCHEMES.iter().find(|(_, scheme)| *scheme == self.scheme);
+        put(format!(
+            "integrator = \"{}\"",
+            scheme.map_or("exact", |(word, _)| word)
+        ));
+        put(format!("guards = {}", self.is_guarded));
+        put("\n[device]".to_owned());
+        for (name, value) in device_numbers(&mut self.device.clone()) {
+            put(format!("{name} = {value:?}"));
+        }
+        put("\n[tolerances]".to_owned());
+        let Tolerances {
+            force_percent,
+            shape_mm,
+            tick_us,
+        } = self.tolerances;
+        put(format!("force_percent = {force_percent:?}"));
+        put(format!("shape_mm = {shape_mm:?}"));
+        put(format!("tick_us = {tick_us:?}"));
+        text
+    }
+
+    /// What a scene of it is made of, with so many nodes along a side where the file leaves them to be planned.
+    pub fn settings(&self, planned_nodes: usize) -> Result<SceneSettings, String> {
+        let nodes = self.nodes.unwrap_or(planned_nodes);
+        let words = |err: &dyn std::error::Error| format!("the scene '{}': {err}", self.name);
+        let spacing = self.side_mm / nodes.saturating_sub(1) as f64;
+        let mut settings = SceneSettings {
+            body: self.body,
+            side_mm: self.side_mm,
+            nodes,
+            max_shear_mm: self.slope * spacing,
+            recovery_s: self.recovery_s.unwrap_or(self.body.tau_eps),
+            friction: self.friction,
+            period: Period::of_rate(self.rate_hz).map_err(|err| words(&err))?,
+            scheme: self.scheme,
+            method: Method::Envelope,
+            cut: Cut::new(self.cut_nodes, self.cut_mm).map_err(|err| words(&err))?,
+            ..SceneSettings::default()
+        }
+        .with_device(self.device);
+        if !self.is_guarded {
+            settings = settings.unguarded();
+        }
+        Ok(settings)
+    }
+
+    /// The scene itself.
+    pub fn scene(&self, planned_nodes: usize) -> Result<Scene, String> {
+        let settings = self.settings(planned_nodes)?;
+        Scene::new(settings).map_err(|err| format!("the scene '{}': {err}", self.name))
+    }
+}
+
+/// Integrators in the file's words.
+const SCHEMES: [(&str, Scheme); 7] = [
+    ("explicit-euler", Scheme::ExplicitEuler),
+    ("implicit-euler", Scheme::ImplicitEuler),
+    ("trapezoid", Scheme::Trapezoid),
+    ("exponential-left", Scheme::ExponentialLeft),
+    ("exponential-first-order", Scheme::ExponentialFirstOrder),
+    ("exact", Scheme::Exact),
+    ("runge-kutta", Scheme::RungeKutta),
+];
+
+/// Parameters of a body in the file's words.
+const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
+
+/// The numbers of a device by name.
+fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15] {
+    let [wide, deep, high] = &mut device.workspace_mm;
+    [
+        ("mass_kg", &mut device.mass_kg),
+        ("damping_n_s_per_mm", &mut device.damping_n_s_per_mm),
+        ("friction_n", &mut device.friction_n),
+        ("step_mm", &mut device.step_mm),
+        ("turn_step_rad", &mut device.turn_step_rad),
+        ("force_max_n", &mut device.force_max_n),
+        ("force_continuous_n", &mut device.force_continuous_n),
+        ("stiffness_max_n_per_mm", &mut device.stiffness_max_n_per_mm),
+        ("reach_x_mm", wide),
+        ("reach_y_mm", deep),
+        ("reach_z_mm", high),
+        ("hand_mass_kg", &mut device.hand_mass_kg),
+        (
+            "hand_stiffness_n_per_mm",
+            &mut device.hand_stiffness_n_per_mm,
+        ),
+        (
+            "hand_damping_n_s_per_mm",
+            &mut device.hand_damping_n_s_per_mm,
+        ),
+        (
+            "hand_speed_max_mm_per_s",
+            &mut device.hand_speed_max_mm_per_s,
+        ),
+    ]
+}
+
+fn read(fields: &mut Fields) -> SceneFile {
+    let mut file = SceneFile::default();
+    let most = 1e6;
+    if let Some(name) = fields.text("name") {
+        file.name = name;
+    }
+    let source = fields.text("tissue.source");
+    let mut body = [None; 5];
+    for (slot, name) in body.iter_mut().zip(BODY) {
+        *slot = fields.number(&format!("tissue.{name}"), -most, most);
+    }
+    let is_whole = body.iter().all(Option::is_some);
+    if source.is_some() && body.iter().any(Option::is_some) {
+        fields.mistake(
+            "tissue.source",
+            "give either a source or parameters, not both",
+        );
+    } else if let [
+        Some(tau_eps),
+        Some(mu1),
+        Some(mu2),
+        Some(mu3),
+        Some(tau_sig),
+    ] = body
+    {
+        file.body = ModifiedKelvin {
+            tau_eps,
+            mu: [mu1, mu2, mu3],
+            tau_sig,
+        };
+        if let Err(err) = file.body.checked() {
+            fields.mistake("tissue.tau_eps", &err.to_string());
+        }
+    } else if !is_whole && body.iter().any(Option::is_some) {
+        fields.mistake(
+            "tissue",
+            "give all of tau_eps, mu1, mu2, mu3 and tau_sig, or a source",
+        );
+    }
+    file.source = source.filter(|source| source != THESIS);
+    // A spacing from a nanometre to a metre, so that every mesh is possible.
+    set(
+        &mut file.side_mm,
+        fields.number("tissue.side_mm", 1.0, 1000.0),
+    );
+    set(&mut file.slope, fields.number("tissue.slope", 0.0, 1000.0));
+    file.recovery_s = fields.number("tissue.recovery_s", 0.0, most);
+    set(
+        &mut file.friction,
+        fields.number("tissue.friction", 0.0, 10.0),
+    );
+    let nodes = fields.whole("mesh.nodes", NODES[0], NODES[1]);
+    match (fields.flag("mesh.auto"), nodes) {
+        (Some(true), Some(_)) => {
+            fields.mistake(
+                "mesh.auto",
+                "a mesh with nodes is not planned; leave one of the two out",
+            );
+        }
+        (Some(true), None) => file.nodes = None,
+        (_, Some(nodes)) => file.nodes = Some(nodes as usize),
+        (_, None) => {}
+    }
+    file.cut_nodes = fields
+        .whole("mesh.cut_nodes", 1, NODES[1] * 2)
+        .map(|range| range as u32);
+    set(&mut file.cut_mm, fields.number("mesh.cut_mm", 0.0, 1000.0));
+    let [slowest, fastest] = Period::RATES_HZ;
+    set(
+        &mut file.rate_hz,
+        fields.number("loop.rate_hz", slowest, fastest),
+    );
+    if let Some(scheme) = fields.choice("loop.integrator", &SCHEMES, Some(file.scheme)) {
+        file.scheme = scheme;
+    }
+    file.is_guarded = fields.flag("loop.guards").unwrap_or(file.is_guarded);
+    for (name, value) in device_numbers(&mut file.device) {
+        set(value, fields.number(&format!("device.{name}"), 0.0, most));
+    }
+    if let Err(err) = file.device.checked() {
+        fields.mistake("device", &err.to_string());
+    }
+    let tolerances = &mut file.tolerances;
+    for (name, value) in [
+        ("force_percent", &mut tolerances.force_percent),
+        ("shape_mm", &mut tolerances.shape_mm),
+        ("tick_us", &mut tolerances.tick_us),
+    ] {
+        // Zero tolerates nothing, which nothing can hold.
+        set(
+            value,
+            fields.number(&format!("tolerances.{name}"), 1e-6, most),
+        );
+    }
+    file
+}
+
+fn set(value: &mut f64, given: Option<f64>) {
+    if let Some(given) = given {
+        *value = given;
+    }
+}
+
+/// A text as TOML has it between quotes.
+fn plain(text: &str) -> String {
+    let mut out = String::new();
+    for letter in text.chars() {
+        match letter {
+            '"' | '\\' => {
+                out.push('\\');
+                out.push(letter);
+            }
+            letter if letter.is_control() => {
+                let _ = write!(out, "\\u{:04X}", u32::from(letter));
+            }
+            letter => out.push(letter),
+        }
+    }
+    out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_written_reads_back_to_the_same_bits() {
+        let usual = SceneFile::default();
+        let odd = SceneFile {
+            name: "a \"quoted\"\\ name\tand ü".to_owned(),
+            body: ModifiedKelvin {
+                tau_eps: 1.0 / 3.0,
+                mu: [1e-7, -0.1, 1e-300],
+                tau_sig: 0.7,
+            },
+            side_mm: 59.999_999_999_999_99,
+            recovery_s: Some(0.1 + 0.2),
+            nodes: None,
+            cut_nodes: Some(17),
+            cut_mm: 1e-3,
+            rate_hz: 3000.0,
+            scheme: Scheme::Trapezoid,
+            is_guarded: false,
+            device: DeviceSettings {
+                mass_kg: 1.0 / 7.0,
+                ..DeviceSettings::default()
+            },
+            ..usual.clone()
+        };
+        let fitted = SceneFile {
+            source: Some("C:\\data\\liver".to_owned()),
+            ..usual.clone()
+        };
+        for file in [usual, odd, fitted] {
+            let again = SceneFile::parse("a.toml", &file.text());
+            assert_eq!(again.as_ref(), Ok(&file), "{}", file.text());
+        }
+    }
+
+    #[test]
+    fn without_a_file_it_is_the_scene_of_the_model() {
+        let settings = SceneFile::default().settings(51).unwrap();
+        assert_eq!(settings, SceneSettings::default());
+        assert_eq!(SceneFile::parse("empty.toml", ""), Ok(SceneFile::default()));
+        let planned = SceneFile::parse("a.toml", "[mesh]\nauto = true").unwrap();
+        assert_eq!(planned.settings(51).unwrap().nodes, 51);
+        let source = SceneFile::parse("a.toml", "[tissue]\nsource = \"thesis\"").unwrap();
+        assert_eq!(source, SceneFile::default());
+    }
+
+    #[test]
+    fn mistakes_are_told_with_their_lines() {
+        for (text, told) in [
+            (
+                "[tissue]\nside_mm = -3",
+                "scene.toml, line 2: tissue.side_mm: give a number from 1",
+            ),
+            (
+                "[tissue]\n\nsid_mm = 3",
+                "scene.toml, line 3: 'tissue.sid_mm' means nothing here",
+            ),
+            (
+                "[tissue]\ntau_eps = 1.0",
+                "give all of tau_eps, mu1, mu2, mu3 and tau_sig",
+            ),
+            (
+                "[tissue]\nsource = \"thesis\"\nmu1 = 1",
+                "line 2: tissue.source: give either a source or parameters",
+            ),
+            (
+                "[mesh]\nnodes = 10.5",
+                "line 2: mesh.nodes: give a whole number from 3 to 1601",
+            ),
+            ("[mesh]\nnodes = 51\nauto = true", "line 3: mesh.auto"),
+            (
+                "[loop]\nrate_hz = 20",
+                "line 2: loop.rate_hz: give a number from 250 to 10000",
+            ),
+            (
+                "[loop]\nintegrator = \"magic\"",
+                "line 2: loop.integrator: give \"",
+            ),
+            (
+                "[device]\nmass_kg = 0",
+                "device with mass_kg = 0 is not possible",
+            ),
+            (
+                "[tolerances]\nshape_mm = \"fine\"",
+                "line 2: tolerances.shape_mm",
+            ),
+            ("side = ", "scene.toml, line 1: this is not TOML"),
+        ] {
+            let said = SceneFile::parse("scene.toml", text).unwrap_err();
+            assert!(said.contains(told), "{said}");
+        }
+    }
+}

@@ -1,0 +1,158 @@
+//! The scene as a loop: a tick allocates nothing, frames are the surface, and a recording is computed again bit by bit.
+
+use palpate_model::haptics::Period;
+use palpate_model::scene::{Hand6, Scene, ScenePath, SceneSettings};
+use palpate_protocols::haptics::scene::{
+    COLUMNS, FRAME_NODES_MAX, SceneFrame, SceneRecorder, SceneRow, SceneTask, scene_input,
+    scene_row,
+};
+use palpate_protocols::haptics::{SceneLoop, Ticking};
+use palpate_sessions::ticks::{End, Recording};
+
+fn scene(settings: SceneSettings) -> Scene {
+    Scene::new(settings).expect("a scene")
+}
+
+#[test]
+fn a_tick_of_a_scene_allocates_nothing_while_it_is_recorded() {
+    let at = tempfile::tempdir().unwrap();
+    let recorder = SceneRecorder::start(&at.path().join("ticks"), "", COLUMNS).unwrap();
+    let scene = scene(SceneSettings::default());
+    let (mut task, mut pointing) =
+        SceneTask::new(scene, (Some(ScenePath::Drag), 1), Some(recorder));
+    let mut frame = task.first();
+    let counted = allocation_counter::measure(|| {
+        for tick in 0..6000_u64 {
+            pointing.write(Hand6::default());
+            // Stalls too.
+            task.tick(1 + u64::from(tick % 997 == 0) * 20);
+            if task.is_shown() {
+                task.show(&mut frame);
+            }
+        }
+    });
+    assert_eq!(counted.count_total, 0, "{counted:?}");
+    assert!(frame.tick.tick > 6000);
+}
+
+fn is_the_surface(frame: &SceneFrame, task: &SceneTask) {
+    let field = task.scene().field();
+    let spacing = frame.side_mm / (frame.nodes - 1) as f64;
+    assert_eq!(frame.heights.len(), frame.nodes * frame.nodes);
+    for (index, height) in frame.heights.iter().enumerate() {
+        let [x, y] = [index % frame.nodes, index / frame.nodes].map(|steps| steps as f64 * spacing);
+        let node = field.grid().nearest(x, y).unwrap();
+        let right = field.heights()[field.grid().index(node)] as f32;
+        assert_eq!(height.to_bits(), right.to_bits(), "{index}");
+    }
+}
+
+#[test]
+fn every_frame_is_the_surface_however_seldom_one_is_taken() {
+    for nodes in [51, 201, 801, 950] {
+        let settings = SceneSettings {
+            nodes,
+            max_shear_mm: 60.0 / (nodes - 1) as f64,
+            recovery_s: 0.05,
+            ..SceneSettings::default()
+        };
+        let (mut task, _) = SceneTask::new(scene(settings), (Some(ScenePath::Drag), 1), None);
+        // Three places as a triple buffer has them, taken in no order.
+        let mut frames = [task.first(), task.first(), task.first()];
+        assert!(frames[0].nodes <= FRAME_NODES_MAX);
+        // All of the side, unless its cells cannot be parted evenly.
+        assert_eq!(frames[0].side_mm > 59.999, nodes != 950);
+        for tick in 0..4000_usize {
+            task.tick(1);
+            if tick % 37 == 0 {
+                let frame = &mut frames[(tick / 37) * 7 % 5 % 3];
+                task.show(frame);
+                if tick % (37 * 3) == 0 {
+                    is_the_surface(frame, &task);
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn a_recorded_loop_is_computed_again_bit_by_bit() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = at.path().join("poke");
+    let recorder = SceneRecorder::start(&folder, "", COLUMNS).unwrap();
+    let settings = SceneSettings::default();
+    let mut live =
+        SceneLoop::start(scene(settings), Some(ScenePath::Poke), Some(recorder)).unwrap();
+    let mut deepest = 0.0_f64;
+    while !live.is_over() {
+        let frame = live.view();
+        let lowest = frame.heights.iter().copied().fold(0.0, f32::min);
+        deepest = deepest.min(f64::from(lowest));
+        assert!(live.is_alive());
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!(deepest < -5.0, "{deepest}");
+    // Then it follows who points.
+    live.point(Hand6 {
+        at: [20.0, 30.0, 5.0],
+        turn: [0.0; 3],
+    });
+    for _ in 0..1000 {
+        if (live.view().tick.device[0] - 20.0).abs() < 1.0 {
+            break;
+        }
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    assert!((live.view().tick.device[0] - 20.0).abs() < 1.0);
+    let end = live.stop().unwrap();
+    assert!(end.kept.work.count > 100);
+    let told = end.recorded.unwrap().unwrap();
+    assert_eq!(told.lost, 0);
+    let found = Recording::read(&folder, COLUMNS).unwrap();
+    assert_eq!(found.rows.len() as u64, told.ticks);
+    assert_eq!(
+        found.end,
+        End::Whole {
+            lost: 0,
+            left: end.scene.hash()
+        }
+    );
+    let differs = |change: fn(usize, &mut SceneRow)| {
+        let mut again = scene(settings);
+        let mut first = None;
+        for (index, row) in found.rows.iter().enumerate() {
+            let mut row = *row;
+            change(index, &mut row);
+            let (hand, elapsed) = scene_input(&row);
+            let told = again.tick_after(hand, elapsed);
+            let made = scene_row(hand, elapsed, &told);
+            first = first.or(made.differs(&row).map(|column| (index, column)));
+        }
+        (first, again.hash())
+    };
+    assert_eq!(differs(|_, _| ()), (None, end.scene.hash()));
+    // One bit of one force.
+    let flipped = differs(|index, row| {
+        if index == 1234 {
+            row.real[8] = f64::from_bits(row.real[8].to_bits() ^ 1);
+        }
+    });
+    assert_eq!(flipped.0, Some((1234, 3 + 8)));
+}
+
+#[test]
+fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
+    for hz in [250.0, 1000.0, 5000.0] {
+        let settings = SceneSettings {
+            period: Period::of_rate(hz).unwrap(),
+            ..SceneSettings::default()
+        };
+        let (mut task, _) = SceneTask::new(scene(settings), (None, 1), None);
+        let shown = (0..hz as usize).filter(|_| {
+            task.tick(1);
+            task.is_shown()
+        });
+        let shown = shown.count();
+        assert!((58..=64).contains(&shown), "{hz} {shown}");
+    }
+}
