@@ -15,7 +15,7 @@ const LIGHT: Vec3 = [-0.4, -0.5, 0.768_114_574_786_860_8];
 /// Light where no light comes from the lamp.
 const AMBIENT: f64 = 0.4;
 /// Half the width of a mesh line in points.
-const LINE: f32 = 0.4;
+const LINE: f32 = 0.5;
 
 /// What is drawn of a surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
