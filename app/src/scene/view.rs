@@ -121,7 +121,11 @@ impl SceneView {
                 .orbit(-ORBIT[0] * f64::from(by.x), ORBIT[0] * f64::from(by.y));
         }
         let pointer = response.hover_pos().or(response.interact_pointer_pos());
-        let is_moved = ui.input(|input| input.pointer.is_moving());
+        // A pointer that rests leaves the hand to the keys.
+        let is_moved = ui.input(|input| {
+            let mut events = input.events.iter();
+            events.any(|event| matches!(event, Event::PointerMoved(_)))
+        });
         if let Some(at) = pointer.filter(|_| presses || is_moved)
             && let Some(place) = self.camera.lens(rect).pick(at, 0.0)
         {
@@ -316,5 +320,147 @@ fn bar_shape(painter: &Painter, rect: Rect, deepest: f64, tokens: &Tokens, font:
             Align2::LEFT_CENTER,
             format!("{}", f64::from(share) * deepest),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use eframe::egui::{CentralPanel, Context, Modifiers, RawInput};
+    use palpate_model::surface::Grid;
+
+    /// One frame of a picture of 800 by 600 points.
+    fn frame(ctx: &Context, view: &mut SceneView, time: f64, events: Vec<Event>) -> Response {
+        let grid = Grid::new(31, 31, 2.0).unwrap();
+        let heights = vec![0.0; grid.nodes()];
+        let shown = Shown {
+            now: Heights::new(grid, &heights).unwrap(),
+            rest: &heights,
+            device: view.hand().at(),
+            turn: [0.0, 0.5, 0.0],
+            contact: None,
+            force: [0.0, 0.0, f64::NAN],
+        };
+        let input = RawInput {
+            screen_rect: Some(Rect::from_min_size(Pos2::ZERO, vec2(800.0, 600.0))),
+            time: Some(time),
+            events,
+            ..RawInput::default()
+        };
+        let mut response = None;
+        let mut output = ctx.run_ui(input, |ui| {
+            let panel = CentralPanel::no_frame();
+            response = Some(panel.show(ui, |ui| view.ui(ui, &shown)).inner);
+        });
+        assert!(!output.shapes.is_empty());
+        // Nothing is painted.
+        output.textures_delta.clear();
+        response.unwrap()
+    }
+
+    fn button(pos: Pos2, button: PointerButton, pressed: bool) -> Event {
+        Event::PointerButton {
+            pos,
+            button,
+            pressed,
+            modifiers: Modifiers::NONE,
+        }
+    }
+
+    fn key(key: Key, modifiers: Modifiers) -> Event {
+        Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers,
+        }
+    }
+
+    #[test]
+    fn a_button_held_presses_where_the_pointer_is_until_it_is_let_go() {
+        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let at = pos2(420.0, 330.0);
+        let rect = frame(&ctx, &mut view, 0.0, Vec::new()).rect;
+        frame(&ctx, &mut view, 0.1, vec![Event::PointerMoved(at)]);
+        assert!(view.hand().at()[2] > 0.0);
+        let picked = view.camera.lens(rect).pick(at, 0.0).unwrap();
+        assert!((view.hand().at()[0] - picked[0]).abs() < 1e-9);
+        let before = view.camera;
+        frame(
+            &ctx,
+            &mut view,
+            0.2,
+            vec![button(at, PointerButton::Primary, true)],
+        );
+        for step in 3..8 {
+            frame(&ctx, &mut view, f64::from(step) * 0.1, Vec::new());
+        }
+        assert!(view.hand().at()[2] < -0.2, "{:?}", view.hand());
+        frame(
+            &ctx,
+            &mut view,
+            0.8,
+            vec![button(at, PointerButton::Primary, false)],
+        );
+        assert!(view.hand().at()[2] > 0.0, "{:?}", view.hand());
+        assert_eq!(view.camera, before);
+    }
+
+    #[test]
+    fn the_other_button_turns_the_scene_and_presses_nothing() {
+        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let at = pos2(420.0, 330.0);
+        frame(&ctx, &mut view, 0.0, vec![Event::PointerMoved(at)]);
+        frame(
+            &ctx,
+            &mut view,
+            0.1,
+            vec![button(at, PointerButton::Secondary, true)],
+        );
+        let before = view.camera;
+        let to = at + vec2(90.0, 0.0);
+        frame(&ctx, &mut view, 0.2, vec![Event::PointerMoved(to)]);
+        frame(
+            &ctx,
+            &mut view,
+            0.3,
+            vec![button(to, PointerButton::Secondary, false)],
+        );
+        assert_ne!(view.camera, before);
+        assert!(view.hand().at()[2] > 0.0);
+    }
+
+    #[test]
+    fn keys_reach_the_picture_that_has_the_focus() {
+        let (ctx, mut view) = (Context::default(), SceneView::of([60.0, 60.0]));
+        let response = frame(&ctx, &mut view, 0.0, Vec::new());
+        let down = || vec![key(Key::PageDown, Modifiers::NONE)];
+        let start = *view.hand();
+        frame(&ctx, &mut view, 0.1, down());
+        assert_eq!(*view.hand(), start, "without the focus a key is another's");
+        response.request_focus();
+        frame(&ctx, &mut view, 0.2, down());
+        assert!(view.hand().at()[2] < start.at()[2]);
+        let camera = view.camera;
+        frame(
+            &ctx,
+            &mut view,
+            0.3,
+            vec![key(Key::ArrowLeft, Modifiers::NONE)],
+        );
+        assert_eq!(view.camera, camera);
+        assert_ne!(view.hand().at()[0], start.at()[0]);
+        let response = frame(
+            &ctx,
+            &mut view,
+            0.4,
+            vec![key(Key::ArrowLeft, Modifiers::SHIFT)],
+        );
+        assert_ne!(view.camera, camera);
+        assert!(response.has_focus(), "arrows stay in the picture");
+        frame(&ctx, &mut view, 0.5, vec![key(Key::Plus, Modifiers::NONE)]);
+        frame(&ctx, &mut view, 0.6, vec![key(Key::Home, Modifiers::NONE)]);
+        assert_eq!(view.camera, camera);
     }
 }
