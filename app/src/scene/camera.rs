@@ -131,7 +131,7 @@ impl Lens {
     pub fn see(&self, point: Vec3) -> Option<Seen> {
         let from = along(point, self.eye, -1.0);
         let [right, up, distance] = self.axes.map(|axis| dot(from, axis));
-        if !(distance > self.near) {
+        if distance.is_nan() || distance <= self.near {
             return None;
         }
         let at = pos2(

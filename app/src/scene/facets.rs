@@ -233,6 +233,11 @@ mod tests {
             }
             assert!((lightness(normal) - wanted).abs() < 1e-12);
         }
+        let lens = Camera::of(grid.extent()).lens(picture());
+        let drawn = facets(heights, heights.all(), &lens, LOOK, 800.0, None);
+        let ink = dimmed(viridis(0.0), wanted as f32);
+        assert!(drawn.mesh.vertices.iter().all(|one| one.color == ink));
+        assert_ne!(ink, viridis(0.0));
     }
 
     #[test]

@@ -264,8 +264,7 @@ fn force_shape(
     font: &FontId,
 ) {
     let newtons = super::camera::dot(shown.force, shown.force).sqrt();
-    // False for NaN.
-    if !(newtons >= ARROW_MIN) {
+    if newtons.is_nan() || newtons < ARROW_MIN {
         return;
     }
     let from = shown.contact.unwrap_or(shown.device);
@@ -350,7 +349,12 @@ mod tests {
         let mut response = None;
         let mut output = ctx.run_ui(input, |ui| {
             let panel = CentralPanel::no_frame();
-            response = Some(panel.show(ui, |ui| view.ui(ui, &shown)).inner);
+            let content = |ui: &mut Ui| {
+                // Something that the arrows would lead to.
+                let _ = ui.button("beside");
+                view.ui(ui, &shown)
+            };
+            response = Some(panel.show(ui, content).inner);
         });
         assert!(!output.shapes.is_empty());
         // Nothing is painted.
