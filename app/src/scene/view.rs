@@ -459,7 +459,7 @@ mod tests {
             &ctx,
             &mut view,
             0.4,
-            vec![key(Key::ArrowLeft, Modifiers::SHIFT)],
+            vec![key(Key::ArrowUp, Modifiers::SHIFT)],
         );
         assert_ne!(view.camera, camera);
         assert!(response.has_focus(), "arrows stay in the picture");
