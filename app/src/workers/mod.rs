@@ -22,6 +22,7 @@ pub mod review;
 pub mod scene;
 pub mod select;
 pub mod task;
+pub mod touch;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
