@@ -6,6 +6,7 @@ use palpate_protocols::haptics::scene::{
     COLUMNS, FRAME_NODES_MAX, SceneFrame, SceneRecorder, SceneRow, SceneTask, scene_input,
     scene_row,
 };
+use palpate_protocols::haptics::scene_file::SceneFile;
 use palpate_protocols::haptics::{SceneLoop, Ticking};
 use palpate_sessions::ticks::{End, Recording};
 
@@ -155,4 +156,21 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
         let shown = shown.count();
         assert!((58..=64).contains(&shown), "{hz} {shown}");
     }
+}
+
+#[test]
+fn the_kept_recording_is_computed_again() {
+    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings/scene-poke");
+    let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
+    let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
+    let mut again = file.scene(0).unwrap();
+    assert!(found.rows.len() > 700);
+    for row in &found.rows {
+        let (hand, elapsed) = scene_input(row);
+        let told = again.tick_after(hand, elapsed);
+        let made = scene_row(hand, elapsed, &told);
+        assert_eq!(row.differs(&made), None, "{row:?} {made:?}");
+    }
+    let left = again.hash();
+    assert_eq!(found.end, End::Whole { lost: 0, left });
 }

@@ -4,11 +4,13 @@ use super::Failure;
 use super::new_file;
 use super::output::Output;
 use super::run::number;
+use super::scene::told;
 use crate::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
 use crate::workers::follow_session::keep_followed;
 use crate::workers::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
+use crate::workers::haptics_tape::{recorder, replay};
 use clap::{Args, Subcommand, ValueEnum};
 use palpate_model::haptics::check::CheckSettings;
 use palpate_model::haptics::{DriveKind, Period};
@@ -24,6 +26,8 @@ pub enum HapticsCommand {
     Check(CheckArgs),
     /// Run the loop in real time on the simulated device and tell how it kept its time
     Run(RunArgs),
+    /// Compute every tick of a recorded run again and compare bit for bit
+    Replay(ReplayArgs),
     /// Push the master's rack with a simulated slider and compare the force commanded with the force measured
     Follow(FollowArgs),
     /// Time the loop on this computer at several rates, idle and beside busy threads
@@ -37,6 +41,7 @@ impl HapticsCommand {
         match self {
             Self::Check(args) => args.json,
             Self::Run(args) => args.json,
+            Self::Replay(args) => args.json,
             Self::Follow(args) => args.json,
             Self::Bench(args) => args.json,
         }
@@ -138,6 +143,20 @@ pub struct RunArgs {
     /// For how long, in s
     #[arg(long, default_value_t = 10.0, value_parser = number, allow_negative_numbers = true, value_name = "S")]
     seconds: f64,
+    /// Record every tick in this new folder, which 'palpate haptics replay' computes again
+    #[arg(long, value_name = "DIR")]
+    record: Option<PathBuf>,
+    /// Print one JSON object
+    #[arg(long)]
+    json: bool,
+}
+
+/// Arguments of `palpate haptics replay`.
+#[derive(Debug, Args)]
+pub struct ReplayArgs {
+    /// The folder of a recording
+    #[arg(value_name = "DIR")]
+    folder: PathBuf,
     /// Print one JSON object
     #[arg(long)]
     json: bool,
@@ -227,6 +246,7 @@ pub(super) fn run(command: &HapticsCommand, output: &Output) -> Result<(), Failu
     match command {
         HapticsCommand::Check(args) => run_check(args, output),
         HapticsCommand::Run(args) => run_loop(args, output),
+        HapticsCommand::Replay(args) => run_replay(args, output),
         HapticsCommand::Follow(args) => run_follow(args, output),
         HapticsCommand::Bench(args) => run_bench(args, output),
     }
@@ -297,9 +317,16 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
 fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     let setting = args.device.setting()?;
     let seconds = checked_seconds(args.seconds)?;
+    new_file::check("recording", args.record.as_deref())?;
     let body = body(&args.source, setting.deepest, output)?;
+    let recorder = args
+        .record
+        .as_deref()
+        .map(|to| recorder(to, body, &setting));
+    let recorder = recorder.transpose().map_err(Failure::failed)?;
     let bar = output.share_bar(1000);
-    let paced = pace(&setting.simulation(body, true), seconds, 0, &mut |share| {
+    let settings = setting.simulation(body, true);
+    let paced = pace(&settings, seconds, 0, recorder, &mut |share| {
         bar.set_position((1000.0 * share) as u64);
         true
     });
@@ -311,6 +338,15 @@ fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     };
     output.result(&found, || run_text(&paced));
     Ok(())
+}
+
+fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
+    let bar = output.share_bar(1000);
+    let replayed = replay(&args.folder, &mut |share| {
+        bar.set_position((1000.0 * share) as u64);
+    });
+    bar.finish_and_clear();
+    told("haptics-replay", replayed, output)
 }
 
 fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
@@ -329,7 +365,7 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
             let setting = Setting::source(period);
             let done = loops.len() as f64;
             let settings = setting.simulation(ModifiedKelvin::THESIS, true);
-            let paced = pace(&settings, seconds, busy, &mut |share| {
+            let paced = pace(&settings, seconds, busy, None, &mut |share| {
                 bar.set_position((1000.0 * (done + share) / count) as u64);
                 true
             });

@@ -114,10 +114,10 @@ fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
 }
 
 /// Work with a progress bar that nobody ends early.
-fn with_bar(
+pub(super) fn with_bar<T>(
     output: &Output,
-    work: impl FnOnce(&trade::Progress<'_>) -> Result<Option<TradeCurves>, String>,
-) -> Result<TradeCurves, Failure> {
+    work: impl FnOnce(&trade::Progress<'_>) -> Result<Option<T>, String>,
+) -> Result<T, Failure> {
     let bar = output.count_bar(0);
     let curves = work(&|done, of, what| {
         bar.set_length(of as u64);

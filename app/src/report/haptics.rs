@@ -101,6 +101,7 @@ pub fn margin_text(margin: &Margin) -> String {
 pub fn run_text(paced: &Paced) -> String {
     let mut lines = vec![format!("priority: {}", paced.priority)];
     lines.extend(table(std::slice::from_ref(paced)));
+    lines.extend(paced.recorded.map(|recorded| recorded.words()));
     lines.join("\n")
 }
 

@@ -1,7 +1,9 @@
-//! What is said of a scene's run and of its recording.
+//! What is said of a scene's run, its plan and its curves.
 
 use super::haptics::run_text;
-use crate::workers::scene::{Played, Replayed};
+use crate::workers::scene::Played;
+use crate::workers::scene_bench::Bench;
+use palpate_model::surface::ScenePlan;
 
 /// A run in words.
 #[must_use]
@@ -32,35 +34,88 @@ pub fn played_text(played: &Played) -> String {
             played.tick_us
         )
     });
-    if let Some(recorded) = &played.recorded {
-        lines.push(match recorded.lost {
-            0 => format!("{} ticks recorded, none lost", recorded.ticks),
-            lost => format!(
-                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be computed again",
-                recorded.ticks
-            ),
-        });
-    }
     lines.push(format!("surface {}", played.surface_hash));
     lines.join("\n")
 }
 
-/// A replay in words.
+/// A plan in words: what is taken, what that costs, what was left out.
 #[must_use]
-pub fn replayed_text(replayed: &Replayed) -> String {
+pub fn plan_text(plan: &ScenePlan) -> String {
     let mut lines = vec![format!(
-        "scene '{}': {} ticks computed again, {}",
-        replayed.name,
-        replayed.ticks,
-        if replayed.is_identical {
-            "every number bit for bit as recorded"
-        } else {
-            "not as recorded"
-        }
+        "plan: {0} x {0} nodes, {1}, cut {2}: shape within {3:.3} mm, force within {4:.4} N, {5:.1} us a tick",
+        plan.mesh.nodes,
+        plan.step.scheme.name(),
+        match plan.cut.threshold_mm > 0.0 {
+            true => plan.cut.words(),
+            false => "nowhere".to_owned(),
+        },
+        plan.shape_error_mm,
+        plan.force_error_n,
+        plan.cost_us
     )];
-    if !replayed.is_whole {
-        lines.push("the recording was cut off; it was compared to its last whole tick".to_owned());
+    for dropped in &plan.dropped {
+        lines.push(format!(
+            "left out: {} (error {:.4} {}, {:.1} us saved)",
+            dropped.what, dropped.error, dropped.unit, dropped.saved_us
+        ));
     }
-    lines.push(format!("surface {}", replayed.surface_hash));
+    for (part, why) in plan.inert {
+        lines.push(format!("without effect: {part}, as {why}"));
+    }
+    lines.join("\n")
+}
+
+/// Measured curves in words; a star marks what nothing beats in both error and time.
+#[must_use]
+pub fn bench_text(bench: &Bench) -> String {
+    let star = |is_on: &bool| if *is_on { "*" } else { " " };
+    let machine = &bench.machine;
+    let mut lines = vec![format!(
+        "{}, {} cores, {} build",
+        machine.cpu, machine.cores, machine.profile
+    )];
+    lines.push("mesh: nodes a side, largest error of shape, time of a tick".to_owned());
+    for (mesh, is_on) in bench.curves.meshes.iter().zip(&bench.meshes_on_front) {
+        lines.push(format!(
+            "{} {:>5}  {:>8.4} mm  {:>8.1} us  {:>8.0} Hz at most",
+            star(is_on),
+            mesh.nodes,
+            mesh.error_mm,
+            mesh.cost_us,
+            1e6 / mesh.cost_us
+        ));
+    }
+    lines.push("cut: largest error of shape, share of a mesh's time".to_owned());
+    for cut in &bench.curves.cuts {
+        let words = match (cut.range, cut.threshold_mm > 0.0) {
+            (None, false) => "none".to_owned(),
+            _ => cut.words(),
+        };
+        lines.push(format!(
+            "  {words:<28}  {:>8.4} mm  {:>5.0} %",
+            cut.error_mm,
+            100.0 * cut.cost_share
+        ));
+    }
+    lines.push("integrator: step, largest error of force, time of a tick".to_owned());
+    for (step, is_on) in bench.curves.steps.iter().zip(&bench.steps_on_front) {
+        lines.push(format!(
+            "{} {:<30} {:>6.2} ms  {:>9.2e} N  {:>7.3} us",
+            star(is_on),
+            step.scheme.name(),
+            1e3 * step.step_s,
+            step.error_n,
+            step.cost_us
+        ));
+    }
+    lines.push("nodes moved in a millisecond".to_owned());
+    for one in &bench.methods {
+        lines.push(format!(
+            "  {:<20} {:>5} nodes a side  {:>9.0}",
+            one.method, one.nodes, one.nodes_per_ms
+        ));
+    }
+    lines.extend(bench.plan.as_ref().map(plan_text));
+    lines.extend(bench.no_plan.as_ref().map(|none| none.why.clone()));
     lines.join("\n")
 }

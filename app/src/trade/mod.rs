@@ -16,7 +16,7 @@ mod timing;
 
 pub use machine::{age_days, this_machine, version};
 pub use picture::svg;
-pub use scene::{SCENE_PEAK, measure_scene};
+pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 pub use text::text;
 
 use chrono::{DateTime, SecondsFormat, Utc};

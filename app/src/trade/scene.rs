@@ -47,11 +47,17 @@ const POKE: HandPoke = HandPoke {
 /// Largest force along it, of the body of the source thesis; a scene's tolerance of force is meant at it.
 pub const SCENE_PEAK: Newtons = Newtons(2.19);
 
+/// Side of the tissue that is measured, in mm.
+pub const SCENE_SIDE_MM: f64 = 40.0;
+
+/// Its steepest slope.
+pub const SCENE_SLOPE: f64 = 0.4;
+
 /// 40 mm of flat tissue, 5 mm deep pokes on and off the nodes, with a slope that lets a poke reach 12.5 mm.
 fn pokes() -> PokeScene {
     PokeScene {
-        extent: 40.0,
-        slope: 0.4,
+        extent: SCENE_SIDE_MM,
+        slope: SCENE_SLOPE,
         depth: 5.0,
         rest: |_, _| 0.0,
         places: vec![[20.0, 20.0], [13.37, 24.81], [29.13, 17.77], [3.21, 38.55]],

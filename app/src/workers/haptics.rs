@@ -3,6 +3,7 @@
 
 use super::fit::fit_source;
 use super::margin::{MarginPoint, margin_curve};
+use super::recorded::RecordedTicks;
 use crate::report::thin::thin;
 use palpate_model::fit::{FitOptions, FitReport, FitSample, fit};
 use palpate_model::haptics::check::{
@@ -15,6 +16,7 @@ use palpate_model::haptics::{BiasCalibration, Buzz, DriveKind, Flags, Period, To
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::analysis::Wanted;
+use palpate_protocols::haptics::taped::{TapeRecorder, Taped};
 use palpate_protocols::haptics::timing::Kept;
 use palpate_protocols::haptics::{Beat, Simulated, Ticking};
 use serde::Serialize;
@@ -305,13 +307,16 @@ pub struct Paced {
     /// What was measured.
     #[serde(flatten)]
     pub kept: Kept,
+    /// What was recorded.
+    pub recorded: Option<RecordedTicks>,
 }
 
-/// Runs the loop in real time for some seconds beside so many busy threads. `is_going` ends it early.
+/// Runs the loop in real time for some seconds beside so many busy threads, and records it if asked to. `is_going` ends it early.
 pub fn pace(
     settings: &SimulationSettings,
     seconds: f64,
     busy: usize,
+    recorder: Option<TapeRecorder>,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Paced, String> {
     let period = settings.system.law.period;
@@ -329,7 +334,7 @@ pub fn pace(
     }
     let device = Simulated::new(settings).map_err(|err| err.to_string())?;
     let first = *device.last();
-    let beat = Beat::start(device, period, first)
+    let beat = Beat::start(Taped { device, recorder }, period, first)
         .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
     let parts = (seconds / PART.as_secs_f64()).ceil().max(1.0);
     for part in 0..parts as u64 {
@@ -340,13 +345,17 @@ pub fn pace(
     }
     let kept = beat.kept();
     let priority = beat.granted().to_string();
-    drop(beat);
+    let taped = beat.end();
     is_over.store(true, Ordering::Relaxed);
     for thread in others {
         // It only spins.
         let _ = thread.join();
     }
+    let taped = taped.ok_or("the loop failed; this is a mistake in palpate")?;
+    let left = taped.device.last().snapshot.sum();
+    let recorded = taped.recorder.map(|recorder| recorder.finish(left));
     Ok(Paced {
+        recorded: recorded.transpose()?.map(RecordedTicks::from),
         rate_hz: 1.0 / period.seconds().0,
         busy_threads: busy,
         priority,

@@ -182,3 +182,44 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
         stderr(&taken)
     );
 }
+
+#[test]
+fn a_recorded_run_is_computed_again_bit_by_bit() {
+    let at = tempfile::tempdir().unwrap();
+    let words = [
+        "haptics",
+        "run",
+        "thesis",
+        "--seconds",
+        "1",
+        "--drive",
+        "current",
+        "--friction",
+        "0.1",
+        "--record",
+        "run",
+        "--json",
+    ];
+    let told = json(&palpate(at.path(), &words));
+    assert_eq!(told["recorded"]["lost"], 0, "{told}");
+    assert!(told["recorded"]["ticks"].as_u64().unwrap() > 100, "{told}");
+    let again = json(&palpate(at.path(), &["haptics", "replay", "run", "--json"]));
+    assert_eq!(again["is_identical"], true, "{again}");
+    assert_eq!(again["is_whole"], true, "{again}");
+    // Not over another; and another friction is another run.
+    assert_eq!(palpate(at.path(), &words).status.code(), Some(2));
+    let settings = at.path().join("run/settings.toml");
+    let text = std::fs::read_to_string(&settings).unwrap();
+    std::fs::write(
+        &settings,
+        text.replace("friction_n = 0.1", "friction_n = 0.3"),
+    )
+    .unwrap();
+    let other = palpate(at.path(), &["haptics", "replay", "run"]);
+    assert_eq!(other.status.code(), Some(1));
+    assert!(
+        stderr(&other).contains("error: tick "),
+        "{}",
+        stderr(&other)
+    );
+}

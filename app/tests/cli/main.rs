@@ -18,6 +18,7 @@ mod protocol;
 mod rate;
 mod records;
 mod report;
+mod scene;
 mod select;
 mod trade;
 mod wired;

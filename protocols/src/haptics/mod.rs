@@ -5,10 +5,11 @@
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 
 mod beat;
+mod led;
 pub mod scene;
 pub mod scene_file;
-mod led;
 mod simulated;
+pub mod taped;
 pub mod timing;
 
 pub use beat::{Beat, Ticking};

@@ -124,21 +124,11 @@ impl SceneFile {
             text.push_str(&line);
             text.push('\n');
         };
-        let ModifiedKelvin {
-            tau_eps,
-            mu: [mu1, mu2, mu3],
-            tau_sig,
-        } = self.body;
         put(format!("name = \"{}\"", plain(&self.name)));
         put("\n[tissue]".to_owned());
         match &self.source {
             Some(source) => put(format!("source = \"{}\"", plain(source))),
-            None => {
-                let body = [tau_eps, mu1, mu2, mu3, tau_sig];
-                for (name, value) in BODY.into_iter().zip(body) {
-                    put(format!("{name} = {value:?}"));
-                }
-            }
+            None => put(body_text(&self.body)),
         }
         put(format!("side_mm = {:?}", self.side_mm));
         put(format!("slope = {:?}", self.slope));
@@ -225,6 +215,48 @@ const SCHEMES: [(&str, Scheme); 7] = [
 /// Parameters of a body in the file's words.
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
+/// The parameters of a body as lines that read back to the same bits.
+#[must_use]
+pub fn body_text(body: &ModifiedKelvin) -> String {
+    let ModifiedKelvin {
+        tau_eps,
+        mu: [mu1, mu2, mu3],
+        tau_sig,
+    } = *body;
+    let values = [tau_eps, mu1, mu2, mu3, tau_sig];
+    let line = |(name, value): (&str, f64)| format!("{name} = {value:?}");
+    let lines: Vec<String> = BODY.into_iter().zip(values).map(line).collect();
+    lines.join("\n")
+}
+
+/// A body that stands in a table of a file, if any of its parameters does; all of them must.
+pub fn read_body(fields: &mut Fields, table: &str) -> Option<ModifiedKelvin> {
+    let values = BODY.map(|name| fields.number(&format!("{table}.{name}"), -1e6, 1e6));
+    if values.iter().all(Option::is_none) {
+        return None;
+    }
+    let [
+        Some(tau_eps),
+        Some(mu1),
+        Some(mu2),
+        Some(mu3),
+        Some(tau_sig),
+    ] = values
+    else {
+        fields.mistake(table, "give all of tau_eps, mu1, mu2, mu3 and tau_sig");
+        return None;
+    };
+    let body = ModifiedKelvin {
+        tau_eps,
+        mu: [mu1, mu2, mu3],
+        tau_sig,
+    };
+    if let Err(err) = body.checked() {
+        fields.mistake(&format!("{table}.tau_eps"), &err.to_string());
+    }
+    Some(body)
+}
+
 /// The numbers of a device by name.
 fn device_numbers(device: &mut DeviceSettings) -> [(&'static str, &mut f64); 15] {
     let [wide, deep, high] = &mut device.workspace_mm;
@@ -263,37 +295,15 @@ fn read(fields: &mut Fields) -> SceneFile {
         file.name = name;
     }
     let source = fields.text("tissue.source");
-    let mut body = [None; 5];
-    for (slot, name) in body.iter_mut().zip(BODY) {
-        *slot = fields.number(&format!("tissue.{name}"), -most, most);
-    }
-    let is_whole = body.iter().all(Option::is_some);
-    if source.is_some() && body.iter().any(Option::is_some) {
+    let body = read_body(fields, "tissue");
+    if source.is_some() && body.is_some() {
         fields.mistake(
             "tissue.source",
             "give either a source or parameters, not both",
         );
-    } else if let [
-        Some(tau_eps),
-        Some(mu1),
-        Some(mu2),
-        Some(mu3),
-        Some(tau_sig),
-    ] = body
-    {
-        file.body = ModifiedKelvin {
-            tau_eps,
-            mu: [mu1, mu2, mu3],
-            tau_sig,
-        };
-        if let Err(err) = file.body.checked() {
-            fields.mistake("tissue.tau_eps", &err.to_string());
-        }
-    } else if !is_whole && body.iter().any(Option::is_some) {
-        fields.mistake(
-            "tissue",
-            "give all of tau_eps, mu1, mu2, mu3 and tau_sig, or a source",
-        );
+    }
+    if let Some(body) = body {
+        file.body = body;
     }
     file.source = source.filter(|source| source != THESIS);
     // A spacing from a nanometre to a metre, so that every mesh is possible.

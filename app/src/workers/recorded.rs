@@ -1,0 +1,166 @@
+//! Recordings of a loop computed again, of whichever loop.
+
+use palpate_sessions::ticks::{End, Recorded, Recording, Row};
+use serde::Serialize;
+
+/// What of a run was recorded.
+#[derive(Clone, Copy, Debug, Serialize)]
+pub struct RecordedTicks {
+    /// Ticks written.
+    pub ticks: u64,
+    /// Ticks for which there was no room.
+    pub lost: u64,
+}
+
+impl From<Recorded> for RecordedTicks {
+    fn from(Recorded { ticks, lost }: Recorded) -> Self {
+        Self { ticks, lost }
+    }
+}
+
+impl RecordedTicks {
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        match self.lost {
+            0 => format!("{} ticks recorded, none lost", self.ticks),
+            lost => format!(
+                "{} ticks recorded, {lost} lost because the disk was too slow; the recording cannot be computed again",
+                self.ticks
+            ),
+        }
+    }
+}
+
+/// What a recording gives when it is computed again.
+#[derive(Clone, Debug, Serialize)]
+pub struct Replayed {
+    /// What the recording is of.
+    pub name: String,
+    /// Ticks computed.
+    pub ticks: u64,
+    /// Whether every number has the recorded bits.
+    pub is_identical: bool,
+    /// Where that is not so first.
+    pub first: Option<Different>,
+    /// Whether the recording has its end; without, it was cut off after the last tick compared.
+    pub is_whole: bool,
+    /// Ticks that were lost while it was recorded.
+    pub lost: u64,
+    /// Hash of what is left at the end.
+    pub end_hash: String,
+}
+
+/// A number that has other bits than the recorded one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Different {
+    /// The tick.
+    pub tick: u64,
+    /// Which number.
+    pub column: &'static str,
+    /// As it was recorded.
+    pub recorded: String,
+    /// As it was computed.
+    pub computed: String,
+}
+
+impl Replayed {
+    /// In words.
+    #[must_use]
+    pub fn words(&self) -> String {
+        let how = match self.is_identical {
+            true => "every number bit for bit as recorded",
+            false => "not as recorded",
+        };
+        let mut lines = vec![format!(
+            "{}: {} ticks computed again, {how}",
+            self.name, self.ticks
+        )];
+        if !self.is_whole {
+            lines.push(
+                "the recording was cut off; it was compared to its last whole tick".to_owned(),
+            );
+        }
+        lines.push(format!("hash at the end {}", self.end_hash));
+        lines.join("\n")
+    }
+
+    /// Why it is not as recorded, if so.
+    #[must_use]
+    pub fn failure(&self) -> Option<String> {
+        let first = self.first.as_ref()?;
+        let why = match self.lost {
+            0 => "the program, its settings or the recording changed".to_owned(),
+            lost => format!("{lost} ticks were lost when it was recorded"),
+        };
+        Some(format!(
+            "tick {}: {} is {} and was recorded as {}; {why}",
+            first.tick, first.column, first.computed, first.recorded
+        ))
+    }
+}
+
+/// A loop that can be computed again.
+pub trait Again<const W: usize, const R: usize> {
+    /// The tick of the recorded inputs of `row`.
+    fn tick(&mut self, row: &Row<W, R>) -> Row<W, R>;
+
+    /// Hash of what is left.
+    fn left(&self) -> u64;
+}
+
+/// Computes every tick of a recording again, to the first that differs.
+pub fn computed_again<const W: usize, const R: usize>(
+    name: &str,
+    found: &Recording<W, R>,
+    (whole, real): ([&'static str; W], [&'static str; R]),
+    again: &mut impl Again<W, R>,
+    progress: &mut dyn FnMut(f64),
+) -> Replayed {
+    let mut first = None;
+    let mut ticks = 0;
+    for (index, row) in found.rows.iter().enumerate() {
+        let computed = again.tick(row);
+        ticks = row.whole[0];
+        if let Some(column) = row.differs(&computed) {
+            let text = |row: &Row<W, R>| match column.checked_sub(W) {
+                None => row.whole[column].to_string(),
+                Some(real) => format!("{:?}", row.real[real]),
+            };
+            first = Some(Different {
+                tick: ticks,
+                column: whole.iter().chain(&real).copied().nth(column).unwrap_or(""),
+                recorded: text(row),
+                computed: text(&computed),
+            });
+            break;
+        }
+        if index.is_multiple_of(1000) {
+            progress(index as f64 / found.rows.len() as f64);
+        }
+    }
+    let hash = again.left();
+    let (is_whole, lost) = match found.end {
+        End::CutOff => (false, 0),
+        End::Whole { lost, left } => {
+            if first.is_none() && left != hash {
+                first = Some(Different {
+                    tick: ticks,
+                    column: "hash at the end",
+                    recorded: format!("{left:016x}"),
+                    computed: format!("{hash:016x}"),
+                });
+            }
+            (true, lost)
+        }
+    };
+    Replayed {
+        name: name.to_owned(),
+        ticks,
+        is_identical: first.is_none(),
+        first,
+        is_whole,
+        lost,
+        end_hash: format!("{hash:016x}"),
+    }
+}

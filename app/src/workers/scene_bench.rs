@@ -1,0 +1,161 @@
+//! What exactness costs in a scene on this computer, and the cheapest way that a scene's tolerances allow.
+
+use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
+use palpate_model::surface::{
+    Contact, Cut, Grid, HeightField, Method, Needs, NoPlan, Recovery, SceneCurves, ScenePlan, Side,
+    StepPoint, Surface, plan, slower,
+};
+use palpate_model::tolerance::Tolerance;
+use palpate_model::trade::{Machine, pareto};
+use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_protocols::runner::Stopwatch;
+use serde::Serialize;
+
+/// The family that a scene plays: the modified Kelvin body of third order.
+const FAMILY: &str = "series-3";
+
+/// For how long one method is timed, in s.
+const TIMED_S: f64 = 0.2;
+
+/// How fast a method moves nodes.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct MethodSpeed {
+    /// Its name.
+    pub method: &'static str,
+    /// Nodes along a side.
+    pub nodes: usize,
+    /// Nodes moved in a millisecond.
+    pub nodes_per_ms: f64,
+}
+
+/// Everything measured, and what follows.
+#[derive(Clone, Debug, Serialize)]
+pub struct Bench {
+    /// The machine.
+    pub machine: Machine,
+    /// Whether only the short part was measured.
+    pub quick: bool,
+    /// Errors against times.
+    pub curves: SceneCurves,
+    /// For each mesh whether none other is both as exact and as cheap.
+    pub meshes_on_front: Vec<bool>,
+    /// For each integrator with its step the same.
+    pub steps_on_front: Vec<bool>,
+    /// The closed form beside the chain as it was published, in this run.
+    pub methods: Vec<MethodSpeed>,
+    /// What the scene is to be played with.
+    pub plan: Option<ScenePlan>,
+    /// Why there is no plan that holds everything.
+    pub no_plan: Option<NoPlan>,
+}
+
+/// Measures; none if `progress` ended it.
+pub fn bench(
+    file: &SceneFile,
+    extent: Extent,
+    progress: &trade::Progress<'_>,
+) -> Result<Option<Bench>, String> {
+    let Some(curves) = measure_scene(extent, progress)? else {
+        return Ok(None);
+    };
+    let methods = [201, 401]
+        .into_iter()
+        .flat_map(|nodes| [Method::Envelope, Method::Chain].map(|method| (nodes, method)))
+        .map(|(nodes, method)| speed(nodes, method))
+        .collect::<Result<_, _>>()?;
+    let (plan, no_plan) = match planned(file, &curves, 1.0) {
+        Ok(plan) => (Some(plan), None),
+        Err(why) => (None, Some(why)),
+    };
+    let meshes = curves.meshes.iter().map(|p| (Some(p.error_mm), p.cost_us));
+    let steps = curves.steps.iter().map(|p| (Some(p.error_n), p.cost_us));
+    Ok(Some(Bench {
+        machine: trade::this_machine(),
+        quick: extent == Extent::Quick,
+        meshes_on_front: pareto(&meshes.collect::<Vec<_>>()),
+        steps_on_front: pareto(&steps.collect::<Vec<_>>()),
+        curves,
+        methods,
+        plan,
+        no_plan,
+    }))
+}
+
+/// The cheapest way that a scene's tolerances allow.
+///
+/// Its rate and its body are its own, so that of the measured steps the nearest to its tick alone and of the families the
+/// body's own alone are left. A scene of another side and slope with as many nodes is the measured one drawn larger, and its errors of
+/// shape are larger in proportion. A cut after so many nodes is another length on every mesh and is not planned; one by movement is off
+/// by no more than that movement on any.
+pub fn planned(file: &SceneFile, curves: &SceneCurves, slower: f64) -> Result<ScenePlan, NoPlan> {
+    let tick = 1.0 / file.rate_hz;
+    let off = |step: &StepPoint| (step.step_s / tick).ln().abs();
+    let nearest = curves.steps.iter().map(off).fold(f64::INFINITY, f64::min);
+    let mut own = curves.clone();
+    own.steps.retain(|step| off(step) <= nearest);
+    let larger = file.side_mm * file.slope / (SCENE_SIDE_MM * SCENE_SLOPE);
+    own.meshes
+        .iter_mut()
+        .for_each(|mesh| mesh.error_mm *= larger);
+    own.cuts.retain(|cut| cut.range.is_none());
+    for cut in &mut own.cuts {
+        cut.error_mm = cut.threshold_mm;
+    }
+    own.families.retain(|family| family.family == FAMILY);
+    let needs = Needs {
+        force: Tolerance::PercentOfThreshold(file.tolerances.force_percent),
+        peak: SCENE_PEAK,
+        shape_mm: file.tolerances.shape_mm,
+        budget_us: file.tolerances.tick_us,
+    };
+    plan(&needs, &own, slower)
+}
+
+/// A scene made after a plan.
+#[must_use]
+pub fn made_after(file: &SceneFile, plan: &ScenePlan) -> SceneFile {
+    SceneFile {
+        nodes: Some(plan.mesh.nodes as usize),
+        cut_nodes: None,
+        cut_mm: plan.cut.threshold_mm,
+        scheme: plan.step.scheme,
+        ..file.clone()
+    }
+}
+
+/// The plan after a tick took longer than it should.
+pub fn planned_again(
+    file: &SceneFile,
+    curves: &SceneCurves,
+    before: &ScenePlan,
+    measured_us: f64,
+) -> Result<ScenePlan, NoPlan> {
+    planned(file, curves, slower(before, 1.0, measured_us))
+}
+
+/// A poke that reaches half of the way to the border, made anew in every tick.
+fn speed(nodes: usize, method: Method) -> Result<MethodSpeed, String> {
+    let grid = Grid::new(nodes, nodes, 1.0).map_err(|err| err.to_string())?;
+    let middle = 0.5 * (nodes - 1) as f64;
+    let contact = [Contact {
+        x: middle,
+        y: middle,
+        z: -0.5 * middle,
+        side: Side::Push,
+    }];
+    let field = HeightField::flat(grid, 1.0).map_err(|err| err.to_string())?;
+    let surface = Surface::new(field, method, Recovery::ELASTIC, Cut::NONE);
+    let mut surface = surface.map_err(|err| err.to_string())?;
+    let watch = Stopwatch::start();
+    let mut moved = 0;
+    while watch.seconds() < TIMED_S {
+        for _ in 0..10 {
+            moved += surface.tick(&contact).moved.moved;
+        }
+    }
+    Ok(MethodSpeed {
+        method: method.name(),
+        nodes,
+        nodes_per_ms: moved as f64 / (1e3 * watch.seconds()),
+    })
+}

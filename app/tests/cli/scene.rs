@@ -1,0 +1,126 @@
+//! `palpate scene`.
+
+use super::{json, palpate, stderr, stdout};
+
+#[test]
+fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
+    let at = tempfile::tempdir().unwrap();
+    let record = ["scene", "record", "--to", "poke", "--json"];
+    let told = json(&palpate(at.path(), &record));
+    assert_eq!(told["command"], "scene-record");
+    assert_eq!(told["recorded"]["lost"], 0, "{told}");
+    assert!(told["depth_max_mm"].as_f64().unwrap() > 5.0, "{told}");
+    assert!(told["work"]["count"].as_u64().unwrap() > 1000, "{told}");
+    let again = json(&palpate(at.path(), &["scene", "replay", "poke", "--json"]));
+    assert_eq!(again["is_identical"], true, "{again}");
+    assert_eq!(again["is_whole"], true, "{again}");
+    assert_eq!(again["end_hash"], told["surface_hash"]);
+    // Not over another.
+    assert_eq!(palpate(at.path(), &record).status.code(), Some(2));
+    // Another tissue gives other forces: exit code 1, and the first tick named.
+    let settings = at.path().join("poke/settings.toml");
+    let text = std::fs::read_to_string(&settings).unwrap();
+    std::fs::write(&settings, text.replace("0.06", "0.06000000000000001")).unwrap();
+    let other = palpate(at.path(), &["scene", "replay", "poke"]);
+    assert_eq!(other.status.code(), Some(1));
+    assert!(stdout(&other).contains("not as recorded"));
+    let said = stderr(&other);
+    assert!(
+        said.contains("error: tick ") && said.contains("force_z_n"),
+        "{said}"
+    );
+    std::fs::write(&settings, text).unwrap();
+    // A changed line is damage; a missing end is a recording that was cut off.
+    let ticks = at.path().join("poke/ticks.csv");
+    let lines = std::fs::read_to_string(&ticks).unwrap();
+    std::fs::write(&ticks, lines.replacen("-0.5,", "-0.4,", 1)).unwrap();
+    let damaged = palpate(at.path(), &["scene", "replay", "poke"]);
+    assert_eq!(damaged.status.code(), Some(2));
+    assert!(stderr(&damaged).contains("damaged"), "{}", stderr(&damaged));
+    std::fs::write(&ticks, &lines[..lines.len() / 2]).unwrap();
+    let cut = palpate(at.path(), &["scene", "replay", "poke"]);
+    assert_eq!(cut.status.code(), Some(0), "{}", stderr(&cut));
+    assert!(stdout(&cut).contains("cut off"), "{}", stdout(&cut));
+}
+
+#[test]
+fn a_scene_file_is_shown_whole_and_run() {
+    let at = tempfile::tempdir().unwrap();
+    let usual = palpate(at.path(), &["scene", "show"]);
+    std::fs::write(at.path().join("usual.toml"), stdout(&usual)).unwrap();
+    let again = palpate(at.path(), &["scene", "show", "usual.toml"]);
+    assert_eq!(stdout(&again), stdout(&usual));
+    assert!(stdout(&again).contains("mu1 = 0.05333"));
+    std::fs::write(
+        at.path().join("fine.toml"),
+        "name = \"fine\"\n[mesh]\nnodes = 401\n[loop]\nrate_hz = 500\n",
+    )
+    .unwrap();
+    let words = ["scene", "run", "fine.toml", "--path", "taps", "--json"];
+    let run = json(&palpate(at.path(), &words));
+    assert_eq!(run["nodes"], 401, "{run}");
+    assert_eq!(run["rate_hz"], 500.0, "{run}");
+    assert_eq!(run["path"], "taps");
+    assert!(run["force_max_n"].as_f64().unwrap() > 0.1, "{run}");
+}
+
+#[test]
+fn what_is_impossible_is_refused_in_words() {
+    let at = tempfile::tempdir().unwrap();
+    std::fs::write(at.path().join("bad.toml"), "[tissue]\nsidemm = 3\n").unwrap();
+    std::fs::write(at.path().join("gone.toml"), "[tissue]\nsource = \"gone\"\n").unwrap();
+    for (words, reason) in [
+        (
+            &["run", "bad.toml"][..],
+            "bad.toml, line 2: 'tissue.sidemm' means nothing here",
+        ),
+        (&["run", "gone.toml"], "gone"),
+        (&["run", "nowhere.toml"], "cannot read nowhere.toml"),
+        (&["run", "--path", "pork"], "poke, press, drag, taps"),
+        (&["run", "--seconds", "0"], "--seconds 0"),
+        (&["replay", "nowhere"], "nowhere"),
+        (&["record", "--to", "no/folder"], "there is no folder no"),
+    ] {
+        let out = palpate(at.path(), &[&["scene"], words].concat());
+        assert_eq!(out.status.code(), Some(2), "{words:?}");
+        assert!(stderr(&out).contains(reason), "{words:?}: {}", stderr(&out));
+    }
+}
+
+#[test]
+fn a_mesh_is_planned_from_what_is_measured() {
+    let at = tempfile::tempdir().unwrap();
+    let coarse =
+        "[mesh]\nauto = true\n[tolerances]\nshape_mm = 5\nforce_percent = 100\ntick_us = 100000\n";
+    std::fs::write(at.path().join("coarse.toml"), coarse).unwrap();
+    let run = json(&palpate(
+        at.path(),
+        &["scene", "run", "coarse.toml", "--json"],
+    ));
+    assert_eq!(run["nodes"], 51, "{run}");
+    assert_eq!(run["plan"]["mesh"]["nodes"], 51, "{run}");
+    assert_eq!(run["plan"]["inert"][0][0], "MinDist", "{run}");
+    // Nothing measured is as exact as this.
+    std::fs::write(
+        at.path().join("exact.toml"),
+        coarse.replace("shape_mm = 5", "shape_mm = 0.000001"),
+    )
+    .unwrap();
+    let none = palpate(at.path(), &["scene", "run", "exact.toml"]);
+    assert_eq!(none.status.code(), Some(1));
+    assert!(
+        stderr(&none).contains("nothing measured holds"),
+        "{}",
+        stderr(&none)
+    );
+    let bench = json(&palpate(
+        at.path(),
+        &["scene", "bench", "coarse.toml", "--json"],
+    ));
+    assert_eq!(bench["command"], "scene-bench");
+    assert_eq!(bench["curves"]["meshes"][0]["nodes"], 51);
+    assert_eq!(bench["plan"]["mesh"]["nodes"], 51, "{bench}");
+    // The closed form is what it is there for.
+    let speed = |index: usize| bench["methods"][index]["nodes_per_ms"].as_f64().unwrap();
+    assert!(speed(0) > 2.0 * speed(1), "{bench}");
+}
