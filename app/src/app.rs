@@ -35,6 +35,7 @@ use crate::workers::recovery::Recovery;
 use crate::workers::select::Selected;
 use eframe::egui::{Context, Theme, Ui, ViewportCommand};
 use palpate_model::extremes::Row;
+use palpate_model::surface::SceneCurves;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, RunRequest, Runner, Snapshot, StartError};
@@ -204,6 +205,12 @@ impl WorkbenchApp {
     #[must_use]
     pub fn trade_curves(&self) -> Option<&TradeCurves> {
         self.trade.curves()
+    }
+
+    /// The curves of a scene.
+    #[must_use]
+    pub fn scene_curves(&self) -> Option<&SceneCurves> {
+        self.trade.scene_curves()
     }
 
     /// What the last test of the extremes found.

@@ -261,3 +261,39 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     assert!(!flow.window.state().haptics().is_running());
     assert!(flow.says("the loop does not run") && flow.says("force commanded"));
 }
+
+#[test]
+fn a_scene_is_measured_and_planned_in_the_window() {
+    let mut flow = Flow::open(TimeScale::Max);
+    screen(&mut flow, Key::Num7);
+    flow.click("Scene: mesh");
+    assert!(flow.says("nothing measured on this machine yet") && flow.says("measure first"));
+    flow.click("few rows, rough times");
+    flow.type_into("tolerance", "50%");
+    flow.type_into("shape", "5");
+    flow.type_into("budget", "100000");
+    flow.click("Measure here  F6");
+    flow.wait("the curves", |window| {
+        window.state().scene_curves().is_some()
+    });
+    flow.window.run_steps(3);
+    // So much is tolerated that the coarsest mesh does, and what that leaves out is told.
+    for words in [
+        "the cheapest that holds both",
+        "51 x 51 nodes (planned)",
+        "left out: a mesh of 201 nodes",
+        "MinDist has no effect",
+    ] {
+        assert!(flow.says(words), "{words}");
+    }
+    for view in ["Scene: influence", "Scene: step", "Scene: mesh"] {
+        flow.click(view);
+        assert!(flow.says("(planned)"), "{view}");
+        flow.window.check_accessibility();
+    }
+    // Nothing holds a shape so well: the nearest is told.
+    flow.type_into("shape", "0.0001");
+    assert!(flow.says("no plan: ") && flow.says("Nearest within the budget"));
+    flow.type_into("budget", "0");
+    assert!(flow.says("must be above 0") && flow.says("cannot be read"));
+}

@@ -82,7 +82,7 @@ pub const LIGHT: Tokens = Tokens {
         grey(0x1C),
     ],
     phase_band: Color32::from_black_alpha(14),
-    ordered: [0.0, 0.55],
+    ordered: [0.0, 0.45],
 };
 
 /// For dim rooms.
@@ -149,6 +149,8 @@ const VIRIDIS: [[u8; 3]; 9] = [
 /// The colour of a share from 0 to 1: as light as the share is large, for every kind of colour vision.
 #[must_use]
 pub fn viridis(share: f32) -> Color32 {
+    // What is no number is as little as can be.
+    let share = if share.is_nan() { 0.0 } else { share };
     let place = share.clamp(0.0, 1.0) * (VIRIDIS.len() - 1) as f32;
     let index = (place as usize).min(VIRIDIS.len() - 2);
     let part = place - index as f32;
