@@ -13,6 +13,7 @@ use crate::screens::models::ModelsScreen;
 use crate::screens::review::ReviewScreen;
 use crate::screens::rig::RigScreen;
 use crate::screens::run_middle::{Chooser, Middle, first_view};
+use crate::screens::scene::SceneScreen;
 use crate::screens::trade::TradeScreen;
 use crate::settings::{Kept, ZOOM};
 use crate::shell::activity::{Intent, activity, is_motion_possible, run_in_progress};
@@ -74,6 +75,7 @@ pub struct WorkbenchApp {
     pub(crate) models: ModelsScreen,
     pub(crate) extremes: ExtremesScreen,
     pub(crate) haptics: HapticsScreen,
+    pub(crate) scene: SceneScreen,
     pub(crate) trade: TradeScreen,
     pub(crate) calibration: CalibrationScreen,
     pub(crate) events: EventLog,
@@ -161,6 +163,7 @@ impl WorkbenchApp {
             models: ModelsScreen::default(),
             extremes: ExtremesScreen::default(),
             haptics: HapticsScreen::default(),
+            scene: SceneScreen::default(),
             calibration,
             trade: TradeScreen::new(curves_in),
             events: EventLog::default(),
@@ -222,6 +225,12 @@ impl WorkbenchApp {
         &self.haptics
     }
 
+    /// The scene screen.
+    #[must_use]
+    pub fn scene(&self) -> &SceneScreen {
+        &self.scene
+    }
+
     /// What the window is in the middle of.
     #[must_use]
     pub fn intent(&self) -> Intent {
@@ -261,6 +270,7 @@ impl WorkbenchApp {
             self.models.is_busy(),
             self.extremes.is_busy(),
             self.haptics.is_busy(),
+            self.scene.is_busy(),
             self.trade.is_busy(),
         ];
         if others.contains(&true) {
@@ -271,9 +281,19 @@ impl WorkbenchApp {
 
     /// Whether the haptic loop may run now, or why not: its priority would disturb a run.
     pub(crate) fn loop_verdict(&self) -> Result<(), String> {
-        match self.is_busy() {
-            true => Err("a run is in progress and would be disturbed".into()),
-            false => Ok(()),
+        match (self.is_busy(), self.scene.is_running()) {
+            (true, _) => Err("a run is in progress and would be disturbed".into()),
+            (_, true) => Err("the scene runs and would be disturbed".into()),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether the scene may run now, or why not.
+    pub(crate) fn scene_verdict(&self) -> Result<(), String> {
+        match (self.is_busy(), self.haptics.is_running()) {
+            (true, _) => Err("a run is in progress and would be disturbed".into()),
+            (_, true) => Err("the haptic loop runs and would be disturbed".into()),
+            _ => self.scene.verdict(),
         }
     }
 
@@ -285,6 +305,7 @@ impl WorkbenchApp {
                 Command::Stop => {
                     self.palette.close();
                     self.haptics.stop_loop();
+                    self.scene.stop();
                     self.operator(Operator::Stop);
                 }
                 Command::Halt => self.operator(Operator::Halt),
@@ -339,6 +360,7 @@ impl WorkbenchApp {
                     }
                     Screen::Extremes => self.extremes.start(ctx),
                     Screen::Haptics => self.haptics.start_check(ctx),
+                    Screen::Scene => self.scene.compute(ctx),
                     Screen::Calibration => self.use_calibration(),
                 },
                 Command::CancelWork => match self.screen {
@@ -348,6 +370,7 @@ impl WorkbenchApp {
                     Screen::Trade => self.trade.cancel(),
                     Screen::Extremes => self.extremes.cancel(),
                     Screen::Haptics => self.haptics.cancel(),
+                    Screen::Scene => self.scene.cancel(),
                 },
                 Command::LoopStart => {
                     if self.loop_verdict().is_ok() {
@@ -356,6 +379,14 @@ impl WorkbenchApp {
                     }
                 }
                 Command::LoopStop => self.haptics.stop_loop(),
+                Command::SceneStart => {
+                    if self.scene_verdict().is_ok() {
+                        self.screen = Screen::Scene;
+                        self.scene.start();
+                    }
+                }
+                Command::SceneStop => self.scene.stop(),
+                Command::OpenScene => self.scene.read(ctx),
                 Command::Review(sessions) => {
                     self.screen = Screen::Review;
                     self.review.open(sessions, ctx);
@@ -513,7 +544,9 @@ impl WorkbenchApp {
         let (tables, sessions): (Vec<_>, Vec<_>) = others
             .into_iter()
             .partition(|path| path.is_file() && !ends(path, &["mcap"]));
-        if let Some(path) = protocols.first() {
+        if let Some(path) = protocols.first().filter(|_| self.screen == Screen::Scene) {
+            self.scene.take(path, ctx);
+        } else if let Some(path) = protocols.first() {
             self.screen = Screen::Run;
             self.read_protocol(|chooser| chooser.read(path, ctx));
         }
@@ -563,6 +596,7 @@ impl WorkbenchApp {
         self.refusal = None;
         // Nothing comes between a rig and its runner.
         self.haptics.stop_loop();
+        self.scene.stop();
         match self.runner.request(Request::Run(Box::new(request), reply)) {
             Ok(()) => {
                 self.start = Start::Asked(answer);
@@ -630,6 +664,7 @@ impl eframe::App for WorkbenchApp {
             Some((Ask::NewSessions, folder)) => self.form.folder = folder.display().to_string(),
             Some((Ask::Session | Ask::Table, path)) => self.models.add(&path),
             Some((Ask::Body, path)) => self.haptics.take(&path),
+            Some((Ask::Scene, path)) => self.scene.take(&path, ctx),
             Some((Ask::Protocol, path)) => self.read_protocol(|chooser| chooser.read(&path, ctx)),
             None => {}
         }
@@ -648,6 +683,7 @@ impl eframe::App for WorkbenchApp {
         self.models.poll();
         self.extremes.poll();
         self.haptics.poll();
+        self.scene.poll();
         self.trade.poll();
         self.calibration.poll();
         if self.screen == Screen::Library {
@@ -658,6 +694,9 @@ impl eframe::App for WorkbenchApp {
         }
         if self.screen == Screen::Calibration {
             self.calibration.shown(ctx);
+        }
+        if self.screen == Screen::Scene {
+            self.scene.shown(ctx);
         }
         let rig = &self.snapshot.rig;
         self.form
@@ -673,7 +712,8 @@ impl eframe::App for WorkbenchApp {
         let is_quiet = run_in_progress(&self.snapshot).is_none()
             && self.intent() == Intent::None
             && !is_motion_possible(&self.snapshot)
-            && !self.haptics.is_running();
+            && !self.haptics.is_running()
+            && !self.scene.is_running();
         // On the rig's screen somebody may press the cell by hand.
         self.pace.next(ctx, !is_quiet, self.screen == Screen::Rig);
     }

@@ -52,6 +52,12 @@ pub enum Command {
     LoopStart,
     /// Stop the haptic loop.
     LoopStop,
+    /// Start the scene.
+    SceneStart,
+    /// Stop the scene.
+    SceneStop,
+    /// Read the scene file whose path is typed; the built-in scene where none is.
+    OpenScene,
     /// Change between the light and the dark theme.
     SwitchTheme,
     /// Look at sessions on the review screen, instead of those there.

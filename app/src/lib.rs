@@ -10,6 +10,7 @@ pub mod command;
 pub mod playback;
 pub mod plots;
 pub mod report;
+pub mod scene;
 pub mod screens;
 pub mod settings;
 pub mod shell;

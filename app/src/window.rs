@@ -182,6 +182,7 @@ impl WorkbenchApp {
             Screen::Models => self.models_ui(ui, commands),
             Screen::Extremes => self.extremes_ui(ui, commands),
             Screen::Haptics => self.haptics_ui(ui, commands),
+            Screen::Scene => self.scene_ui(ui, commands),
             Screen::Trade => self.trade_ui(ui, commands),
             Screen::Calibration => self.calibration_ui(ui, commands),
         }
@@ -290,6 +291,19 @@ impl WorkbenchApp {
         CentralPanel::default()
             .frame(frame(ui, true))
             .show(ui, |ui| self.haptics.middle_ui(ui));
+    }
+
+    fn scene_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+        let verdict = self.scene_verdict();
+        side_ui(ui, &mut self.sizes, Edge::Left, |ui| {
+            self.scene.left_ui(ui, &verdict, commands);
+        });
+        side_ui(ui, &mut self.sizes, Edge::Right, |ui| {
+            self.scene.right_ui(ui)
+        });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.scene.middle_ui(ui));
     }
 
     fn models_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {

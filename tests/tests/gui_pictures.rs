@@ -157,6 +157,19 @@ fn check_buzz(window: &mut Window) {
     panic!("the check never ended");
 }
 
+/// Waits for the poke that the scene screen computes when it is shown first: at its deepest, whatever the computer's pace.
+fn compute_poke(window: &mut Window) {
+    for _ in 0..2000 {
+        window.step();
+        if window.state().scene().ahead().is_some() {
+            window.run_steps(2);
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    panic!("the poke was never computed");
+}
+
 #[test]
 fn every_screen_looks_as_it_did() {
     if !has_renderer() {
@@ -180,6 +193,9 @@ fn every_screen_looks_as_it_did() {
             }
             if screen == Screen::Haptics {
                 check_buzz(&mut window);
+            }
+            if screen == Screen::Scene {
+                compute_poke(&mut window);
             }
             settle(&mut window);
             // Who sits at this computer is not in the picture; how long a search took is, in a few digits.

@@ -17,5 +17,6 @@ pub mod review;
 pub mod rig;
 pub mod rig_panel;
 pub mod run_middle;
+pub mod scene;
 pub mod trade;
 pub mod weighing;

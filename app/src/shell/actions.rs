@@ -50,6 +50,10 @@ impl WorkbenchApp {
             true => Ok(()),
             false => Err("the loop does not run".to_owned()),
         };
+        let is_touched = match self.scene.is_running() {
+            true => Ok(()),
+            false => Err("the scene does not run".to_owned()),
+        };
         actions.extend([
             Action::new("Retract after a stop", "F8", Command::Retract).if_ok(can_retract),
             Action::new("Close the session after a stop", "", Command::CloseSession).if_ok(is_held),
@@ -61,6 +65,8 @@ impl WorkbenchApp {
             Action::new("Cancel the work of this screen", "", Command::CancelWork),
             Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(self.loop_verdict()),
             Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(is_felt),
+            Action::new("Start the scene", "", Command::SceneStart).if_ok(self.scene_verdict()),
+            Action::new("Stop the scene", "", Command::SceneStop).if_ok(is_touched),
         ]);
         for screen in Screen::ALL {
             let keys = format!("Ctrl+{}", screen.key().symbol_or_name());

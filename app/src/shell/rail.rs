@@ -28,11 +28,13 @@ pub enum Screen {
     Extremes,
     /// A body felt through a device.
     Haptics,
+    /// Tissue that is seen and felt.
+    Scene,
 }
 
 impl Screen {
     /// All, in the order of a day's work.
-    pub const ALL: [Self; 9] = [
+    pub const ALL: [Self; 10] = [
         Self::Rig,
         Self::Calibration,
         Self::Run,
@@ -42,6 +44,7 @@ impl Screen {
         Self::Trade,
         Self::Extremes,
         Self::Haptics,
+        Self::Scene,
     ];
 
     /// Name on the rail.
@@ -57,6 +60,7 @@ impl Screen {
             Self::Trade => "Trade",
             Self::Extremes => "Extremes",
             Self::Haptics => "Haptics",
+            Self::Scene => "Scene",
         }
     }
 
@@ -79,6 +83,7 @@ impl Screen {
             Self::Trade => "what accuracy costs on this machine",
             Self::Extremes => "what is right and what is refused at the ends of every range",
             Self::Haptics => "feel a body through a device: margin, buzz and loop",
+            Self::Scene => "press into a piece of tissue and see it give way",
         }
     }
 
@@ -95,6 +100,8 @@ impl Screen {
             Self::Trade => Key::Num7,
             Self::Extremes => Key::Num8,
             Self::Haptics => Key::Num9,
+            // Every number is taken: Ctrl+0 is the usual size of text.
+            Self::Scene => Key::E,
         }
     }
 }

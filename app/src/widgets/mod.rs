@@ -3,6 +3,7 @@
 pub mod choice_box;
 pub mod choice_table;
 pub mod fact_row;
+pub mod loop_times;
 pub mod mark;
 pub mod places;
 pub mod quantity_input;

@@ -25,6 +25,7 @@ pub mod scene;
 pub mod scene_bench;
 pub mod select;
 pub mod task;
+pub mod touch;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 

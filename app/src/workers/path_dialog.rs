@@ -17,6 +17,8 @@ pub enum Ask {
     Protocol,
     /// A recorded session to feel.
     Body,
+    /// A scene file.
+    Scene,
 }
 
 /// A dialog that may be open.
@@ -40,6 +42,10 @@ impl PathDialog {
             Ask::Table => dialog
                 .set_title("Table of a recording")
                 .add_filter("tables", &["csv", "tsv", "txt"])
+                .pick_file(),
+            Ask::Scene => dialog
+                .set_title("Scene")
+                .add_filter("scenes", &["toml"])
                 .pick_file(),
             Ask::Protocol => dialog
                 .set_title("Protocol")

@@ -4,9 +4,9 @@ use super::{HapticsScreen, Looked};
 use crate::report::haptics::{margin_text, tried_text, why_less};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::loop_times::loop_times_ui;
 use crate::workers::feel::Feel;
-use eframe::egui::{Grid, Label, RichText, Ui};
-use palpate_model::units::Seconds;
+use eframe::egui::{Label, RichText, Ui};
 
 impl HapticsScreen {
     /// What is known.
@@ -83,29 +83,7 @@ fn loop_ui(ui: &mut Ui, feel: &Feel) {
         format!("{:.0} ticks a second", feel.rate_hz()),
     );
     fact_ui(ui, "priority", feel.priority());
-    fact_ui(
-        ui,
-        "overruns",
-        format!("{}; {} ticks missed", kept.overruns, kept.missed),
-    );
-    let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
-    Grid::new("loop_times").striped(true).show(ui, |ui| {
-        for head in ["in µs", "p50", "p99", "p99.9", "max"] {
-            ui.label(RichText::new(head).color(tokens.text_quiet).small());
-        }
-        ui.end_row();
-        for (name, spread) in [
-            ("period", &kept.period),
-            ("late", &kept.late),
-            ("compute", &kept.work),
-        ] {
-            ui.label(name);
-            for time in [spread.p50, spread.p99, spread.p99_9, spread.max] {
-                ui.label(micros(time));
-            }
-            ui.end_row();
-        }
-    });
+    loop_times_ui(ui, kept);
 }
 
 fn looked_ui(ui: &mut Ui, looked: &Looked) {

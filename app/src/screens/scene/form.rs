@@ -1,0 +1,227 @@
+//! The scene as typed.
+
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::quantity_input::{QuantityField, quantity_ui};
+use crate::widgets::text_row::text_row;
+use eframe::egui::{Label, RichText, Ui};
+use palpate_model::haptics::Period;
+use palpate_model::scene::{ScenePath, SceneSettings};
+use palpate_model::surface::INERT;
+use palpate_protocols::haptics::scene_file::SceneFile;
+
+/// The path that is chosen first.
+pub(super) const FIRST_PATH: ScenePath = ScenePath::Poke;
+
+/// Nodes along a side that a scene may have.
+const NODES: [f64; 2] = [3.0, 1601.0];
+
+/// What is asked for beside the fields.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Asked {
+    /// A dialog for a scene file.
+    Dialog,
+    /// The file that is named.
+    Read,
+}
+
+/// A scene file's numbers and the path of the hand.
+pub(super) struct SceneForm {
+    /// Path of the file; none for the scene built in.
+    pub file: String,
+    /// What was read of it.
+    read: SceneFile,
+    notes: Vec<String>,
+    side: QuantityField,
+    nodes: QuantityField,
+    slope: QuantityField,
+    friction: QuantityField,
+    rate: QuantityField,
+    is_guarded: bool,
+    /// What leads the hand at first; the pointer and the keys without one.
+    pub path: Option<ScenePath>,
+}
+
+impl Default for SceneForm {
+    fn default() -> Self {
+        Self::of(SceneFile::default())
+    }
+}
+
+impl SceneForm {
+    fn of(read: SceneFile) -> Self {
+        let nodes = read.nodes.unwrap_or(SceneSettings::default().nodes);
+        Self {
+            file: String::new(),
+            notes: Vec::new(),
+            side: QuantityField::new(read.side_mm),
+            nodes: QuantityField::new(nodes as f64),
+            slope: QuantityField::new(read.slope),
+            friction: QuantityField::new(read.friction),
+            rate: QuantityField::new(read.rate_hz),
+            is_guarded: read.is_guarded,
+            path: Some(FIRST_PATH),
+            read,
+        }
+    }
+
+    /// Takes what was read of a file.
+    pub fn fill(&mut self, read: SceneFile, mut notes: Vec<String>) {
+        if read.nodes.is_none() {
+            notes.push("the file leaves the mesh to a plan: plan it on the screen Trade".into());
+        }
+        *self = Self {
+            file: std::mem::take(&mut self.file),
+            path: self.path,
+            notes,
+            ..Self::of(read)
+        };
+    }
+
+    /// Checks every field.
+    pub fn check(&mut self) {
+        let within = |value: f64, [low, high]: [f64; 2]| match (low..=high).contains(&value) {
+            true => Ok(()),
+            false => Err(format!("must be from {low} to {high}")),
+        };
+        self.side.check(|side| within(side, [1.0, 1000.0]));
+        self.nodes.check(|nodes| match nodes.fract() == 0.0 {
+            true => within(nodes, NODES),
+            false => Err("must be a whole number".into()),
+        });
+        self.slope.check(|slope| within(slope, [0.0, 1000.0]));
+        self.friction
+            .check(|friction| within(friction, [0.0, 10.0]));
+        self.rate.check(|rate| {
+            let period = Period::of_rate(rate);
+            period.map(|_| ()).map_err(|err| err.to_string())
+        });
+    }
+
+    /// What the scene is made of, or the first thing that is wrong.
+    pub fn settings(&self) -> Result<SceneSettings, String> {
+        let value = |name: &str, field: &QuantityField| {
+            let value = field.value.clone();
+            value.map_err(|reason| format!("{name}: {reason}"))
+        };
+        let nodes = value("nodes", &self.nodes)? as usize;
+        let file = SceneFile {
+            side_mm: value("side", &self.side)?,
+            nodes: Some(nodes),
+            slope: value("slope", &self.slope)?,
+            friction: value("friction", &self.friction)?,
+            rate_hz: value("rate", &self.rate)?,
+            is_guarded: self.is_guarded,
+            ..self.read.clone()
+        };
+        file.settings(nodes)
+    }
+
+    /// Draws the fields.
+    pub fn ui(&mut self, ui: &mut Ui) -> Option<Asked> {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let quiet = |ui: &mut Ui, words: &str| {
+            ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+        };
+        let mut asked = None;
+        section_ui(ui, "Scene");
+        if text_row(ui, "file", "a scene file; built in without", &mut self.file) {
+            asked = Some(Asked::Read);
+        }
+        ui.horizontal_wrapped(|ui| {
+            if ui.button("Built in").clicked() {
+                self.file.clear();
+                asked = Some(Asked::Read);
+            }
+            if ui.button("Open").clicked() {
+                asked = Some(Asked::Read);
+            }
+            if ui.button("Choose a scene...").clicked() {
+                asked = Some(Asked::Dialog);
+            }
+        });
+        quiet(ui, &self.read.name);
+        for note in &self.notes {
+            quiet(ui, note);
+        }
+        section_ui(ui, "Tissue and mesh");
+        quantity_ui(ui, "side", "mm", &mut self.side);
+        quantity_ui(ui, "nodes", "along a side", &mut self.nodes);
+        quantity_ui(ui, "slope", "steepest", &mut self.slope);
+        quantity_ui(ui, "friction", "of the tissue", &mut self.friction);
+        let [(least, _), (most, _)] = INERT;
+        let words = format!("{least} and {most} do nothing here: nodes move along z alone");
+        quiet(ui, &words);
+        section_ui(ui, "Loop");
+        quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
+        ui.checkbox(&mut self.is_guarded, "guards and controller");
+        let device = &self.read.device;
+        let words = format!(
+            "simulated device: up to {} N, {} N for long, {} N/mm, places in steps of {} mm, friction {} N",
+            device.force_max_n,
+            device.force_continuous_n,
+            device.stiffness_max_n_per_mm,
+            device.step_mm,
+            device.friction_n
+        );
+        quiet(ui, &words);
+        section_ui(ui, "Hand");
+        ui.horizontal_wrapped(|ui| {
+            for path in ScenePath::ALL {
+                ui.radio_value(&mut self.path, Some(path), path.name());
+            }
+            ui.radio_value(&mut self.path, None, "pointer and keys");
+        });
+        asked
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn untouched_the_form_is_the_scene_built_in() {
+        let mut form = SceneForm::default();
+        form.check();
+        let built_in = SceneFile::default().settings(1).unwrap();
+        assert_eq!(form.settings().unwrap(), built_in);
+    }
+
+    #[test]
+    fn every_field_reaches_the_scene_and_what_cannot_be_is_refused_with_its_name() {
+        let mut form = SceneForm::default();
+        for (field, text) in [
+            (&mut form.side, "40"),
+            (&mut form.nodes, "81"),
+            (&mut form.slope, "0.5"),
+            (&mut form.friction, "0"),
+            (&mut form.rate, "2000"),
+        ] {
+            field.text = text.into();
+        }
+        form.is_guarded = false;
+        form.check();
+        let settings = form.settings().unwrap();
+        let wanted = SceneFile {
+            side_mm: 40.0,
+            nodes: Some(81),
+            slope: 0.5,
+            friction: 0.0,
+            rate_hz: 2000.0,
+            is_guarded: false,
+            ..SceneFile::default()
+        };
+        assert_eq!(settings, wanted.settings(1).unwrap());
+        for (text, words) in [
+            ("2", "nodes: must be from 3"),
+            ("10.5", "nodes: must be a whole"),
+            ("5000", "to 1601"),
+        ] {
+            form.nodes.text = text.into();
+            form.check();
+            let refused = form.settings().unwrap_err();
+            assert!(refused.contains(words), "{refused}");
+        }
+    }
+}

@@ -1,0 +1,256 @@
+//! A piece of tissue that is pressed with the pointer, the keys or along a path, seen in three dimensions, with the force
+//! that a hand would feel.
+
+mod form;
+mod middle;
+mod right;
+
+use crate::command::{Command, Commands};
+use crate::scene::view::SceneView;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
+use crate::widgets::reason_button::reason_button;
+use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::workers::path_dialog::Ask;
+use crate::workers::scene::scene_of;
+use crate::workers::task::Task;
+use crate::workers::touch::{Ahead, Moment, Touch, ahead};
+use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
+use form::SceneForm;
+use middle::Side;
+use palpate_model::scene::{Hand6, SceneSettings};
+use palpate_protocols::haptics::scene_file::SceneFile;
+use std::path::Path;
+
+/// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
+const TURN: [f64; 3] = [0.0, -0.5, 0.0];
+
+/// The screen's state.
+pub struct SceneScreen {
+    form: SceneForm,
+    reading: Task<(SceneFile, Vec<String>)>,
+    /// Whether the file asked for has not come yet.
+    is_reading: bool,
+    ahead: Task<Ahead>,
+    is_shown: bool,
+    touch: Option<Touch>,
+    refusal: Option<String>,
+    side: Side,
+    view: SceneView,
+    /// The length of the side that the view was made for, in mm.
+    viewed_mm: f64,
+}
+
+impl Default for SceneScreen {
+    fn default() -> Self {
+        let form = SceneForm::default();
+        let side = SceneFile::default().side_mm;
+        Self {
+            form,
+            reading: Task::default(),
+            is_reading: false,
+            ahead: Task::default(),
+            is_shown: false,
+            touch: None,
+            refusal: None,
+            side: Side::Ahead,
+            view: SceneView::of([side; 2]),
+            viewed_mm: side,
+        }
+    }
+}
+
+impl SceneScreen {
+    /// Whether times measured now would be disturbed.
+    #[must_use]
+    pub fn is_busy(&self) -> bool {
+        self.ahead.standing().is_some() || self.is_running()
+    }
+
+    /// Whether the scene runs.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.touch.as_ref().is_some_and(Touch::is_running)
+    }
+
+    /// The scene that runs or ran last.
+    #[must_use]
+    pub fn touch(&self) -> Option<&Touch> {
+        self.touch.as_ref()
+    }
+
+    /// The path that was computed last.
+    #[must_use]
+    pub fn ahead(&self) -> Option<&Result<Ahead, String>> {
+        self.ahead.answer()
+    }
+
+    /// Whether what stands in the form can be started.
+    pub fn verdict(&self) -> Result<(), String> {
+        if self.is_running() {
+            return Err("the scene runs".into());
+        }
+        self.form.settings().map(|_| ())
+    }
+
+    /// Computes the path the first time the screen is shown, so that there is something to see.
+    pub fn shown(&mut self, ctx: &Context) {
+        if !std::mem::replace(&mut self.is_shown, true) {
+            self.compute(ctx);
+        }
+    }
+
+    /// Fetches what is new.
+    pub fn poll(&mut self) {
+        self.form.check();
+        self.ahead.poll();
+        self.reading.poll();
+        if self.is_reading && self.reading.standing().is_none() {
+            self.is_reading = false;
+            match self.reading.answer() {
+                Some(Ok((file, notes))) => {
+                    self.refusal = None;
+                    self.form.fill(file.clone(), notes.clone());
+                }
+                Some(Err(reason)) => self.refusal = Some(reason.clone()),
+                None => {}
+            }
+        }
+        let hand = Hand6 {
+            at: self.view.hand().at(),
+            turn: TURN,
+        };
+        if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
+            self.refusal = Some(reason);
+        }
+    }
+
+    /// Takes a scene file.
+    pub fn take(&mut self, path: &Path, ctx: &Context) {
+        self.form.file = path.display().to_string();
+        self.read(ctx);
+    }
+
+    /// Reads the file that is named, on a thread: a body may have to be fitted.
+    pub fn read(&mut self, ctx: &Context) {
+        if self.is_running() {
+            return;
+        }
+        let named = self.form.file.trim().to_owned();
+        self.is_reading = true;
+        self.reading.start("scene-read", ctx, move |_| {
+            scene_of((!named.is_empty()).then_some(Path::new(&named)))
+        });
+    }
+
+    /// Computes what stands in the form along its path.
+    pub fn compute(&mut self, ctx: &Context) {
+        let Ok(settings) = self.form.settings() else {
+            return;
+        };
+        let path = self.form.path.unwrap_or(form::FIRST_PATH);
+        self.side = Side::Ahead;
+        self.look_at(&settings);
+        self.ahead.start("scene-ahead", ctx, move |progress| {
+            ahead(settings, path, &mut |share| {
+                let told = progress.tell((1000.0 * share) as usize, 1000, "the path");
+                told.is_continue()
+            })
+        });
+    }
+
+    /// Ends that.
+    pub fn cancel(&self) {
+        self.ahead.cancel();
+    }
+
+    /// Starts the scene, unless it runs.
+    pub fn start(&mut self) {
+        if self.is_running() {
+            return;
+        }
+        let started = self.form.settings().and_then(|settings| {
+            self.look_at(&settings);
+            Touch::start(settings, self.form.path)
+        });
+        match started {
+            Ok(touch) => {
+                self.touch = Some(touch);
+                self.side = Side::Live;
+                self.refusal = None;
+            }
+            Err(reason) => self.refusal = Some(reason),
+        }
+    }
+
+    /// Stops it.
+    pub fn stop(&mut self) {
+        if let Some(touch) = &mut self.touch {
+            touch.stop();
+        }
+    }
+
+    /// Another piece of tissue is looked at anew.
+    fn look_at(&mut self, settings: &SceneSettings) {
+        if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
+            self.viewed_mm = settings.side_mm;
+            let has_lines = self.view.has_lines;
+            self.view = SceneView::of([settings.side_mm; 2]);
+            self.view.has_lines = has_lines;
+        }
+    }
+
+    /// What is on the screen: the scene that runs or ran, or the path computed ahead.
+    fn seen(&self) -> Option<(&SceneSettings, &Moment)> {
+        match (self.side, &self.touch, self.ahead.answer()) {
+            (Side::Live, Some(touch), _) => Some((touch.settings(), touch.moment())),
+            (Side::Ahead, _, Some(Ok(ahead))) => Some((&ahead.settings, &ahead.deepest)),
+            _ => None,
+        }
+    }
+
+    /// What is asked for. `verdict` says whether the scene may be started.
+    pub fn left_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        // What runs is not to be changed under a hand.
+        let is_running = self.is_running();
+        ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
+            Some(form::Asked::Dialog) => commands.push(Command::Choose(Ask::Scene)),
+            Some(form::Asked::Read) => commands.push(Command::OpenScene),
+            None => {}
+        });
+        if let Some(reason) = &self.refusal {
+            ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+        }
+        ui.add_space(6.0);
+        let may = match is_running {
+            true => Err("the scene runs".into()),
+            false => self.form.settings().map(|_| ()),
+        };
+        match task_ui(ui, "Compute the path  F6", &self.ahead, &may) {
+            Some(Pressed::Start) => commands.push(Command::Work),
+            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
+            None => {}
+        }
+        section_ui(ui, "Touch");
+        let size = vec2(170.0, 34.0);
+        if is_running {
+            let stop = Button::new("Stop the scene").min_size(size);
+            if ui.add(stop).place("Stop the scene").clicked() {
+                commands.push(Command::SceneStop);
+            }
+        } else if reason_button(ui, "Start the scene", size, verdict) {
+            commands.push(Command::SceneStart);
+        }
+        let words = match self.touch.as_ref().is_some_and(Touch::is_led) {
+            true => "the path leads the hand; after it the pointer and the keys do",
+            false => {
+                "in the picture: hold the left button to press, with the wheel deeper; drag with the right button to \
+                 turn, wheel to zoom. Keys: arrows move, Page Down presses, Page Up lifts, Shift with arrows turns, \
+                 + and - zoom, Home looks as at first"
+            }
+        };
+        ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+    }
+}

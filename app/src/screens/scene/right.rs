@@ -1,0 +1,72 @@
+//! What is felt, why it is not more, and how the loop does.
+
+use super::SceneScreen;
+use super::middle::Side;
+use crate::report::haptics::margin_text;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::loop_times::loop_times_ui;
+use crate::workers::touch::{Touch, force_of, margin_of};
+use eframe::egui::{Label, RichText, Ui};
+use palpate_model::scene::{SceneSettings, SceneTick};
+
+impl SceneScreen {
+    /// What is known.
+    pub fn right_ui(&self, ui: &mut Ui) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        let Some((settings, moment)) = self.seen() else {
+            ui.label(RichText::new("nothing to feel yet").color(tokens.text_quiet));
+            return;
+        };
+        force_ui(ui, &moment.tick);
+        guard_ui(ui, settings, &moment.tick);
+        let live = self.touch.as_ref().filter(|_| self.side == Side::Live);
+        if let Some(touch) = live {
+            loop_ui(ui, touch);
+        }
+    }
+}
+
+fn force_ui(ui: &mut Ui, tick: &SceneTick) {
+    section_ui(ui, "Force");
+    let now = format!("{:.2} N at {:.2} mm", force_of(tick), tick.depth);
+    ui.label(RichText::new(now).heading().monospace());
+    let [x, y, z] = tick.device;
+    fact_ui(ui, "stylus", format!("{x:.1}, {y:.1}, {z:.2} mm"));
+    fact_ui(ui, "speed", format!("{:.1} mm/s inwards", tick.speed));
+    fact_ui(ui, "moved", format!("{} nodes", tick.moved));
+    section_ui(ui, "Why no force?");
+    ui.add(Label::new(tick.why.words()).wrap());
+}
+
+fn guard_ui(ui: &mut Ui, settings: &SceneSettings, tick: &SceneTick) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    section_ui(ui, "Margin and guard");
+    if tick.is_contact() {
+        let margin = margin_text(&margin_of(settings, tick));
+        ui.add(Label::new(margin).wrap());
+    } else {
+        ui.label("no margin without contact");
+    }
+    let added = match settings.controller {
+        Some(_) => format!("{:.2} N s/m of damping", 1e3 * tick.injected_damping),
+        None => "nothing: guards and controller are off".to_owned(),
+    };
+    fact_ui(ui, "added", added);
+    fact_ui(ui, "energy", format!("{:.2} mJ absorbed", tick.energy));
+    for sentence in tick.flags.sentences() {
+        ui.add(Label::new(RichText::new(sentence).small()).wrap());
+    }
+    if tick.is_buzzing {
+        let words = RichText::new("the loop swings by itself: buzz");
+        ui.label(words.strong().color(tokens.alarm_text));
+    }
+}
+
+fn loop_ui(ui: &mut Ui, touch: &Touch) {
+    section_ui(ui, "Loop");
+    let rate = touch.settings().period.hz();
+    fact_ui(ui, "wanted", format!("{rate:.0} ticks a second"));
+    fact_ui(ui, "priority", touch.priority());
+    loop_times_ui(ui, touch.kept());
+}

@@ -1,0 +1,35 @@
+//! How a loop keeps its time, as a table.
+
+use super::fact_row::fact_ui;
+use crate::theme::Tokens;
+use eframe::egui::{Grid, RichText, Ui};
+use palpate_model::units::Seconds;
+use palpate_protocols::haptics::timing::Kept;
+
+/// Draws overruns, and the percentiles of period, lateness and work.
+pub fn loop_times_ui(ui: &mut Ui, kept: &Kept) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    fact_ui(
+        ui,
+        "overruns",
+        format!("{}; {} ticks missed", kept.overruns, kept.missed),
+    );
+    let micros = |time: Seconds| format!("{:.0}", 1e6 * time.0);
+    Grid::new("loop_times").striped(true).show(ui, |ui| {
+        for head in ["in µs", "p50", "p99", "p99.9", "max"] {
+            ui.label(RichText::new(head).color(tokens.text_quiet).small());
+        }
+        ui.end_row();
+        for (name, spread) in [
+            ("period", &kept.period),
+            ("late", &kept.late),
+            ("compute", &kept.work),
+        ] {
+            ui.label(name);
+            for time in [spread.p50, spread.p99, spread.p99_9, spread.max] {
+                ui.label(micros(time));
+            }
+            ui.end_row();
+        }
+    });
+}

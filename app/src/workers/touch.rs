@@ -1,0 +1,307 @@
+//! The scene as the window has it: computed ahead along a path, or in a loop of its own, and what was seen of it.
+
+use palpate_model::haptics::LawSettings;
+use palpate_model::haptics::margin::{Device, Margin, Watch};
+use palpate_model::scene::{Hand6, Scene, ScenePath, SceneSettings, SceneTick};
+use palpate_model::surface::{Grid, Heights, MeshError};
+use palpate_model::units::{Depth, MmPerS, Newtons};
+use palpate_protocols::haptics::SceneLoop;
+use palpate_protocols::haptics::timing::Kept;
+use std::collections::VecDeque;
+
+/// How much of the past is kept for the plots, in s.
+pub const PAST_S: f64 = 10.0;
+/// Between two looks at how the loop keeps its time, in s: numbers that change faster cannot be read.
+const LOOK_S: f64 = 0.5;
+/// Ticks between two looks at a scene that is computed ahead.
+const AHEAD_TICKS: u64 = 10;
+
+/// Force and depth at one time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TouchPoint {
+    /// Since the start, in s.
+    pub t: f64,
+    /// Length of the force on the hand in N.
+    pub force: f64,
+    /// Depth of the stylus in mm.
+    pub depth: f64,
+}
+
+impl TouchPoint {
+    fn of(tick: &SceneTick, settings: &SceneSettings) -> Self {
+        Self {
+            t: settings.period.time_of(tick.tick).seconds().0,
+            force: force_of(tick),
+            depth: tick.depth,
+        }
+    }
+}
+
+/// Length of the force on the hand in N.
+#[must_use]
+pub fn force_of(tick: &SceneTick) -> f64 {
+    let [x, y, z] = tick.force;
+    x.hypot(y).hypot(z)
+}
+
+/// A scene at one moment.
+#[derive(Clone, Debug)]
+pub struct Moment {
+    /// Its tick.
+    pub tick: SceneTick,
+    grid: Grid,
+    heights: Vec<f64>,
+    rest: Vec<f64>,
+}
+
+impl Moment {
+    fn of(scene: &Scene) -> Self {
+        let field = scene.field();
+        Self {
+            tick: scene.last(),
+            grid: *field.grid(),
+            heights: field.heights().to_vec(),
+            // A scene's tissue is flat at rest.
+            rest: vec![0.0; field.heights().len()],
+        }
+    }
+
+    /// The surface.
+    pub fn now(&self) -> Result<Heights<'_>, MeshError> {
+        Heights::new(self.grid, &self.heights)
+    }
+
+    /// Its heights at rest in mm.
+    #[must_use]
+    pub fn rest(&self) -> &[f64] {
+        &self.rest
+    }
+}
+
+/// The margin of a scene's loop where it is now.
+#[must_use]
+pub fn margin_of(settings: &SceneSettings, tick: &SceneTick) -> Margin {
+    let device = &settings.device;
+    let watch = Watch {
+        body: LawSettings::of(settings.body, settings.period).body,
+        scheme: settings.scheme,
+        period: settings.period,
+        device: Device {
+            damping: device.damping_n_s_per_mm,
+            friction: Newtons(device.friction_n),
+            count_mm: device.step_mm,
+            delay_ticks: 0.0,
+        },
+    };
+    watch.at(Depth(tick.depth), MmPerS(tick.speed))
+}
+
+/// A scene that was computed along a path, and not in real time.
+#[derive(Clone, Debug)]
+pub struct Ahead {
+    /// What it is made of.
+    pub settings: SceneSettings,
+    /// The path.
+    pub path: ScenePath,
+    /// Where it was deepest.
+    pub deepest: Moment,
+    /// Force and depth over time.
+    pub trail: Vec<TouchPoint>,
+}
+
+/// Computes a scene along a path. `is_going` hears the share done and ends it early.
+pub fn ahead(
+    settings: SceneSettings,
+    path: ScenePath,
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<Ahead, String> {
+    let mut scene = Scene::new(settings).map_err(|err| err.to_string())?;
+    let mut deepest = Moment::of(&scene);
+    let mut trail = Vec::new();
+    let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
+    for tick in 1..=ticks {
+        let t = settings.period.time_of(tick).seconds().0;
+        let told = scene.tick(path.at(t, &settings));
+        if !tick.is_multiple_of(AHEAD_TICKS) {
+            continue;
+        }
+        trail.push(TouchPoint::of(&told, &settings));
+        if told.depth > deepest.tick.depth {
+            deepest.tick = told;
+            deepest.heights.copy_from_slice(scene.field().heights());
+        }
+        if !is_going(tick as f64 / ticks as f64) {
+            return Err("ended before it was done".into());
+        }
+    }
+    Ok(Ahead {
+        settings,
+        path,
+        deepest,
+        trail,
+    })
+}
+
+/// A scene that runs or ran, and what was seen of it.
+#[derive(Debug)]
+pub struct Touch {
+    live: Option<SceneLoop>,
+    settings: SceneSettings,
+    moment: Moment,
+    trail: VecDeque<TouchPoint>,
+    kept: Kept,
+    looked: f64,
+    is_led: bool,
+    priority: String,
+}
+
+impl Touch {
+    /// Starts the loop; the hand goes along `path` and then where it is pointed.
+    pub fn start(settings: SceneSettings, path: Option<ScenePath>) -> Result<Self, String> {
+        let scene = Scene::new(settings).map_err(|err| err.to_string())?;
+        let moment = Moment::of(&scene);
+        let live = SceneLoop::start(scene, path, None)?;
+        Ok(Self {
+            settings,
+            moment,
+            trail: VecDeque::new(),
+            kept: live.timing(),
+            looked: 0.0,
+            is_led: path.is_some(),
+            priority: live.granted().to_string(),
+            live: Some(live),
+        })
+    }
+
+    /// Points the hand and takes over what is new. An error: the loop has ended by itself.
+    pub fn poll(&mut self, hand: Hand6) -> Result<(), String> {
+        let Some(live) = &mut self.live else {
+            return Ok(());
+        };
+        live.point(hand);
+        self.is_led = !live.is_over();
+        let frame = live.view();
+        if frame.tick.tick > self.moment.tick.tick {
+            let spacing = frame.side_mm / (frame.nodes - 1) as f64;
+            let grid = Grid::new(frame.nodes, frame.nodes, spacing);
+            self.moment.grid = grid.map_err(|err| err.to_string())?;
+            self.moment.tick = frame.tick;
+            self.moment.heights.clear();
+            let heights = frame.heights.iter().copied().map(f64::from);
+            self.moment.heights.extend(heights);
+            self.moment.rest.resize(frame.heights.len(), 0.0);
+            self.trail
+                .push_back(TouchPoint::of(&frame.tick, &self.settings));
+        }
+        let period = self.settings.period;
+        let now = period.time_of(self.moment.tick.tick).seconds().0;
+        while self
+            .trail
+            .front()
+            .is_some_and(|point| point.t < now - PAST_S)
+        {
+            self.trail.pop_front();
+        }
+        if now - self.looked >= LOOK_S {
+            self.kept = live.timing();
+            self.looked = now;
+        }
+        if live.is_alive() {
+            return Ok(());
+        }
+        self.live = None;
+        Err(
+            "the scene ended unexpectedly; start it again, and report it if it happens twice"
+                .into(),
+        )
+    }
+
+    /// Whether it ticks.
+    #[must_use]
+    pub fn is_running(&self) -> bool {
+        self.live.is_some()
+    }
+
+    /// Whether a path leads the hand, and not who sits here.
+    #[must_use]
+    pub fn is_led(&self) -> bool {
+        self.is_running() && self.is_led
+    }
+
+    /// Ends it after the tick under way; what was seen stays.
+    pub fn stop(&mut self) {
+        if let Some(live) = self.live.take() {
+            self.kept = live.timing();
+        }
+    }
+
+    /// What it is made of.
+    #[must_use]
+    pub fn settings(&self) -> &SceneSettings {
+        &self.settings
+    }
+
+    /// What was seen last.
+    #[must_use]
+    pub fn moment(&self) -> &Moment {
+        &self.moment
+    }
+
+    /// The time of it in s.
+    #[must_use]
+    pub fn now(&self) -> f64 {
+        let period = self.settings.period;
+        period.time_of(self.moment.tick.tick).seconds().0
+    }
+
+    /// The past as it was seen.
+    pub fn trail(&self) -> impl Iterator<Item = &TouchPoint> + Clone {
+        self.trail.iter()
+    }
+
+    /// How the loop kept its time.
+    #[must_use]
+    pub fn kept(&self) -> &Kept {
+        &self.kept
+    }
+
+    /// The priority that the system gave.
+    #[must_use]
+    pub fn priority(&self) -> &str {
+        &self.priority
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_poke_computed_ahead_is_as_deep_as_the_hand_goes_and_ends_above() {
+        let settings = SceneSettings {
+            nodes: 41,
+            max_shear_mm: 1.5,
+            ..SceneSettings::default()
+        };
+        let poke = || ahead(settings, ScenePath::Poke, &mut |_| true).unwrap();
+        let one = poke();
+        let deepest = &one.deepest.tick;
+        // The hand goes 8 mm deep; the force holds the stylus back.
+        assert!(
+            deepest.depth > 4.0 && deepest.depth <= 8.2,
+            "{}",
+            deepest.depth
+        );
+        let low = one.deepest.heights.iter().copied().fold(0.0, f64::min);
+        assert!((low + deepest.depth).abs() < 0.5, "{low}");
+        assert!(force_of(deepest) > 0.1);
+        let last = one.trail.last().unwrap();
+        assert!(last.depth == 0.0 && (last.t - ScenePath::Poke.seconds()).abs() < 0.02);
+        // The same bits every time, so that pictures of it are equal.
+        let again = poke();
+        assert_eq!(one.trail, again.trail);
+        assert_eq!(one.deepest.heights, again.deepest.heights);
+        let cut = ahead(settings, ScenePath::Poke, &mut |share| share < 0.5);
+        assert!(cut.unwrap_err().contains("before it was done"));
+    }
+}
