@@ -232,9 +232,7 @@ pub fn body_text(body: &ModifiedKelvin) -> String {
 /// A body that stands in a table of a file, if any of its parameters does; all of them must.
 pub fn read_body(fields: &mut Fields, table: &str) -> Option<ModifiedKelvin> {
     let values = BODY.map(|name| fields.number(&format!("{table}.{name}"), -1e6, 1e6));
-    if values.iter().all(Option::is_none) {
-        return None;
-    }
+    let given = values.iter().position(Option::is_some)?;
     let [
         Some(tau_eps),
         Some(mu1),
@@ -243,7 +241,8 @@ pub fn read_body(fields: &mut Fields, table: &str) -> Option<ModifiedKelvin> {
         Some(tau_sig),
     ] = values
     else {
-        fields.mistake(table, "give all of tau_eps, mu1, mu2, mu3 and tau_sig");
+        let key = format!("{table}.{}", BODY[given]);
+        fields.mistake(&key, "give all of tau_eps, mu1, mu2, mu3 and tau_sig");
         return None;
     };
     let body = ModifiedKelvin {
@@ -449,10 +448,10 @@ mod tests {
             ),
             (
                 "[tissue]\ntau_eps = 1.0",
-                "give all of tau_eps, mu1, mu2, mu3 and tau_sig",
+                "line 2: tissue.tau_eps: give all of tau_eps, mu1, mu2, mu3 and tau_sig",
             ),
             (
-                "[tissue]\nsource = \"thesis\"\nmu1 = 1",
+                "[tissue]\nsource = \"thesis\"\ntau_eps = 1\nmu1 = 1\nmu2 = 1\nmu3 = 1\ntau_sig = 1",
                 "line 2: tissue.source: give either a source or parameters",
             ),
             (

@@ -117,12 +117,8 @@ impl SceneForm {
         file.settings(nodes)
     }
 
-    /// Draws the fields.
+    /// Draws which scene it is, and what leads the hand.
     pub fn ui(&mut self, ui: &mut Ui) -> Option<Asked> {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let quiet = |ui: &mut Ui, words: &str| {
-            ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
-        };
         let mut asked = None;
         section_ui(ui, "Scene");
         if text_row(ui, "file", "a scene file; built in without", &mut self.file) {
@@ -140,10 +136,22 @@ impl SceneForm {
                 asked = Some(Asked::Dialog);
             }
         });
-        quiet(ui, &self.read.name);
+        quiet_ui(ui, &self.read.name);
         for note in &self.notes {
-            quiet(ui, note);
+            quiet_ui(ui, note);
         }
+        section_ui(ui, "Hand");
+        ui.horizontal_wrapped(|ui| {
+            for path in ScenePath::ALL {
+                ui.radio_value(&mut self.path, Some(path), path.name());
+            }
+            ui.radio_value(&mut self.path, None, "pointer and keys");
+        });
+        asked
+    }
+
+    /// Draws what it is made of.
+    pub fn parts_ui(&mut self, ui: &mut Ui) {
         section_ui(ui, "Tissue and mesh");
         quantity_ui(ui, "side", "mm", &mut self.side);
         quantity_ui(ui, "nodes", "along a side", &mut self.nodes);
@@ -151,7 +159,7 @@ impl SceneForm {
         quantity_ui(ui, "friction", "of the tissue", &mut self.friction);
         let [(least, _), (most, _)] = INERT;
         let words = format!("{least} and {most} do nothing here: nodes move along z alone");
-        quiet(ui, &words);
+        quiet_ui(ui, &words);
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
         ui.checkbox(&mut self.is_guarded, "guards and controller");
@@ -164,16 +172,14 @@ impl SceneForm {
             device.step_mm,
             device.friction_n
         );
-        quiet(ui, &words);
-        section_ui(ui, "Hand");
-        ui.horizontal_wrapped(|ui| {
-            for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name());
-            }
-            ui.radio_value(&mut self.path, None, "pointer and keys");
-        });
-        asked
+        quiet_ui(ui, &words);
     }
+}
+
+/// A remark.
+fn quiet_ui(ui: &mut Ui, words: &str) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
 }
 
 #[cfg(test)]

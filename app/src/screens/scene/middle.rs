@@ -17,7 +17,7 @@ pub(super) enum Side {
 }
 
 /// Share of the height that the picture gets.
-const PICTURE_SHARE: f32 = 0.62;
+const PICTURE_SHARE: f32 = 0.52;
 /// Room for a legend.
 const HEAD: f32 = 24.0;
 

@@ -252,5 +252,6 @@ impl SceneScreen {
             }
         };
         ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+        ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
     }
 }
