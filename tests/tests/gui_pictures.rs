@@ -33,11 +33,14 @@ fn has_renderer() -> bool {
     files.any(|file| file.file_name().to_string_lossy().starts_with("lvp"))
 }
 
+/// Recorded sessions that stand in the library.
+const SESSIONS: [&str; 3] = ["ramp-hold-lab", "every-motion", "over-force-galil"];
+
 /// A folder with the same name on every computer, for it stands in pictures; with the recorded sessions in it.
 fn library() -> PathBuf {
     let folder = Path::new("/tmp/palpate-pictures").to_owned();
     let _ = std::fs::remove_dir_all(&folder);
-    for name in ["ramp-hold-lab", "every-motion", "over-force-galil"] {
+    for name in SESSIONS {
         let to = folder.join(name);
         std::fs::create_dir_all(&to).unwrap();
         for item in std::fs::read_dir(workspace().join("tests/sessions").join(name)).unwrap() {
@@ -198,8 +201,10 @@ fn every_screen_looks_as_it_did() {
                 compute_poke(&mut window);
             }
             settle(&mut window);
+            let found = format!("{} sessions, found in", SESSIONS.len());
             for _ in 0..2000 {
-                let mut found = window.query_all_by_label_contains("found in");
+                // All of them: before they are read there are none.
+                let mut found = window.query_all_by_label_contains(&found);
                 if screen != Screen::Library || found.next().is_some() {
                     break;
                 }
