@@ -1,9 +1,9 @@
 //! A surface as triangles: which nodes are drawn, in which order, and how light each is.
 
 use super::camera::{Lens, Seen, Vec3, dot};
-use crate::theme::tokens::viridis;
+use crate::theme::tokens::{dimmed, viridis};
 use eframe::egui::epaint::{Mesh, Vertex, WHITE_UV};
-use eframe::egui::{Color32, Pos2, Rgba};
+use eframe::egui::{Color32, Pos2};
 use palpate_model::surface::{Grid, Heights, Node};
 
 /// Most cells along a side of the drawn surface; one with its lines drawn has half as many.
@@ -169,12 +169,6 @@ pub fn facets(
         every: (grid.columns() - 1).div_ceil(lattice.columns.len() - 1),
         deepest,
     }
-}
-
-/// A colour in so much light.
-fn dimmed(colour: Color32, light: f32) -> Color32 {
-    let [r, g, b, _] = Rgba::from(colour).to_array();
-    Rgba::from_rgb(r * light, g * light, b * light).into()
 }
 
 /// A thin line as two triangles, so that cells drawn later hide it.

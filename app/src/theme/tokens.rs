@@ -1,6 +1,6 @@
 //! Every colour of the window. Greys by default; a saturated colour means "look here".
 
-use eframe::egui::Color32;
+use eframe::egui::{Color32, Rgba};
 
 /// The colours of one theme, by use.
 #[derive(Clone, Debug, PartialEq)]
@@ -160,6 +160,13 @@ pub fn viridis(share: f32) -> Color32 {
         (low + part * (high - low)).round() as u8
     };
     Color32::from_rgb(mix(0), mix(1), mix(2))
+}
+
+/// A colour in a share of the light that shows it as it is.
+#[must_use]
+pub fn dimmed(color: Color32, light: f32) -> Color32 {
+    let [r, g, b, _] = Rgba::from(color).to_array();
+    Rgba::from_rgb(r * light, g * light, b * light).into()
 }
 
 #[cfg(test)]
