@@ -169,6 +169,39 @@ fn what_is_handed_over_is_never_torn_and_never_older_than_before() {
 }
 
 #[test]
+fn a_loop_that_cannot_keep_up_leaves_the_core_to_others() {
+    /// Keeps the core for twice its time, and counts what was due.
+    #[derive(Default)]
+    struct Heavy {
+        calls: u64,
+        ticks: u64,
+    }
+    impl Ticking for Heavy {
+        type View = u64;
+        fn tick(&mut self, elapsed: u64) {
+            self.calls += 1;
+            // The first ones may follow each other.
+            if self.calls > 20 {
+                self.ticks += elapsed;
+            }
+            std::thread::sleep(std::time::Duration::from_millis(10));
+        }
+        fn show(&self, view: &mut u64) {
+            *view = self.calls;
+        }
+    }
+    let period = Period::of_rate(250.0).unwrap();
+    let mut beat = Beat::start(Heavy::default(), period, 0).unwrap();
+    while *beat.seen() < 60 {
+        std::thread::sleep(std::time::Duration::from_millis(1));
+    }
+    let task = beat.end().unwrap();
+    // 10 ms of work and 4 of rest are three and a half ticks of 4 ms; without the rest two and a half.
+    let due = task.ticks as f64 / (task.calls - 20) as f64;
+    assert!(due >= 3.25, "{due}");
+}
+
+#[test]
 fn ticks_that_were_missed_are_told_and_none_is_lost() {
     /// Sleeps through some ticks now and then, which a loop must never do.
     struct Sleepy {

@@ -274,7 +274,7 @@ impl<const W: usize, const R: usize> Recording<W, R> {
         }
         let mut hash = hashed(BASIS, head.as_bytes());
         let mut rows = Vec::new();
-        for (index, line) in lines {
+        while let Some((index, line)) = lines.next() {
             let number = index + 1;
             let Some(content) = line.strip_suffix('\n') else {
                 // Its writer was stopped here.
@@ -283,6 +283,9 @@ impl<const W: usize, const R: usize> Recording<W, R> {
             if content.starts_with("end,") {
                 let end = ended(content, hash, rows.len());
                 let end = end.ok_or_else(|| damaged(number, "the lines are not those written"))?;
+                if lines.next().is_some() {
+                    return Err(damaged(number + 1, "something follows the end"));
+                }
                 return Ok(Self {
                     settings,
                     rows,
@@ -374,6 +377,9 @@ mod tests {
                 "{said}"
             );
         }
+        std::fs::write(&file, format!("{whole}3,0.4,-2.5")).unwrap();
+        let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
+        assert!(said.contains("line 6: something follows"), "{said}");
         std::fs::write(&file, whole.replacen("0.2", "x", 1)).unwrap();
         let said = Recording::<1, 2>::read(&folder, COLUMNS).unwrap_err();
         assert!(said.contains("line 3"), "{said}");

@@ -4,7 +4,7 @@ use super::Failure;
 use super::new_file;
 use super::output::Output;
 use super::run::number;
-use super::scene::told;
+use super::scene::{ReplayArgs, told};
 use crate::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
@@ -146,17 +146,6 @@ pub struct RunArgs {
     /// Record every tick in this new folder, which 'palpate haptics replay' computes again
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-/// Arguments of `palpate haptics replay`.
-#[derive(Debug, Args)]
-pub struct ReplayArgs {
-    /// The folder of a recording
-    #[arg(value_name = "DIR")]
-    folder: PathBuf,
     /// Print one JSON object
     #[arg(long)]
     json: bool,

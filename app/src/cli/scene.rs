@@ -91,15 +91,15 @@ pub struct BenchArgs {
     json: bool,
 }
 
-/// Arguments of `palpate scene replay`.
+/// Arguments of `palpate scene replay` and `palpate haptics replay`.
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
     /// The folder of a recording
     #[arg(value_name = "DIR")]
-    folder: PathBuf,
+    pub(super) folder: PathBuf,
     /// Print one JSON object
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 /// Arguments of `palpate scene show`.

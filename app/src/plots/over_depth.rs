@@ -295,3 +295,76 @@ pub fn over_depth_ui(
     let pixels = [size.x, size.y].map(|side| f64::from(side) * scale);
     (gesture(ui, &response.response), pixels)
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use palpate_model::signal::track::Segment;
+
+    const KEY: [f64; 2] = [0.0, 100.0];
+
+    /// Depth is the number of the sample, force the same from above, in segments of ten.
+    fn track() -> Track {
+        let mut track = Track::default();
+        for begin in [0, 10, 20] {
+            let own = || (begin..begin + 10).map(|index| index as f32);
+            let times = own().map(f64::from).collect();
+            let columns = [own().collect(), own().map(|index| 90.0 - index).collect()];
+            track.push(Arc::new(Segment::new(times, &columns)));
+        }
+        track
+    }
+
+    fn made(parts: &[([usize; 2], Color32)], pixels: f64) -> Made {
+        let sources: Vec<Owned> = parts
+            .iter()
+            .enumerate()
+            .map(|(id, (rows, color))| Owned {
+                track: track(),
+                columns: [0, 1],
+                rows: *rows,
+                id: id as u64,
+                color: *color,
+            })
+            .collect();
+        let key = Key {
+            depth: KEY,
+            force: KEY,
+            pixels: [pixels; 2],
+            versions: Vec::new(),
+        };
+        reduce(key, &sources, &AtomicBool::new(false)).unwrap()
+    }
+
+    #[test]
+    fn of_a_part_the_line_goes_from_its_first_sample_to_its_last() {
+        let tokens = Tokens::of(false);
+        let made = made(&[([7, 23], tokens.text), ([0, 30], tokens.text)], 1000.0);
+        for (id, ends) in [(0, [7.0, 22.0]), (1, [0.0, 29.0])] {
+            let line = made.lines.iter().find(|line| line.id == id).unwrap();
+            assert_eq!(line.samples as f64, ends[1] - ends[0] + 1.0);
+            let points: Vec<&PlotPoint> = line.stretches.iter().flatten().collect();
+            let reached = [points[0], points[points.len() - 1]].map(|point| point.x);
+            assert!((reached[0] - ends[0]).abs() < 1e-9 && (reached[1] - ends[1]).abs() < 1e-9);
+        }
+        assert!(made.picture.is_none());
+    }
+
+    #[test]
+    fn a_picture_begins_above_and_has_the_first_line_in_front() {
+        let (front, back) = (Tokens::of(false).series, Tokens::of(false).limit);
+        let mut picture = None;
+        // Two pixels wide and three high; what is given begins below.
+        let coverage = |pixels: [u8; 6]| Coverage {
+            size: [2, 3],
+            pixels: pixels.to_vec(),
+        };
+        paint(&mut picture, &coverage([255, 255, 0, 0, 0, 0]), back);
+        paint(&mut picture, &coverage([255, 0, 0, 0, 0, 255]), front);
+        let none = Color32::TRANSPARENT;
+        assert_eq!(
+            picture.unwrap().pixels,
+            [none, front, none, none, front, back]
+        );
+    }
+}

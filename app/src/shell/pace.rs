@@ -10,7 +10,7 @@ const MOVING: Duration = Duration::from_millis(33);
 /// Between two frames at rest: live values must not look frozen.
 const RESTING: Duration = Duration::from_millis(250);
 /// Between two frames at rest with no key or pointer used for [`UNUSED_S`]: what trips by itself is seen soon.
-const UNUSED: Duration = Duration::from_secs(2);
+const UNUSED: Duration = Duration::from_secs(1);
 /// So long after the last key or move of the pointer somebody is still there.
 const UNUSED_S: f64 = 5.0;
 
@@ -72,7 +72,7 @@ mod tests {
     }
 
     #[test]
-    fn an_unused_window_is_drawn_every_other_second_and_a_used_one_at_once_more_often() {
+    fn an_unused_window_is_drawn_once_a_second_and_a_used_one_at_once_more_often() {
         let (ctx, mut pace) = (Context::default(), FramePace::default());
         // The first frames of egui ask for more themselves.
         for step in 0..4 {

@@ -8,6 +8,7 @@ pub mod mark;
 pub mod places;
 pub mod quantity_input;
 pub mod reason_button;
+pub mod remark;
 pub mod state_badge;
 pub mod steady;
 pub mod step_mark;

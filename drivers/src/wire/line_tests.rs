@@ -135,13 +135,34 @@ fn stops_overtake_what_waits() {
             "EnableMotor"
         ]
     );
-    let raw = line.take_raw();
+    let mut raw = line.take_raw();
+    while raw.is_empty() {
+        std::thread::yield_now();
+        raw = line.take_raw();
+    }
     assert!(
         raw.iter()
             .all(|piece| piece.is_sent && &*piece.device == "controller")
     );
     drop(line);
     assert_eq!(read(&mut there, 3), b"bye");
+}
+
+#[test]
+fn a_stop_waits_for_nobody_who_reads_reports() {
+    let (here, mut there) = super::super::pair();
+    let mut line = Line::start(Box::new(here), Notes::default(), clock(), settings()).unwrap();
+    let reports = Arc::clone(&line.reports);
+    let reading = reports.0.lock().unwrap();
+    // Something to report comes first, so that the thread has wanted to hand it over.
+    there.write(b"a").unwrap();
+    line.send(RigCommand::EnableMotor).unwrap();
+    assert_eq!(read(&mut there, 12), b"EnableMotor\r");
+    line.send(RigCommand::Halt).unwrap();
+    assert_eq!(read(&mut there, 5), b"Halt\r");
+    drop(reading);
+    let event = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
+    assert!(matches!(event.body, RigEventBody::Ack(_)));
 }
 
 #[test]

@@ -10,6 +10,10 @@ use std::sync::mpsc::{Receiver, sync_channel};
 use std::thread::JoinHandle;
 use triple_buffer::{Output, triple_buffer};
 
+/// So many overruns in a row, and the loop rests for a tick after each further one: at real-time priority nobody else, who might
+/// stop it, would have the core.
+const OVERRUNS_MAX: u32 = 10;
+
 /// What a loop does.
 pub trait Ticking: Send + 'static {
     /// What others see of it.
@@ -116,12 +120,15 @@ fn run<T: Ticking>(
     timing: &Timing,
 ) -> T {
     let metronome = Metronome::start();
+    // Ticks in a row that took longer than their time.
+    let mut overruns = 0_u32;
+    let mut rested_at = 0;
     // Ticks done; the next one is due after as many periods, and so nothing adds up.
     let mut done = 0_u64;
     let mut before = None;
     while !is_ending.load(Ordering::Relaxed) {
         let due = period.time_of(done).0;
-        metronome.wait(due);
+        metronome.wait(due.max(rested_at));
         let begun = metronome.now();
         let elapsed = 1 + (begun.saturating_sub(due)) / period.nanos();
         task.tick(elapsed);
@@ -138,6 +145,12 @@ fn run<T: Ticking>(
         }
         if ended.saturating_sub(begun) > period.nanos() {
             timing.overruns.fetch_add(1, Ordering::Relaxed);
+            overruns += 1;
+        } else {
+            overruns = 0;
+        }
+        if overruns >= OVERRUNS_MAX {
+            rested_at = ended + period.nanos();
         }
         timing.missed.fetch_add(elapsed - 1, Ordering::Relaxed);
     }

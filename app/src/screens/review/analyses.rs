@@ -8,15 +8,15 @@ mod said;
 use super::Looked;
 use crate::command::Commands;
 use crate::report::dossier::Wanted;
-use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::analyses::{Deed, Done, Known, Who, own, read};
 use crate::workers::edits::author;
 use crate::workers::task::Task;
-use eframe::egui::{Context, Label, RichText, Ui};
+use eframe::egui::{Context, Ui};
 use form::Form;
 use palpate_model::fit::Parameter;
 use papers::Papers;
@@ -168,7 +168,7 @@ impl AnalysesPanel {
             return;
         };
         match &known {
-            Err(reason) => wrong_ui(ui, reason),
+            Err(reason) => alarm_ui(ui, reason),
             Ok(known) => self.known_ui(ui, known, looked),
         }
         self.known = Some(known);
@@ -284,18 +284,7 @@ impl AnalysesPanel {
             _ if self.work.standing().is_some() => {}
             None => {}
             Some(Ok(done)) => quiet_ui(ui, &done.sentence),
-            Some(Err(reason)) => wrong_ui(ui, reason),
+            Some(Err(reason)) => alarm_ui(ui, reason),
         }
     }
-}
-
-fn quiet_ui(ui: &mut Ui, text: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let text = RichText::new(text).color(tokens.text_quiet).small();
-    ui.add(Label::new(text).wrap());
-}
-
-fn wrong_ui(ui: &mut Ui, text: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
 }

@@ -2,11 +2,11 @@
 //! were, and how they compare with the first.
 
 use super::ReviewScreen;
-use super::left::quiet_ui;
 use super::middle::head_ui;
 use super::subject::Subject;
 use crate::plots::over_depth::{Layer, Source, over_depth_ui};
 use crate::theme::Tokens;
+use crate::widgets::remark::quiet_ui;
 use crate::widgets::table::{Column, Row, table_ui};
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};

@@ -7,6 +7,7 @@ use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::review::{Leader, Quantity, Stage};
 use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
@@ -192,17 +193,4 @@ impl ReviewScreen {
             ui.selectable_value(&mut self.view, view, view.name());
         }
     }
-}
-
-/// A remark.
-pub(super) fn quiet_ui(ui: &mut Ui, words: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    let words = RichText::new(words).color(tokens.text_quiet).small();
-    ui.add(Label::new(words).wrap());
-}
-
-/// A sentence about what is wrong.
-pub(super) fn alarm_ui(ui: &mut Ui, words: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.add(Label::new(RichText::new(words).color(tokens.alarm_text)).wrap());
 }

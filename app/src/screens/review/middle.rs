@@ -1,13 +1,14 @@
 //! The plots: over time above each other, over depth, and the tables.
 
 use super::keys::Move;
-use super::left::{color_of, quiet_ui};
+use super::left::color_of;
 use super::subject::{LINE_MODELLED, LINE_RESIDUAL, Subject};
 use super::{ReviewScreen, View};
 use crate::plots::navigate::Gesture;
 use crate::plots::over_depth::{self, Source, over_depth_ui};
 use crate::plots::over_time::{Layer, Moment, Panel, Setting, over_time_ui};
 use crate::theme::Tokens;
+use crate::widgets::remark::quiet_ui;
 use crate::workers::review::{Quantity, Recording};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 

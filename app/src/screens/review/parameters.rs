@@ -1,10 +1,10 @@
 //! The parameters of every session's fit in one table, with their intervals.
 
 use super::ReviewScreen;
-use super::left::{alarm_ui, quiet_ui};
 use super::middle::head_ui;
 use super::subject::Subject;
 use crate::report::text::{self, typeset};
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::table::{Column, Row, table_ui};
 use eframe::egui::Ui;
 use palpate_model::fit::Parameter;

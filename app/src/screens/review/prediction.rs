@@ -1,11 +1,12 @@
 //! What the fit of the session in front says of the next one, beside what was measured there.
 
 use super::ReviewScreen;
-use super::left::{alarm_ui, color_of, quiet_ui};
+use super::left::color_of;
 use super::middle::head_ui;
 use crate::plots::navigate::Span;
 use crate::plots::over_time::{Layer, Panel, Setting, over_time_ui};
 use crate::theme::Tokens;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::review::Quantity;
 use crate::workers::review::fit::{MODELLED, Prediction, RESIDUAL, predict};

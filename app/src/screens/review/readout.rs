@@ -1,7 +1,8 @@
 //! What stands at the two cursors and between them, as labels that can be read aloud and copied.
 
+use super::ReviewScreen;
 use super::subject::Subject;
-use super::{ReviewScreen, left::quiet_ui};
+use crate::widgets::remark::quiet_ui;
 use crate::workers::review::Quantity;
 use eframe::egui::{RichText, Ui};
 

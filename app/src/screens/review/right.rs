@@ -1,11 +1,11 @@
 //! What is known of the session in front: verdict, health, how it ended, calibration, hashes, events, the fit.
 
 use super::ReviewScreen;
-use super::left::{alarm_ui, quiet_ui};
 use super::subject::Subject;
 use crate::screens::exact_fit::exact_ui;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::uncertain::{interval, plain};
 use crate::workers::review::Facts;
 use crate::workers::review::fit::SessionFit;

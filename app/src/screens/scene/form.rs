@@ -1,10 +1,10 @@
 //! The scene as typed.
 
-use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
+use crate::widgets::remark::quiet_ui;
 use crate::widgets::text_row::text_row;
-use eframe::egui::{Label, RichText, Ui};
+use eframe::egui::Ui;
 use palpate_model::haptics::Period;
 use palpate_model::scene::{ScenePath, SceneSettings};
 use palpate_model::surface::INERT;
@@ -174,12 +174,6 @@ impl SceneForm {
         );
         quiet_ui(ui, &words);
     }
-}
-
-/// A remark.
-fn quiet_ui(ui: &mut Ui, words: &str) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
-    ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
 }
 
 #[cfg(test)]

@@ -1,12 +1,13 @@
 //! The analyses there are, and what the one chosen found.
 
 use super::super::Looked;
-use super::{Own, quiet_ui};
+use super::Own;
 use crate::report::said;
 use crate::report::{kept, text};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::remark::quiet_ui;
 use crate::workers::analyses::{Deed, Known};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_sessions::analyses::{Analysed, Analysis};

@@ -1,11 +1,11 @@
 //! Report and figure of what is in front, as new files.
 
 use super::super::Looked;
-use super::{quiet_ui, wrong_ui};
 use crate::report::dossier::{Figure, Wanted, name_of};
 use crate::report::figures::Window;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::form_label;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::analyses::{Done, Paper, paper};
@@ -163,6 +163,6 @@ fn answer_ui(ui: &mut Ui, task: &Task<Done>) {
         _ if task.standing().is_some() => {}
         None => {}
         Some(Ok(done)) => quiet_ui(ui, &done.sentence),
-        Some(Err(reason)) => wrong_ui(ui, reason),
+        Some(Err(reason)) => alarm_ui(ui, reason),
     }
 }

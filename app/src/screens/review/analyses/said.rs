@@ -1,9 +1,9 @@
 //! What a session is worth, and where its contact really was.
 
-use super::quiet_ui;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::remark::quiet_ui;
 use crate::workers::analyses::{Deed, Known};
 use eframe::egui::{ComboBox, Ui, vec2};
 use palpate_model::units::Position;
