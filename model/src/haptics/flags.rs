@@ -26,7 +26,7 @@ facts! {
     FORCE_MAX 5 "the force is held at its limit";
     SLEW 6 "the force changes as fast as it may";
     SOFT_START 7 "the force rises slowly after the start";
-    STALL 8 "the loop had stopped; the force rises again from zero";
+    STALL 8 "the loop had stopped; the force rises slowly from what the device held";
     CONTACT_RAMP 9 "the force rises slowly after contact";
     NO_CONTACT 10 "the load cell feels no contact; the force is zero";
     ABOVE_SURFACE 11 "the probe is above the surface; the force is zero";

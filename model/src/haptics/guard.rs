@@ -15,7 +15,7 @@ pub struct GuardSettings {
     pub soft_start: Seconds,
     /// A loop that is away for longer has stalled.
     pub stall: Seconds,
-    /// After a stall the force rises from zero over this time.
+    /// After a stall the force rises over this time from what the device held meanwhile; to less it goes at once.
     pub stall_ramp: Seconds,
     /// After contact the force rises over this time.
     pub contact_ramp: Seconds,
@@ -68,6 +68,8 @@ pub struct ForceGuard {
     after_stall: Ramp,
     after_contact: Ramp,
     is_touching: bool,
+    /// The force that the device held through the last stall.
+    held: f64,
     last: f64,
 }
 
@@ -119,6 +121,7 @@ impl ForceGuard {
             after_stall: Ramp::new(period, settings.stall_ramp, true),
             after_contact: Ramp::new(period, settings.contact_ramp, false),
             is_touching: false,
+            held: 0.0,
             last: 0.0,
         }
     }
@@ -137,11 +140,12 @@ impl ForceGuard {
     /// Bounds `force`, `elapsed` ticks after the last call: one, unless the loop was away.
     #[must_use]
     pub fn tick(&mut self, force: Newtons, is_touching: bool, elapsed: u64) -> GuardTick {
-        if elapsed > self.stall {
-            self.after_stall.done = 0;
-        }
         if self.lets_go_after.is_some_and(|ticks| elapsed > ticks) {
             self.last = 0.0;
+        }
+        if elapsed > self.stall {
+            self.after_stall.done = 0;
+            self.held = self.last;
         }
         if is_touching && !self.is_touching {
             self.after_contact.done = 0;
@@ -162,7 +166,10 @@ impl ForceGuard {
         };
         let bounded = wanted.clamp(-self.force_max, self.force_max);
         flags |= Flags::FORCE_MAX.when(bounded != wanted);
-        let target = bounded * start.min(stall).min(contact);
+        let risen = bounded * start.min(contact);
+        // A device that held its force goes on from there: a loop that is late again and again would else never reach it.
+        let known = risen.clamp(self.held.min(0.0), self.held.max(0.0));
+        let target = known + (risen - known) * stall;
         let reached = target.clamp(self.last - self.change_max, self.last + self.change_max);
         flags |= Flags::SLEW.when(reached != target);
         self.last = reached;
@@ -226,12 +233,35 @@ mod tests {
         let one = run(25, 2.0, true, 1);
         assert!((one.force.0 - 1.0).abs() < 1e-12 && one.flags.has(Flags::CONTACT_RAMP));
         run(25, 2.0, true, 1);
-        // A stall of 5 ms is none; one of 6 ms begins again from zero, by way of the limit.
-        assert_eq!(run(1, 2.0, true, 5).flags, Flags::NONE);
-        let one = run(1, 2.0, true, 6);
-        assert!((one.force.0 - 1.5).abs() < 1e-12 && one.flags.has(Flags::STALL));
-        assert!((run(124, 2.0, true, 1).force.0 - 1.0).abs() < 1e-12);
-        assert_eq!(run(125, 2.0, true, 1).force, Newtons(2.0));
+        // A stall of 5 ms is none; after one of 6 ms the force rises from what was held: 2 N.
+        assert_eq!(run(1, 4.0, true, 5).flags, Flags::SLEW);
+        run(3, 2.0, true, 1);
+        let one = run(1, 4.0, true, 6);
+        assert!((one.force.0 - 2.008).abs() < 1e-12 && one.flags == Flags::STALL);
+        assert!((run(124, 4.0, true, 1).force.0 - 3.0).abs() < 1e-12);
+        assert_eq!(run(125, 4.0, true, 1).force, Newtons(4.0));
+        // To less, and across zero, it goes at the limit of its change.
+        let one = run(1, 3.7, true, 6);
+        assert!((one.force.0 - 3.7).abs() < 1e-12 && one.flags == Flags::STALL);
+        let one = run(8, -2.0, true, 1);
+        assert!((one.force.0 - 0.0).abs() < 0.3, "{one:?}");
+        // Ten of the 250 ticks of the ramp are done.
+        let one = run(1, -2.0, true, 1);
+        assert!((one.force.0 + 2.0 * 10.0 / 250.0).abs() < 1e-12, "{one:?}");
+    }
+
+    #[test]
+    fn a_loop_that_is_late_again_and_again_reaches_the_force_all_the_same() {
+        let mut guard = ForceGuard::new(&GuardSettings::default(), PERIOD);
+        let mut last = 0.0;
+        // A stall of 19 ms every 60 ms, which is a quarter of the ramp.
+        for tick in 0..6000 {
+            let elapsed = if tick % 60 == 0 { 19 } else { 1 };
+            let one = guard.tick(Newtons(3.0), true, elapsed).force.0;
+            assert!(one >= last, "{tick}: {last} {one}");
+            last = one;
+        }
+        assert!(last > 2.9, "{last}");
     }
 
     #[test]
