@@ -11,6 +11,7 @@ pub mod doubles;
 pub mod emulate;
 pub mod galil;
 pub mod grbl;
+pub mod haptic;
 pub mod hx711;
 pub mod mark10;
 pub mod open;

@@ -3,20 +3,20 @@
 use palpate_model::haptics::{Flags, Period};
 use palpate_model::random::SplitMix;
 use palpate_model::scene::{
-    DeviceSettings, Hand6, Pose, Scene, SceneError, ScenePath, SceneSettings, SceneTick,
+    DeviceSettings, Hand6, LedScene, Pose, Scene, SceneError, ScenePath, SceneSettings, SceneTick,
     SimulatedDevice, WhyNoForce,
 };
 use palpate_model::units::Depth;
 
 fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, SceneTick)) -> Scene {
-    let mut scene = Scene::new(settings).expect("a scene");
+    let mut led = LedScene::new(settings).expect("a scene");
     let ticks = settings.period.hz() * path.seconds();
     for _ in 0..ticks as u64 {
-        let t = settings.period.time_of(scene.ticks() + 1).seconds();
-        let tick = scene.tick(path.at(t.0, &settings));
-        seen(&scene, tick);
+        let t = settings.period.time_of(led.scene.ticks() + 1).seconds();
+        let tick = led.tick(path.at(t.0, &settings));
+        seen(&led.scene, tick);
     }
-    scene
+    led.scene
 }
 
 /// A place, and no turn.
@@ -288,26 +288,35 @@ fn why_there_is_no_force_is_told() {
 }
 
 #[test]
-fn a_stall_is_led_through_and_the_force_rises_again_from_zero() {
+fn a_stall_is_led_through_and_the_force_rises_from_what_was_held() {
     let settings = SceneSettings::default();
-    let mut scene = Scene::new(settings).unwrap();
-    for _ in 0..3000 {
-        scene.tick(at(30.0, 30.0, -12.0));
-    }
-    let before = scene.last();
-    let after = scene.tick_after(at(30.0, 30.0, -12.0), 50);
-    assert_eq!(after.tick, before.tick + 50);
+    let mut led = LedScene::new(settings).unwrap();
+    let mut follow = |ticks: u32, depth: f64, stall: u64| {
+        let hand = at(30.0, 30.0, -depth);
+        let mut told = led.tick_after(hand, stall);
+        for _ in 1..ticks {
+            told = led.tick(hand);
+        }
+        told
+    };
+    let before = follow(3000, 12.0, 1);
+    let away = 50;
+    // The hand goes on while the loop is away.
+    let after = follow(1, 22.0, away);
+    assert_eq!(after.tick, before.tick + away);
     assert!(
         after.flags.has(Flags::STALL) && after.why == WhyNoForce::RampingIn,
         "{after:?}"
     );
-    for _ in 0..20 {
-        scene.tick(at(30.0, 30.0, -12.0));
-    }
+    assert!(after.depth > before.depth + 2.0, "{after:?}");
     assert!(
-        scene.last().force[2] < 0.2 * before.force[2],
-        "{:?}",
-        scene.last()
+        (after.force[2] - before.force[2]).abs() < 0.05,
+        "{before:?} {after:?}"
+    );
+    let risen = follow(2000, 22.0, 1);
+    assert!(
+        risen.force[2] > 1.5 * before.force[2] && !risen.flags.has(Flags::STALL),
+        "{before:?} {risen:?}"
     );
 }
 

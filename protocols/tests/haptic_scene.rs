@@ -1,26 +1,39 @@
 //! The scene as a loop: a tick allocates nothing, frames are the surface, and a recording is computed again bit by bit.
 
+use palpate_drivers::haptic::HapticDevice;
 use palpate_model::haptics::Period;
-use palpate_model::scene::{Hand6, Scene, ScenePath, SceneSettings};
+use palpate_model::scene::{
+    DeviceSettings, Hand6, LedScene, Pose, Scene, ScenePath, SceneSettings,
+};
 use palpate_protocols::haptics::scene::{
-    COLUMNS, FRAME_NODES_MAX, SceneFrame, SceneRecorder, SceneRow, SceneTask, scene_input,
-    scene_row,
+    COLUMNS, FRAME_NODES_MAX, SENSED_COLUMNS, SceneFrame, SceneRecorder, SceneRow, SceneTask,
+    scene_input, scene_row,
 };
 use palpate_protocols::haptics::scene_file::SceneFile;
-use palpate_protocols::haptics::{SceneLoop, Ticking};
+use palpate_protocols::haptics::{SceneLoop, Stylus, Ticking};
 use palpate_sessions::ticks::{End, Recording};
 
 fn scene(settings: SceneSettings) -> Scene {
     Scene::new(settings).expect("a scene")
 }
 
+/// On the simulated device.
+fn task(
+    settings: SceneSettings,
+    path: Option<ScenePath>,
+    recorder: Option<SceneRecorder>,
+) -> (SceneTask, triple_buffer::Input<Hand6>) {
+    let (stylus, pointing) = Stylus::new(settings, (path, 1)).expect("a device");
+    let task = SceneTask::new(scene(settings), Box::new(stylus), recorder);
+    (task, pointing)
+}
+
 #[test]
 fn a_tick_of_a_scene_allocates_nothing_while_it_is_recorded() {
     let at = tempfile::tempdir().unwrap();
     let recorder = SceneRecorder::start(&at.path().join("ticks"), "", COLUMNS).unwrap();
-    let scene = scene(SceneSettings::default());
-    let (mut task, mut pointing) =
-        SceneTask::new(scene, (Some(ScenePath::Drag), 1), Some(recorder));
+    let settings = SceneSettings::default();
+    let (mut task, mut pointing) = task(settings, Some(ScenePath::Drag), Some(recorder));
     let mut frame = task.first();
     let counted = allocation_counter::measure(|| {
         for tick in 0..6000_u64 {
@@ -57,7 +70,7 @@ fn every_frame_is_the_surface_however_seldom_one_is_taken() {
             recovery_s: 0.05,
             ..SceneSettings::default()
         };
-        let (mut task, _) = SceneTask::new(scene(settings), (Some(ScenePath::Drag), 1), None);
+        let (mut task, _) = task(settings, Some(ScenePath::Drag), None);
         // Three places as a triple buffer has them, taken in no order.
         let mut frames = [task.first(), task.first(), task.first()];
         assert!(frames[0].nodes <= FRAME_NODES_MAX);
@@ -119,7 +132,7 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
         }
     );
     let differs = |change: fn(usize, &mut SceneRow)| {
-        let mut again = scene(settings);
+        let mut again = LedScene::new(settings).unwrap();
         let mut first = None;
         for (index, row) in found.rows.iter().enumerate() {
             let mut row = *row;
@@ -129,7 +142,7 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
             let made = scene_row(hand, elapsed, &told);
             first = first.or(made.differs(&row).map(|column| (index, column)));
         }
-        (first, again.hash())
+        (first, again.scene.hash())
     };
     assert_eq!(differs(|_, _| ()), (None, end.scene.hash()));
     // One bit of one force.
@@ -148,7 +161,7 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
             period: Period::of_rate(hz).unwrap(),
             ..SceneSettings::default()
         };
-        let (mut task, _) = SceneTask::new(scene(settings), (None, 1), None);
+        let (mut task, _) = task(settings, None, None);
         let shown = (0..hz as usize).filter(|_| {
             task.tick(1);
             task.is_shown()
@@ -163,7 +176,7 @@ fn the_kept_recording_is_computed_again() {
     let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings/scene-poke");
     let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
     let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
-    let mut again = file.scene(0).unwrap();
+    let mut again = LedScene::new(file.settings(0).unwrap()).unwrap();
     assert!(found.rows.len() > 700);
     for row in &found.rows {
         let (hand, elapsed) = scene_input(row);
@@ -171,6 +184,107 @@ fn the_kept_recording_is_computed_again() {
         let made = scene_row(hand, elapsed, &told);
         assert_eq!(row.differs(&made), None, "{row:?} {made:?}");
     }
-    let left = again.hash();
+    let left = again.scene.hash();
     assert_eq!(found.end, End::Whole { lost: 0, left });
+}
+
+/// A device that is not simulated: its stylus goes where a script says, and it keeps what it was given.
+#[derive(Debug)]
+struct Scripted {
+    settings: DeviceSettings,
+    script: fn(u64) -> [f64; 3],
+    ticks: u64,
+    given: std::sync::mpsc::SyncSender<[f64; 3]>,
+}
+
+impl Scripted {
+    fn new(script: fn(u64) -> [f64; 3]) -> (Box<Self>, std::sync::mpsc::Receiver<[f64; 3]>) {
+        let (given, told) = std::sync::mpsc::sync_channel(4096);
+        let settings = DeviceSettings::default();
+        let device = Self {
+            settings,
+            script,
+            ticks: 0,
+            given,
+        };
+        (Box::new(device), told)
+    }
+}
+
+impl HapticDevice for Scripted {
+    fn settings(&self) -> &DeviceSettings {
+        &self.settings
+    }
+
+    fn sense(&mut self, elapsed: u64) -> Pose {
+        self.ticks += elapsed;
+        Pose {
+            at: (self.script)(self.ticks),
+            turn: [0.0, -0.5, 0.0],
+        }
+    }
+
+    fn give(&mut self, force: [f64; 3]) {
+        let _ = self.given.try_send(force);
+    }
+}
+
+/// Pressed in at 50 mm/s to 15 mm, held, and gone after 2 s.
+fn pressed(tick: u64) -> [f64; 3] {
+    let depth = (0.05 * tick as f64 - 5.0).min(15.0);
+    let z = if tick < 2000 { -depth } else { f64::NAN };
+    [30.0, 31.0, z]
+}
+
+#[test]
+fn another_device_takes_the_place_of_the_simulated_one() {
+    let (device, given) = Scripted::new(pressed);
+    let settings = SceneSettings::default();
+    let mut task = SceneTask::new(scene(settings), device, None);
+    let mut alone = scene(settings);
+    let mut most = 0.0_f64;
+    for tick in 1..=3000 {
+        task.tick(1);
+        let (at, turn) = (pressed(tick), [0.0, -0.5, 0.0]);
+        let told = alone.feel(Pose { at, turn }, 1);
+        let force = given.try_recv().expect("a force in every tick");
+        assert_eq!(force, told.force, "{tick}");
+        assert!(force.iter().all(|part| part.is_finite()));
+        most = most.max(force[2]);
+    }
+    assert!(most > 0.5, "{most}");
+    // A device that is nowhere is let go.
+    assert_eq!(task.scene().last().force, [0.0; 3]);
+    // Its numbers are those that the scene is guarded by, or there is no scene.
+    let stronger = DeviceSettings {
+        force_max_n: 8.0,
+        ..DeviceSettings::default()
+    };
+    let (device, _given) = Scripted::new(pressed);
+    let refused = SceneLoop::on(device, scene(settings.with_device(stronger)), None);
+    assert!(refused.unwrap_err().contains("another device"));
+}
+
+#[test]
+fn a_recording_of_another_device_is_computed_again_from_where_it_was_sensed() {
+    let at = tempfile::tempdir().unwrap();
+    let folder = at.path().join("sensed");
+    let recorder = SceneRecorder::start(&folder, "", SENSED_COLUMNS).unwrap();
+    let settings = SceneSettings::default();
+    let (device, _given) = Scripted::new(pressed);
+    let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
+    assert!(live.is_over());
+    while live.view().tick.tick < 1200 {
+        std::thread::sleep(std::time::Duration::from_millis(5));
+    }
+    let end = live.stop().unwrap();
+    let found = Recording::read(&folder, SENSED_COLUMNS).unwrap();
+    let mut again = scene(settings);
+    for row in &found.rows {
+        let (Hand6 { at, turn }, elapsed) = scene_input(row);
+        let told = again.feel(Pose { at, turn }, elapsed);
+        let made = scene_row(Hand6 { at, turn }, elapsed, &told);
+        assert_eq!(row.differs(&made), None);
+    }
+    assert!(again.last().depth > 10.0 && again.hash() == end.scene.hash());
 }

@@ -8,7 +8,7 @@
 //! [`Recorder::push`] neither waits nor allocates: ticks go through a ring, and a thread writes them.
 
 use std::fs::File;
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -245,13 +245,22 @@ pub fn read_settings(folder: &Path) -> Result<String, String> {
     text(&folder.join(SETTINGS))
 }
 
+/// Whether the ticks of a recording have these columns.
+pub fn has_columns(folder: &Path, whole: &[&str], real: &[&str]) -> Result<bool, String> {
+    let file = folder.join(TICKS);
+    let mut head = String::new();
+    let read = File::open(&file).and_then(|ticks| BufReader::new(ticks).read_line(&mut head));
+    read.map_err(|err| unread(&file, &err))?;
+    Ok(head.trim_end() == [whole, real].concat().join(","))
+}
+
 fn text(file: &Path) -> Result<String, String> {
-    std::fs::read_to_string(file).map_err(|err| {
-        format!(
-            "cannot read {} ({err}); give the folder of a recording",
-            file.display()
-        )
-    })
+    std::fs::read_to_string(file).map_err(|err| unread(file, &err))
+}
+
+fn unread(file: &Path, err: &std::io::Error) -> String {
+    let called = file.display();
+    format!("cannot read {called} ({err}); give the folder of a recording")
 }
 
 impl<const W: usize, const R: usize> Recording<W, R> {

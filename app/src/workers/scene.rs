@@ -2,11 +2,13 @@
 
 use super::haptics::{Paced, body_of};
 use super::recorded::{Again, RecordedTicks, Replayed, computed_again};
-use palpate_model::scene::{Scene, ScenePath, WhyNoForce};
+use palpate_model::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
 use palpate_protocols::haptics::SceneLoop;
-use palpate_protocols::haptics::scene::{COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row};
+use palpate_protocols::haptics::scene::{
+    COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
+};
 use palpate_protocols::haptics::scene_file::SceneFile;
-use palpate_sessions::ticks::{Recording, SETTINGS};
+use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use serde::Serialize;
 use std::path::Path;
 use std::time::Duration;
@@ -123,11 +125,25 @@ pub fn play(
     })
 }
 
-impl Again<3, 10> for Scene {
+impl Again<3, 10> for LedScene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
         let (hand, elapsed) = scene_input(row);
         let told = self.tick_after(hand, elapsed);
         scene_row(hand, elapsed, &told)
+    }
+
+    fn left(&self) -> u64 {
+        self.scene.hash()
+    }
+}
+
+/// On a device that was sensed.
+impl Again<3, 10> for Scene {
+    fn tick(&mut self, row: &SceneRow) -> SceneRow {
+        let (sensed, elapsed) = scene_input(row);
+        let Hand6 { at, turn } = sensed;
+        let told = self.feel(Pose { at, turn }, elapsed);
+        scene_row(sensed, elapsed, &told)
     }
 
     fn left(&self) -> u64 {
@@ -137,7 +153,10 @@ impl Again<3, 10> for Scene {
 
 /// Computes every tick of a recording again from its inputs.
 pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, String> {
-    let found = Recording::read(folder, COLUMNS)?;
+    let (whole, sensed) = SENSED_COLUMNS;
+    let is_sensed = has_columns(folder, &whole, &sensed)?;
+    let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
+    let found = Recording::read(folder, columns)?;
     let called = folder.join(SETTINGS).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;
     let nodes = file
@@ -145,5 +164,9 @@ pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, 
         .ok_or_else(|| format!("{called} leaves its mesh open; a recording names its nodes"))?;
     let mut scene = file.scene(nodes)?;
     let name = format!("scene '{}'", file.name);
-    Ok(computed_again(&name, &found, COLUMNS, &mut scene, progress))
+    if is_sensed {
+        return Ok(computed_again(&name, &found, columns, &mut scene, progress));
+    }
+    let mut led = LedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
+    Ok(computed_again(&name, &found, columns, &mut led, progress))
 }

@@ -2,7 +2,7 @@
 
 use palpate_model::haptics::LawSettings;
 use palpate_model::haptics::margin::{Device, Margin, Watch};
-use palpate_model::scene::{Hand6, Scene, ScenePath, SceneSettings, SceneTick};
+use palpate_model::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
 use palpate_model::surface::{Grid, Heights, MeshError};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_protocols::haptics::SceneLoop;
@@ -115,20 +115,21 @@ pub fn ahead(
     path: ScenePath,
     is_going: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Ahead, String> {
-    let mut scene = Scene::new(settings).map_err(|err| err.to_string())?;
-    let mut deepest = Moment::of(&scene);
+    let mut led = LedScene::new(settings).map_err(|err| err.to_string())?;
+    let mut deepest = Moment::of(&led.scene);
     let mut trail = Vec::new();
     let ticks = (path.seconds() / settings.period.seconds().0).ceil() as u64;
     for tick in 1..=ticks {
         let t = settings.period.time_of(tick).seconds().0;
-        let told = scene.tick(path.at(t, &settings));
+        let told = led.tick(path.at(t, &settings));
         if !tick.is_multiple_of(AHEAD_TICKS) {
             continue;
         }
         trail.push(TouchPoint::of(&told, &settings));
         if told.depth > deepest.tick.depth {
             deepest.tick = told;
-            deepest.heights.copy_from_slice(scene.field().heights());
+            let now = led.scene.field().heights();
+            deepest.heights.copy_from_slice(now);
         }
         if !is_going(tick as f64 / ticks as f64) {
             return Err("ended before it was done".into());

@@ -4,7 +4,7 @@
 //! energies add up exactly). Turns carry no torque, as on the Omni: they are where the hand has them, in steps of
 //! the sensor.
 
-use super::SceneError;
+use super::{LED_MAX, SceneError, SceneSettings};
 use crate::haptics::Period;
 use crate::haptics::rig::{Hand, HandPath, Rack, RackEnergies, RackForces};
 use serde::{Deserialize, Serialize};
@@ -198,6 +198,12 @@ impl SimulatedDevice {
         })
     }
 
+    /// The device of a scene, over the middle of its tissue.
+    pub fn of(settings: &SceneSettings) -> Result<Self, SceneError> {
+        let (middle, start) = (settings.middle(), settings.start());
+        Self::new(settings.device, settings.period, middle, start)
+    }
+
     /// What it is.
     #[must_use]
     pub fn settings(&self) -> &DeviceSettings {
@@ -241,7 +247,8 @@ impl SimulatedDevice {
         self.axes.iter().map(Rack::kinetic).sum()
     }
 
-    /// Moves through `ticks` ticks with `force` (N) held on the stylus, led by a hand. A hand at no number stays where it was.
+    /// Moves through `ticks` ticks, a thousand at most, with `force` (N) held on the stylus, led by a hand. A hand at no number
+    /// stays where it was.
     pub fn follow(&mut self, hand: Hand6, force: [f64; 3], ticks: u64) {
         let (force, _) = self.settings.given(force);
         let wanted = if hand.is_finite() {
@@ -253,7 +260,7 @@ impl SimulatedDevice {
         } else {
             self.aim
         };
-        for _ in 0..ticks {
+        for _ in 0..ticks.min(LED_MAX) {
             self.tick(wanted, force);
         }
     }

@@ -1,16 +1,19 @@
 //! A piece of tissue that is seen and felt: the [surface](crate::surface) that follows a stylus, the
 //! [force law](crate::haptics::ForceLaw) that answers it, and the device between them and a hand.
 //!
-//! One [`Scene::tick`] is: the device moves under the force held; the contact point follows it on the surface at rest, so
-//! that the force does not see its own deformation; the law makes a force of depth; guards bound it along the normal; the
-//! surface follows the stylus. It allocates nothing, takes no lock, reads no clock and gives the same bits for the same hands.
+//! One [`LedScene::tick`] is: the device moves under the force held; then [`Scene::feel`]: the contact point follows it on the
+//! surface at rest, so that the force does not see its own deformation; the law makes a force of depth; guards bound it along the
+//! normal; the surface follows the stylus. It allocates nothing, takes no lock, reads no clock and gives the same bits for the same
+//! hands.
 
 mod device;
+mod led;
 mod path;
 mod settings;
 mod why;
 
 pub use device::{DeviceSettings, Hand6, Pose, SimulatedDevice};
+pub use led::LedScene;
 pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
 pub use why::WhyNoForce;
@@ -77,7 +80,6 @@ impl SceneTick {
 #[derive(Clone, Debug)]
 pub struct Scene {
     settings: SceneSettings,
-    device: SimulatedDevice,
     surface: Surface,
     proxy: Proxy,
     law: ForceLaw,
@@ -96,19 +98,16 @@ impl Scene {
     /// At rest, the stylus over the middle. Everything that ticks need is allocated here.
     pub fn new(settings: SceneSettings) -> Result<Self, SceneError> {
         let period = settings.period;
-        let start = settings.start();
-        let device = SimulatedDevice::new(settings.device, period, settings.middle(), start)?;
+        let pose = SimulatedDevice::of(&settings)?.pose();
         let recovery = Recovery::new(Seconds(settings.recovery_s), period.seconds())?;
         let surface = Surface::new(settings.field()?, settings.method, recovery, settings.cut)?;
         let law = LawSettings {
             scheme: settings.scheme,
             ..LawSettings::of(settings.body, period)
         };
-        let below = -start[2];
-        let pose = device.pose();
+        let below = -settings.start()[2];
         let heard = BuzzSettings::of(settings.device.step_mm);
         Ok(Self {
-            device,
             surface,
             proxy: Proxy::new(settings.friction, f64::INFINITY)?,
             law: ForceLaw::new(law, Depth(below))?,
@@ -136,12 +135,6 @@ impl Scene {
     #[must_use]
     pub fn settings(&self) -> &SceneSettings {
         &self.settings
-    }
-
-    /// The device.
-    #[must_use]
-    pub fn device(&self) -> &SimulatedDevice {
-        &self.device
     }
 
     /// The surface.
@@ -174,22 +167,8 @@ impl Scene {
         hash(self.field().heights())
     }
 
-    /// One tick, led by a hand.
-    pub fn tick(&mut self, hand: Hand6) -> SceneTick {
-        self.tick_after(hand, 1)
-    }
-
-    /// The tick that comes `elapsed` ticks after the last: one, unless the loop was away. Device and law are led through what was
-    /// missed; the surface stood still meanwhile.
-    pub fn tick_after(&mut self, hand: Hand6, elapsed: u64) -> SceneTick {
-        let elapsed = elapsed.max(1);
-        self.device
-            .follow(hand, self.last.force, elapsed.min(LED_MAX));
-        let pose = self.device.pose();
-        self.feel(pose, elapsed)
-    }
-
-    /// The tick of a device that was sensed at `pose`, which [`SceneTick::force`] is for.
+    /// The tick of a device that was sensed at `pose`, which [`SceneTick::force`] is for, `elapsed` ticks after the last: one,
+    /// unless the loop was away. The law is led through what was missed; the surface stood still meanwhile.
     pub fn feel(&mut self, pose: Pose, elapsed: u64) -> SceneTick {
         let elapsed = elapsed.max(1);
         let tick = self.last.tick.saturating_add(elapsed);

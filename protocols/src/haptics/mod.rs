@@ -9,6 +9,7 @@ mod led;
 pub mod scene;
 pub mod scene_file;
 mod simulated;
+mod stylus;
 pub mod taped;
 pub mod timing;
 
@@ -17,3 +18,4 @@ pub use led::{Lead, Led, Live, TRAIL, TrailPoint};
 pub use palpate_drivers::priority;
 pub use scene::{SceneEnd, SceneFrame, SceneLoop};
 pub use simulated::Simulated;
+pub use stylus::Stylus;

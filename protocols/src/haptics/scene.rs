@@ -1,15 +1,16 @@
-//! The virtual scene in a loop: a hand from a path or from outside, frames for graphics, and a recording of its ticks.
+//! The virtual scene in a loop: a device, frames for graphics, and a recording of its ticks.
 
 use super::timing::Kept;
-use super::{Beat, Ticking};
+use super::{Beat, Stylus, Ticking};
+use palpate_drivers::haptic::HapticDevice;
 use palpate_drivers::priority::Granted;
 use palpate_model::haptics::Period;
-use palpate_model::scene::{Hand6, Scene, ScenePath, SceneSettings, SceneTick};
+use palpate_model::scene::{Hand6, Pose, Scene, ScenePath, SceneTick};
 use palpate_model::surface::{HeightField, Rect};
 use palpate_sessions::ticks::{Recorded, Recorder, Row};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use triple_buffer::{Input, Output, triple_buffer};
+use triple_buffer::Input;
 
 /// Frames a second: what a usual display shows.
 const FRAMES_HZ: f64 = 60.0;
@@ -19,21 +20,33 @@ const FRAMES_HZ: f64 = 60.0;
 pub const FRAME_NODES_MAX: usize = 401;
 
 /// Columns of a recorded scene: whole numbers, then others.
-pub const COLUMNS: ([&str; 3], [&str; 10]) = (
-    ["tick", "elapsed", "row_hash"],
-    [
-        "hand_x_mm",
-        "hand_y_mm",
-        "hand_z_mm",
-        "yaw_rad",
-        "pitch_rad",
-        "roll_rad",
-        "force_x_n",
-        "force_y_n",
-        "force_z_n",
-        "depth_mm",
-    ],
-);
+pub type Columns = ([&'static str; 3], [&'static str; 10]);
+
+const fn columns(place: [&'static str; 3]) -> Columns {
+    let [x, y, z] = place;
+    let forces = ["force_x_n", "force_y_n", "force_z_n"];
+    (
+        ["tick", "elapsed", "row_hash"],
+        [
+            x,
+            y,
+            z,
+            "yaw_rad",
+            "pitch_rad",
+            "roll_rad",
+            forces[0],
+            forces[1],
+            forces[2],
+            "depth_mm",
+        ],
+    )
+}
+
+/// Columns of a scene on the simulated device: the hand that led it.
+pub const COLUMNS: Columns = columns(["hand_x_mm", "hand_y_mm", "hand_z_mm"]);
+
+/// Columns of a scene on another device: where its stylus was sensed.
+pub const SENSED_COLUMNS: Columns = columns(["stylus_x_mm", "stylus_y_mm", "stylus_z_mm"]);
 
 /// A recorded tick of a scene.
 pub type SceneRow = Row<3, 10>;
@@ -135,43 +148,30 @@ fn stride(nodes: usize) -> usize {
 #[derive(Debug)]
 pub struct SceneTask {
     scene: Scene,
-    path: Option<ScenePath>,
-    /// How often the path is gone.
-    laps: u32,
-    pointed: Output<Hand6>,
+    device: Box<dyn HapticDevice>,
     recorder: Option<SceneRecorder>,
-    is_over: Arc<AtomicBool>,
     /// Ticks from frame to frame, and since the last.
     apart: u64,
     since: u64,
 }
 
 impl SceneTask {
-    /// The task, and where to tell the hand's place. The path is gone `laps` times.
+    /// The task.
     #[must_use]
     pub fn new(
         scene: Scene,
-        (path, laps): (Option<ScenePath>, u32),
+        device: Box<dyn HapticDevice>,
         recorder: Option<SceneRecorder>,
-    ) -> (Self, Input<Hand6>) {
+    ) -> Self {
         let period: Period = scene.settings().period;
-        let hand = Hand6 {
-            at: scene.settings().start(),
-            turn: [0.0; 3],
-        };
-        let (input, pointed) = triple_buffer(&hand);
         let apart = (period.hz() / FRAMES_HZ).round().max(1.0) as u64;
-        let task = Self {
+        Self {
             scene,
-            path,
-            laps,
-            pointed,
+            device,
             recorder,
-            is_over: Arc::new(AtomicBool::new(path.is_none())),
             apart,
             since: apart,
-        };
-        (task, input)
+        }
     }
 
     /// What is seen before the first tick.
@@ -185,30 +185,18 @@ impl SceneTask {
     pub fn scene(&self) -> &Scene {
         &self.scene
     }
-
-    fn hand(&mut self, tick: u64) -> Hand6 {
-        let settings: &SceneSettings = self.scene.settings();
-        let t = settings.period.time_of(tick).seconds().0;
-        match self.path {
-            Some(path) if t <= path.seconds() * f64::from(self.laps) => {
-                path.at(t % path.seconds(), settings)
-            }
-            _ => {
-                self.is_over.store(true, Ordering::Relaxed);
-                *self.pointed.read()
-            }
-        }
-    }
 }
 
 impl Ticking for SceneTask {
     type View = SceneFrame;
 
     fn tick(&mut self, elapsed: u64) {
-        let hand = self.hand(self.scene.ticks().saturating_add(elapsed));
-        let told = self.scene.tick_after(hand, elapsed);
+        let Pose { at, turn } = self.device.sense(elapsed);
+        let told = self.scene.feel(Pose { at, turn }, elapsed);
+        self.device.give(told.force);
         if let Some(recorder) = &self.recorder {
-            recorder.push(scene_row(hand, elapsed, &told));
+            let input = self.device.hand().unwrap_or(Hand6 { at, turn });
+            recorder.push(scene_row(input, elapsed, &told));
         }
         self.since = if self.is_shown() { 1 } else { self.since + 1 };
     }
@@ -237,12 +225,12 @@ pub struct SceneEnd {
 #[derive(Debug)]
 pub struct SceneLoop {
     beat: Beat<SceneTask>,
-    pointing: Mutex<Input<Hand6>>,
-    is_over: Arc<AtomicBool>,
+    /// The hand on the simulated device, and whether its path has come to its end.
+    hand: Option<(Mutex<Input<Hand6>>, Arc<AtomicBool>)>,
 }
 
 impl SceneLoop {
-    /// Begins to tick. After `path`, or without one, the hand goes where it is [pointed](Self::point).
+    /// Begins to tick on the simulated device. After `path`, or without one, the hand goes where it is [pointed](Self::point).
     pub fn start(
         scene: Scene,
         path: Option<ScenePath>,
@@ -257,23 +245,41 @@ impl SceneLoop {
         path: (Option<ScenePath>, u32),
         recorder: Option<SceneRecorder>,
     ) -> Result<Self, String> {
+        let made = Stylus::new(*scene.settings(), path);
+        let (device, pointing) = made.map_err(|err| err.to_string())?;
+        let hand = (Mutex::new(pointing), device.over());
+        let mut live = Self::on(Box::new(device), scene, recorder)?;
+        live.hand = Some(hand);
+        Ok(live)
+    }
+
+    /// Begins to tick on a device of its own, which the scene has to be made for. Its recording has [`SENSED_COLUMNS`].
+    pub fn on(
+        device: Box<dyn HapticDevice>,
+        scene: Scene,
+        recorder: Option<SceneRecorder>,
+    ) -> Result<Self, String> {
         let period = scene.settings().period;
-        let (task, pointing) = SceneTask::new(scene, path, recorder);
-        let (first, is_over) = (task.first(), Arc::clone(&task.is_over));
+        if *device.settings() != scene.settings().device {
+            return Err(
+                "the scene is made for another device than the one that is there; give it the numbers of that".into(),
+            );
+        }
+        let task = SceneTask::new(scene, device, recorder);
+        let first = task.first();
         let beat = Beat::start(task, period, first).map_err(|err| {
             format!("the thread of the scene cannot be started ({err}); end other programs")
         })?;
-        Ok(Self {
-            beat,
-            pointing: Mutex::new(pointing),
-            is_over,
-        })
+        Ok(Self { beat, hand: None })
     }
 
-    /// The hand goes there from the next tick on. Only those who point wait for each other, the loop for nobody.
+    /// The hand on the simulated device goes there from the next tick on. Only those who point wait for each other, the loop for
+    /// nobody.
     pub fn point(&self, hand: Hand6) {
-        let mut pointing = self.pointing.lock().unwrap_or_else(PoisonError::into_inner);
-        pointing.write(hand);
+        if let Some((pointing, _)) = &self.hand {
+            let mut pointing = pointing.lock().unwrap_or_else(PoisonError::into_inner);
+            pointing.write(hand);
+        }
     }
 
     /// The newest frame.
@@ -296,7 +302,8 @@ impl SceneLoop {
     /// Whether the path has come to its end; without one it is over from the start.
     #[must_use]
     pub fn is_over(&self) -> bool {
-        self.is_over.load(Ordering::Relaxed)
+        let path = self.hand.as_ref();
+        path.is_none_or(|(_, is_over)| is_over.load(Ordering::Relaxed))
     }
 
     /// Whether it still ticks; it does until it is stopped, unless its work failed.

@@ -1,0 +1,90 @@
+//! The simulated haptic device with a hand on it that a path leads, and then who points.
+
+use palpate_drivers::haptic::HapticDevice;
+use palpate_model::scene::{
+    DeviceSettings, Hand6, Pose, SceneError, ScenePath, SceneSettings, SimulatedDevice,
+};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use triple_buffer::{Input, Output, triple_buffer};
+
+/// The simulated device of a scene.
+#[derive(Debug)]
+pub struct Stylus {
+    device: SimulatedDevice,
+    settings: SceneSettings,
+    path: Option<ScenePath>,
+    /// How often the path is gone.
+    laps: u32,
+    pointed: Output<Hand6>,
+    is_over: Arc<AtomicBool>,
+    /// Ticks since the start.
+    ticks: u64,
+    hand: Hand6,
+    force: [f64; 3],
+}
+
+impl Stylus {
+    /// Over the middle of a scene's tissue, and where to tell its hand's place. The path is gone `laps` times.
+    pub fn new(
+        settings: SceneSettings,
+        (path, laps): (Option<ScenePath>, u32),
+    ) -> Result<(Self, Input<Hand6>), SceneError> {
+        let hand = Hand6 {
+            at: settings.start(),
+            turn: [0.0; 3],
+        };
+        let (input, pointed) = triple_buffer(&hand);
+        let stylus = Self {
+            device: SimulatedDevice::of(&settings)?,
+            settings,
+            path,
+            laps,
+            pointed,
+            is_over: Arc::new(AtomicBool::new(path.is_none())),
+            ticks: 0,
+            hand,
+            force: [0.0; 3],
+        };
+        Ok((stylus, input))
+    }
+
+    /// Tells whether the path has come to its end; without one it is over from the start.
+    pub(super) fn over(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.is_over)
+    }
+
+    fn led(&mut self) -> Hand6 {
+        let t = self.settings.period.time_of(self.ticks).seconds().0;
+        match self.path {
+            Some(path) if t <= path.seconds() * f64::from(self.laps) => {
+                path.at(t % path.seconds(), &self.settings)
+            }
+            _ => {
+                self.is_over.store(true, Ordering::Relaxed);
+                *self.pointed.read()
+            }
+        }
+    }
+}
+
+impl HapticDevice for Stylus {
+    fn settings(&self) -> &DeviceSettings {
+        self.device.settings()
+    }
+
+    fn sense(&mut self, elapsed: u64) -> Pose {
+        self.ticks = self.ticks.saturating_add(elapsed);
+        self.hand = self.led();
+        self.device.follow(self.hand, self.force, elapsed);
+        self.device.pose()
+    }
+
+    fn give(&mut self, force: [f64; 3]) {
+        self.force = force;
+    }
+
+    fn hand(&self) -> Option<Hand6> {
+        Some(self.hand)
+    }
+}
