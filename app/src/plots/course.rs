@@ -97,7 +97,7 @@ pub fn course_ui(ui: &mut Ui, outline: &[OutlinePoint], limits: CourseLimits) {
 }
 
 fn plot_ui(ui: &mut Ui, tokens: &Tokens, axis: &str, course: Course<'_>) {
-    quiet(Plot::new(course.title), tokens)
+    quiet(ui, Plot::new(course.title), tokens)
         .x_axis_label(axis)
         .y_axis_label(course.y_axis)
         .include_y(0.0)

@@ -15,7 +15,7 @@ fn faded(age: usize) -> f32 {
 /// so the axis does not creep while the probe goes in.
 pub fn force_depth_ui(ui: &mut Ui, cache: &PlotCache, depth_mm: f64) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let plot = quiet(Plot::new("force_depth"), tokens)
+    let plot = quiet(ui, Plot::new("force_depth"), tokens)
         .x_axis_label("depth from contact (mm)")
         .y_axis_label("force above tare (N)")
         .include_x(0.0)

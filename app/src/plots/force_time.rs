@@ -52,7 +52,7 @@ pub fn force_time_ui(
         .filter(|_| view == TimeView::FromRamp)
         .and_then(ramp_start);
     let now = run.map_or(60.0, |run| run.now.seconds().0.max(1.0));
-    let plot = quiet(Plot::new("force_time"), tokens)
+    let plot = quiet(ui, Plot::new("force_time"), tokens)
         .x_axis_label("session time (s)")
         .y_axis_label("force above tare (N)")
         .include_y(-0.5)

@@ -69,7 +69,7 @@ pub fn log_scatter_ui(ui: &mut Ui, id: &str, scatter: &Scatter<'_>) {
         .iter()
         .map(|mark| (place(mark.at), mark.name.clone()))
         .collect();
-    let plot = quiet(Plot::new(id.to_owned()), tokens)
+    let plot = quiet(ui, Plot::new(id.to_owned()), tokens)
         .x_axis_label(scatter.axes[0])
         .y_axis_label(scatter.axes[1])
         .x_grid_spacer(decades)

@@ -1,7 +1,7 @@
 //! Damping that a body needs over depth, what asks for it, and what the device has.
 
 use super::strip::legend_ui;
-use super::style::{quiet, round_marks, steps_across};
+use super::style::quiet;
 use crate::theme::Tokens;
 use crate::workers::margin::MarginPoint;
 use eframe::egui::{Color32, Ui, vec2};
@@ -85,9 +85,7 @@ fn part_ui(ui: &mut Ui, id: &str, picture: &MarginPicture<'_>, shown: RangeInclu
         .filter(|one| shown.contains(&one.depth))
         .collect();
     let most = points.iter().map(|one| one.delay).fold(0.0, f64::max);
-    let across = steps_across(ui.available_width());
-    let plot = quiet(Plot::new(id.to_owned()), tokens)
-        .x_grid_spacer(move |input| round_marks(input, across))
+    let plot = quiet(ui, Plot::new(id.to_owned()), tokens)
         .x_axis_label("depth (mm)")
         .y_axis_label("damping needed (N s/m)")
         .include_y(0.0)

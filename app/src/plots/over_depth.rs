@@ -248,7 +248,7 @@ pub fn over_depth_ui(
 ) -> (Gesture, [f64; 2]) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (x, y) = (depth.shown(), force.shown());
-    let plot = quiet(Plot::new("review_force_depth"), tokens)
+    let plot = quiet(ui, Plot::new("review_force_depth"), tokens)
         .x_axis_label("depth from contact (mm)")
         .y_axis_label("force above tare (N)")
         .set_margin_fraction(vec2(0.0, 0.0))

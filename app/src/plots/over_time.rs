@@ -82,7 +82,7 @@ pub fn over_time_ui(
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (shown, [low, high]) = (span.shown(), heights(panel));
     let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
-    let plot = quiet(Plot::new(panel.id), tokens)
+    let plot = quiet(ui, Plot::new(panel.id), tokens)
         .y_axis_label(panel.axis)
         .y_grid_spacer(move |input| round_marks(input, marks_up))
         .x_axis_label(time_axis.unwrap_or_default())

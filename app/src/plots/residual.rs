@@ -10,7 +10,7 @@ use std::ops::RangeInclusive;
 /// Draws the plot in the space there is, for the session times that the plot above shows.
 pub fn residual_ui(ui: &mut Ui, exact: &ExactFit, shown: RangeInclusive<f64>) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let plot = quiet(Plot::new("residual"), tokens)
+    let plot = quiet(ui, Plot::new("residual"), tokens)
         .y_axis_label("residual (mN)")
         // Low as it is, it has room for three numbers.
         .y_grid_spacer(|input| round_marks(input, 4.0))

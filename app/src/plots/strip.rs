@@ -1,6 +1,6 @@
 //! A few curves over one axis, with their names in words above: what a loop did over time, live or simulated.
 
-use super::style::{quiet, round_marks, steps_across};
+use super::style::quiet;
 use crate::theme::Tokens;
 use eframe::egui::{Color32, RichText, Sense, Ui, vec2};
 use egui_plot::{Line, Plot, PlotPoints};
@@ -40,14 +40,10 @@ pub fn legend_ui(ui: &mut Ui, ink: Color32, words: &str) {
 /// Draws it in the space there is.
 pub fn strip_ui(ui: &mut Ui, strip: Strip) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
-    let across = steps_across(ui.available_width());
     let has_time = !strip.axes[0].is_empty();
-    let plot = quiet(Plot::new(strip.id), tokens)
+    let plot = quiet(ui, Plot::new(strip.id), tokens)
         .x_axis_label(strip.axes[0])
         .y_axis_label(strip.axes[1])
-        .x_grid_spacer(move |input| round_marks(input, across))
-        .y_grid_spacer(move |input| round_marks(input, marks_up))
         .show_axes([has_time, true])
         .include_y(*strip.least.start())
         .include_y(*strip.least.end())

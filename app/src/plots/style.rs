@@ -1,15 +1,15 @@
 //! What all plots have in common: a quiet grid at round numbers and a readout under the pointer.
 
 use crate::theme::Tokens;
-use eframe::egui::{Color32, Rangef, vec2};
+use eframe::egui::{Color32, Rangef, Ui, Vec2, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
 
 /// Labelled steps across the width and up the height of a plot, at most.
 const STEPS_ACROSS: f64 = 9.0;
 const STEPS_UP: f64 = 6.0;
 
-/// Between two labelled steps, at least: closer ones lose their labels.
-const POINTS_PER_STEP: f32 = 75.0;
+/// Between two labelled steps, at least, across and up: the labels of closer ones fade and go.
+const POINTS_PER_STEP: [f32; 2] = [75.0, 34.0];
 
 /// Unlabelled lines between two labelled ones.
 const MINOR_PER_MAJOR: f64 = 5.0;
@@ -19,15 +19,16 @@ pub(super) fn band_of(tokens: &Tokens) -> Color32 {
     tokens.series.gamma_multiply(0.18)
 }
 
-/// Gives a plot the common look.
-pub(crate) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+/// Gives a plot that fills the space there is the common look.
+pub(crate) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+    let [across, up] = steps(ui.available_size());
     plot.allow_scroll(false)
         .set_margin_fraction(vec2(0.01, 0.03))
         .grid_color(tokens.line)
         // Points between two lines at which they begin to show and are drawn in full.
         .grid_spacing(Rangef::new(10.0, 70.0))
-        .x_grid_spacer(|input| round_marks(input, STEPS_ACROSS))
-        .y_grid_spacer(|input| round_marks(input, STEPS_UP))
+        .x_grid_spacer(move |input| round_marks(input, across))
+        .y_grid_spacer(move |input| round_marks(input, up))
         .x_axis_formatter(|mark, _| mark_text(mark))
         .y_axis_formatter(|mark, _| mark_text(mark))
         // One width for all, so that plots above each other share their time axis.
@@ -40,9 +41,13 @@ pub(crate) fn quiet<'a>(plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         })
 }
 
-/// Labelled steps that a plot of a width in points has room for.
-pub(super) fn steps_across(width: f32) -> f64 {
-    f64::from(width / POINTS_PER_STEP).clamp(2.0, STEPS_ACROSS)
+/// Labelled steps that a plot of a size in points has room for, across and up.
+fn steps(size: Vec2) -> [f64; 2] {
+    let [across, up] = POINTS_PER_STEP;
+    [
+        f64::from(size.x / across).clamp(2.0, STEPS_ACROSS),
+        f64::from(size.y / up).clamp(2.0, STEPS_UP),
+    ]
 }
 
 /// Marks at round numbers: labelled ones a step of 1, 2 or 5 times a power of ten apart.

@@ -42,7 +42,7 @@ impl Approach {
             .iter()
             .map(|point| point.x)
             .fold(f64::NEG_INFINITY, f64::max);
-        quiet(Plot::new("approach"), tokens)
+        quiet(ui, Plot::new("approach"), tokens)
             .x_axis_label("position from home (mm)")
             .y_axis_label("force above tare (N)")
             .include_y(0.1)

@@ -4,6 +4,7 @@ use crate::command::{Command, Commands};
 use crate::report::extremes::{GroupSummary, VERDICTS, summary};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
@@ -106,7 +107,8 @@ impl ExtremesScreen {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("extent");
         });
         ui.add_space(8.0);
         match task_ui(ui, "Test the extremes  F6", &self.task, &Ok(())) {
@@ -214,7 +216,8 @@ fn choice_ui<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choice
                 }
             })
             .response
-            .labelled_by(label.id);
+            .labelled_by(label.id)
+            .place(name);
     });
 }
 

@@ -3,8 +3,9 @@
 use super::form::ProtocolForm;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
+use crate::widgets::tick_box::tick_box;
 use crate::widgets::uncertain::clock;
-use eframe::egui::{Checkbox, RichText, Ui};
+use eframe::egui::{RichText, Ui};
 use palpate_protocols::preview::Preview;
 
 /// Draws durations, forces and storage, then refusals and notes.
@@ -48,8 +49,7 @@ pub fn acknowledgement_ui(ui: &mut Ui, form: &mut ProtocolForm) {
         ui.label(RichText::new(format!("Mind: {warning}")).color(tokens.alarm_text));
     }
     let mut is_acknowledged = form.is_acknowledged();
-    let tick = Checkbox::new(&mut is_acknowledged, "I accept this; it is recorded");
-    if ui.add(tick).changed() {
+    if tick_box(ui, &mut is_acknowledged, "I accept this; it is recorded").changed() {
         form.acknowledge(is_acknowledged);
     }
 }

@@ -9,6 +9,7 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
 use palpate_protocols::file::{Kind, What};
@@ -83,7 +84,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
     let hint = field.hint();
     if field.parameter.kind == Kind::Flag {
         let mut is_on = field.text == "true";
-        let tick = ui.checkbox(&mut is_on, field.parameter.name.as_str());
+        let tick = tick_box(ui, &mut is_on, field.parameter.name.as_str());
         if tick.on_hover_text(hint).changed() {
             field.text = is_on.to_string();
         }

@@ -210,7 +210,7 @@ fn residuals_ui(ui: &mut Ui, run: &RunView, bench: &Bench) {
         .iter()
         .map(|one| one.mass_g)
         .fold(0.0, f64::max);
-    quiet(Plot::new("weighing residuals"), tokens)
+    quiet(ui, Plot::new("weighing residuals"), tokens)
         .x_axis_label("weight (N)")
         .y_axis_label("apart (N)")
         .include_x(0.0)

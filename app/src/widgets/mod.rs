@@ -15,4 +15,5 @@ pub mod step_mark;
 pub mod table;
 pub mod task_bar;
 pub mod text_row;
+pub mod tick_box;
 pub mod uncertain;

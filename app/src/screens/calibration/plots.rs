@@ -61,7 +61,7 @@ fn one_ui(
     dots: Option<&[Vec<[f64; 2]>; 2]>,
 ) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
-    quiet(Plot::new(title), tokens)
+    quiet(ui, Plot::new(title), tokens)
         .x_axis_label("force (N)")
         .x_grid_spacer(|input| round_marks(input, STEPS_ACROSS))
         .include_y(0.0)

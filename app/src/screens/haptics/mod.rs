@@ -11,6 +11,7 @@ use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::tick_box::tick_box;
 use crate::workers::feel::Feel;
 use crate::workers::haptics::{Checked, Setting, body_of, check};
 use crate::workers::path_dialog::Ask;
@@ -195,7 +196,7 @@ impl HapticsScreen {
         section_ui(ui, "Feel");
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
-            ui.checkbox(&mut self.is_open, "without guards and controller");
+            tick_box(ui, &mut self.is_open, "without guards and controller");
         });
         if let Some(reason) = &self.refusal {
             ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());

@@ -2,6 +2,7 @@
 
 use super::say::sentence;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
@@ -88,7 +89,8 @@ impl FilesPanel {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("as");
         });
         text_row(ui, "to folder", "made if there is none", &mut self.to);
         let is_open = self.dialog.is_open();

@@ -2,7 +2,9 @@
 
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
+use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, ComboBox, Label, RichText, TextEdit, Ui};
 use palpate_model::select::{HoldOut, SelectOptions};
@@ -200,9 +202,14 @@ impl ModelsForm {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("hold out");
         });
-        ui.checkbox(&mut self.with_unload, "the way back too, where recorded");
+        tick_box(
+            ui,
+            &mut self.with_unload,
+            "the way back too, where recorded",
+        );
     }
 }
 

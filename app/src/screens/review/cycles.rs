@@ -8,6 +8,7 @@ use crate::plots::over_depth::{Layer, Source, over_depth_ui};
 use crate::theme::Tokens;
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::table::{Column, Row, table_ui};
+use crate::widgets::tick_box::tick_box;
 use crate::workers::review::Quantity;
 use eframe::egui::{Color32, RichText, Ui, vec2};
 
@@ -152,7 +153,7 @@ impl ReviewScreen {
                     ui.label(mark.color(*color).strong());
                 }
             }
-            ui.checkbox(&mut self.has_ends_only, "First and last cycle only");
+            tick_box(ui, &mut self.has_ends_only, "First and last cycle only");
         });
         let is_drawn = |index: usize| !self.has_ends_only || index == 0 || index + 1 == all.len();
         let id = |cycle: &Cycle| (front.id << 32) | u64::from(cycle.number);

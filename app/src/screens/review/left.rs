@@ -9,6 +9,7 @@ use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::tick_box::tick_box;
 use crate::workers::review::{Leader, Quantity, Stage};
 use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
 use std::path::PathBuf;
@@ -47,7 +48,7 @@ impl ReviewScreen {
         section_ui(ui, "Shown over time");
         for quantity in Quantity::ALL {
             let mut is_shown = self.quantities.contains(&quantity);
-            if ui.checkbox(&mut is_shown, quantity.name()).changed() {
+            if tick_box(ui, &mut is_shown, quantity.name()).changed() {
                 // In the order in which they always stand.
                 let wanted = |one: &Quantity| match *one == quantity {
                     true => is_shown,
@@ -58,7 +59,7 @@ impl ReviewScreen {
         }
         let has_fit = self.subjects.iter().any(|one| one.fitted().is_some());
         ui.add_enabled_ui(has_fit, |ui| {
-            ui.checkbox(&mut self.has_residuals, "Residuals of the fit")
+            tick_box(ui, &mut self.has_residuals, "Residuals of the fit")
         });
         if !has_fit {
             quiet_ui(ui, "no session shown has been fitted here yet");

@@ -4,6 +4,7 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::text_row::text_row;
+use crate::widgets::tick_box::tick_box;
 use eframe::egui::Ui;
 use palpate_model::haptics::Period;
 use palpate_model::scene::{ScenePath, SceneSettings};
@@ -162,7 +163,7 @@ impl SceneForm {
         quiet_ui(ui, &words);
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
-        ui.checkbox(&mut self.is_guarded, "guards and controller");
+        tick_box(ui, &mut self.is_guarded, "guards and controller");
         let device = &self.read.device;
         let words = format!(
             "simulated device: up to {} N, {} N for long, {} N/mm, places in steps of {} mm, friction {} N",

@@ -4,6 +4,7 @@ use super::SceneScreen;
 use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::scene::view::Shown;
 use crate::theme::Tokens;
+use crate::widgets::tick_box::tick_box;
 use crate::workers::touch::{PAST_S, TouchPoint};
 use eframe::egui::{Label, RichText, Ui, vec2};
 
@@ -30,7 +31,7 @@ impl SceneScreen {
                 ui.selectable_value(&mut self.side, side, name);
             }
             ui.separator();
-            ui.checkbox(&mut self.view.has_lines, "mesh lines");
+            tick_box(ui, &mut self.view.has_lines, "mesh lines");
             if ui.button("Look as at first").clicked() {
                 self.view.reset();
             }

@@ -13,6 +13,7 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::table::table_ui;
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::tick_box::tick_box;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Label, RichText, TextEdit, Ui, vec2};
 use palpate_model::surface::{Needs, NoPlan, SceneCurves, ScenePlan, plan};
@@ -249,7 +250,7 @@ impl TradeScreen {
             quantity_ui(ui, "share", "% of each period", &mut self.share);
         }
         section_ui(ui, "Measure");
-        ui.checkbox(&mut self.is_quick, "few rows, rough times");
+        tick_box(ui, &mut self.is_quick, "few rows, rough times");
         ui.add_space(4.0);
         let pressed = match is_scene {
             true => task_ui(ui, "Measure here  F6", &self.scene, verdict),

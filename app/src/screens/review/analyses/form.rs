@@ -1,9 +1,11 @@
 //! The analysis to be made, as typed.
 
 use crate::report::dossier::Wanted;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::text_row::text_row;
+use crate::widgets::tick_box::tick_box;
 use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
 use eframe::egui::{ComboBox, Ui, vec2};
 use palpate_model::families;
@@ -126,12 +128,17 @@ impl Form {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("model");
         });
         match self.family {
-            Some(_) => ui.checkbox(&mut self.with_unload, "the way back too, where recorded"),
+            Some(_) => tick_box(
+                ui,
+                &mut self.with_unload,
+                "the way back too, where recorded",
+            ),
             None if others == 0 || !self.is_together => {
-                ui.checkbox(&mut self.with_profile, "profile intervals too")
+                tick_box(ui, &mut self.with_profile, "profile intervals too")
             }
             None => ui.label("without profile intervals"),
         };
@@ -140,7 +147,7 @@ impl Form {
                 1 => "one body for this and the other shown".to_owned(),
                 _ => format!("one body for this and the {others} others shown"),
             };
-            ui.checkbox(&mut self.is_together, words);
+            tick_box(ui, &mut self.is_together, &words);
         }
     }
 
@@ -163,7 +170,8 @@ impl Form {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("from library");
         });
         text_row(ui, "or file", "a calibration's document", &mut self.file);
     }

@@ -4,10 +4,12 @@ use super::super::Looked;
 use crate::report::dossier::{Figure, Wanted, name_of};
 use crate::report::figures::Window;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
+use crate::widgets::tick_box::tick_box;
 use crate::workers::analyses::{Done, Paper, paper};
 use crate::workers::path_dialog::{SaveAs, SaveDialog};
 use crate::workers::task::Task;
@@ -63,7 +65,11 @@ impl Papers {
         text_row(ui, "report file", "a new .html file", &mut self.report);
         self.choose_ui(ui, Field::Report, looked);
         if shown.len() > 1 {
-            ui.checkbox(&mut self.is_of_all, format!("of all {} shown", shown.len()));
+            tick_box(
+                ui,
+                &mut self.is_of_all,
+                &format!("of all {} shown", shown.len()),
+            );
         }
         let verdict = path_verdict(&self.report, &["html", "htm"]);
         match task_ui(ui, "Write report", &self.pages, &verdict) {
@@ -93,7 +99,8 @@ impl Papers {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("of");
         });
         text_row(
             ui,
@@ -105,7 +112,7 @@ impl Papers {
         let is_over_samples = matches!(self.of, Figure::ForceTime | Figure::ForceDepth);
         if let Some([from, until]) = self.span.filter(|_| is_over_samples) {
             let words = format!("only {from:.3} to {until:.3} s");
-            ui.checkbox(&mut self.is_of_span, words);
+            tick_box(ui, &mut self.is_of_span, &words);
         }
         let verdict = path_verdict(&self.figure, &["svg", "png"]);
         match task_ui(ui, "Write figure", &self.figures, &verdict) {

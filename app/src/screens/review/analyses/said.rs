@@ -1,6 +1,7 @@
 //! What a session is worth, and where its contact really was.
 
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
@@ -45,7 +46,8 @@ impl Said {
                     }
                 })
                 .response
-                .labelled_by(label.id);
+                .labelled_by(label.id)
+                .place("verdict");
         });
         let size = vec2(170.0, 26.0);
         if reason_button(ui, "Give verdict", size, verdict) {
@@ -82,7 +84,8 @@ impl Said {
                         }
                     })
                     .response
-                    .labelled_by(label.id);
+                    .labelled_by(label.id)
+                    .place("which");
             });
         }
         let found = known.contacts[self.contact].0;
