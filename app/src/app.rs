@@ -684,6 +684,7 @@ impl eframe::App for WorkbenchApp {
         self.extremes.poll();
         self.haptics.poll();
         self.scene.poll();
+        self.scene.plan(self.trade.scene_curves());
         self.trade.poll();
         self.calibration.poll();
         if self.screen == Screen::Library {

@@ -297,3 +297,44 @@ fn a_scene_is_measured_and_planned_in_the_window() {
     flow.type_into("budget", "0");
     assert!(flow.says("must be above 0") && flow.says("cannot be read"));
 }
+
+#[test]
+fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
+    let mut flow = Flow::open(TimeScale::Max);
+    screen(&mut flow, Key::Num9);
+    check_haptics(&mut flow);
+    let folder = flow.folder.path().join("felt");
+    flow.type_into("record to", &folder.display().to_string());
+    flow.click("Start the loop");
+    flow.click("Ramp and hold");
+    flow.wait("a force", |window| felt(window)[1] > 1.0);
+    flow.click("Lift off");
+    flow.wait("none", |window| felt(window)[1] == 0.0);
+    flow.window.key_press(Key::Escape);
+    flow.wait("the end of the recording", |window| {
+        let mut found = window.query_all_by_label_contains("ticks recorded, none lost");
+        found.next().is_some()
+    });
+    flow.click("Replay it");
+    flow.wait("the replay", |window| {
+        window.state().haptics().replayed().is_some()
+    });
+    let replayed = flow.window.state().haptics().replayed().unwrap();
+    let replayed = replayed.as_ref().unwrap();
+    assert!(
+        replayed.is_identical && replayed.ticks > 100,
+        "{replayed:?}"
+    );
+    assert!(replayed.name.contains("led by hand"));
+    // Where the hand was led is what it is computed from.
+    let ticks = std::fs::read_to_string(folder.join("ticks.csv")).unwrap();
+    let mut places: Vec<&str> = ticks
+        .lines()
+        .filter_map(|line| line.split(',').nth(3))
+        .collect();
+    places.dedup();
+    assert!(
+        places.contains(&"30.0") && places.contains(&"-2.0"),
+        "{places:?}"
+    );
+}

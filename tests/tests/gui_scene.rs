@@ -131,3 +131,103 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
         40.0
     );
 }
+
+fn replayed(window: &Window) -> Option<Result<bool, String>> {
+    let replayed = window.state().scene().replayed()?;
+    Some(
+        replayed
+            .as_ref()
+            .map(|one| one.is_identical)
+            .map_err(Clone::clone),
+    )
+}
+
+#[test]
+fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
+    let mut flow = open();
+    assert!(!flow.is_enabled("Replay it") && flow.says("name the folder of a recording first"));
+    let folder = flow.folder.path().join("poke");
+    let called = folder.display().to_string();
+    flow.type_into("nodes", "51");
+    flow.type_into("record to", &called);
+    flow.click("Start the scene");
+    assert!(!flow.is_enabled("Replay it"));
+    flow.wait("the end of the path", |window| {
+        let touch = window.state().scene().touch().unwrap();
+        touch.is_running() && !touch.is_led()
+    });
+    flow.window.key_press(Key::Escape);
+    flow.window.run_steps(2);
+    flow.wait("the end of the recording", |window| {
+        let mut found = window.query_all_by_label_contains("ticks recorded, none lost");
+        found.next().is_some()
+    });
+    flow.click("Replay it");
+    flow.wait("the replay", |window| replayed(window).is_some());
+    flow.window.run_steps(3);
+    assert_eq!(replayed(&flow.window), Some(Ok(true)));
+    assert!(flow.says("every number bit for bit as recorded"));
+    flow.window.check_accessibility();
+    // A folder has one recording.
+    flow.type_into("record to", &called);
+    flow.click("Start the scene");
+    assert!(!flow.window.state().scene().is_running());
+    assert!(flow.says("give a new folder that may be written"));
+    flow.type_into("record to", "");
+    // Another body gives other forces, and a line that was changed is told.
+    let settings = folder.join("settings.toml");
+    let text = std::fs::read_to_string(&settings).unwrap();
+    std::fs::write(&settings, text.replacen("tau_eps = 1", "tau_eps = 2", 1)).unwrap();
+    flow.click("Replay it");
+    flow.wait("the difference", |window| {
+        replayed(window) == Some(Ok(false))
+    });
+    flow.window.run_steps(3);
+    assert!(flow.says("and was recorded as"));
+    let ticks = folder.join("ticks.csv");
+    let lines = std::fs::read_to_string(&ticks).unwrap();
+    std::fs::write(&ticks, lines.replacen("\n10,", "\n11,", 1)).unwrap();
+    flow.click("Replay it");
+    flow.wait("the damage", |window| {
+        replayed(window).is_some_and(|one| one.is_err())
+    });
+    flow.window.run_steps(3);
+    assert!(flow.says("the recording is damaged"));
+}
+
+#[test]
+fn a_plan_is_taken_and_stands_in_the_form() {
+    let mut flow = open();
+    // Any computer holds these.
+    let path = flow.folder.path().join("loose.toml");
+    let text = "name = \"loose\"\n[tolerances]\nforce_percent = 1000.0\nshape_mm = 5.0\ntick_us = 100000.0\n";
+    std::fs::write(&path, text).unwrap();
+    flow.type_into("file", &path.display().to_string());
+    flow.click("Open");
+    flow.wait("the file", |window| {
+        window.query_by_label("loose").is_some()
+    });
+    assert!(!flow.is_enabled("Take the plan"));
+    assert!(flow.says("measure what a scene costs on the screen Trade first"));
+    flow.window
+        .key_press_modifiers(Modifiers::COMMAND, Key::Num7);
+    flow.window.run_steps(3);
+    flow.click("Scene: mesh");
+    flow.click("few rows, rough times");
+    flow.click("Measure here  F6");
+    flow.wait("the curves", |window| {
+        window.state().scene_curves().is_some()
+    });
+    flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
+    flow.window.run_steps(3);
+    assert!(flow.says("left out: ") && flow.says("without effect: MinDist"));
+    flow.click("Take the plan");
+    flow.window.run_steps(3);
+    flow.click("Start the scene");
+    let settings = *flow.window.state().scene().touch().unwrap().settings();
+    let curves = flow.window.state().scene_curves().unwrap();
+    let meshes = curves.meshes.iter().map(|mesh| mesh.nodes as usize);
+    assert!(meshes.clone().any(|nodes| nodes == settings.nodes));
+    assert!(flow.says(&format!("plan: {0} x {0} nodes", settings.nodes)));
+    flow.click("Stop the scene");
+}

@@ -246,6 +246,7 @@ fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
     let bar = output.share_bar(1000);
     let replayed = replay(&args.folder, &mut |share| {
         bar.set_position((1000.0 * share) as u64);
+        true
     });
     bar.finish_and_clear();
     told("scene-replay", replayed, output)

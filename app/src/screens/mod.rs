@@ -18,5 +18,6 @@ pub mod rig;
 pub mod rig_panel;
 pub mod run_middle;
 pub mod scene;
+mod tape;
 pub mod trade;
 pub mod weighing;

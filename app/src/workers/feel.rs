@@ -3,6 +3,7 @@
 use palpate_model::haptics::Flags;
 use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
+use palpate_protocols::haptics::taped::{LedRecorder, TapedLed};
 use palpate_protocols::haptics::timing::Kept;
 use palpate_protocols::haptics::{Beat, Lead, Led, TrailPoint};
 use std::collections::VecDeque;
@@ -18,7 +19,7 @@ const CAUSE_S: f64 = 0.3;
 
 /// A loop that runs or ran, and what was seen of it.
 pub struct Feel {
-    beat: Option<Beat<Led>>,
+    beat: Option<Beat<TapedLed>>,
     lead: Lead,
     known: u64,
     trail: VecDeque<TrailPoint>,
@@ -33,11 +34,19 @@ pub struct Feel {
 
 impl Feel {
     /// Starts the loop; the hand moves at `speed` where it is led.
-    pub fn start(settings: &SimulationSettings, speed: MmPerS) -> Result<Self, String> {
+    pub fn start(
+        settings: &SimulationSettings,
+        speed: MmPerS,
+        recorder: Option<LedRecorder>,
+    ) -> Result<Self, String> {
         let device = Led::new(settings, speed).map_err(|err| err.to_string())?;
         let (lead, first) = (device.lead(), device.live().clone());
         let last = first.last;
         let period = settings.system.law.period;
+        let device = TapedLed {
+            led: device,
+            recorder,
+        };
         let beat = Beat::start(device, period, first)
             .map_err(|err| format!("the loop's thread cannot be started: {err}"))?;
         Ok(Self {
@@ -90,11 +99,11 @@ impl Feel {
         self.beat.is_some()
     }
 
-    /// Ends it after the tick under way; what was seen stays.
-    pub fn stop(&mut self) {
-        if let Some(beat) = self.beat.take() {
-            self.kept = beat.kept();
-        }
+    /// What is still to be ended, whose recording waits for the disk; what was seen stays.
+    pub fn stop(&mut self) -> Option<Beat<TapedLed>> {
+        let beat = self.beat.take()?;
+        self.kept = beat.kept();
+        Some(beat)
     }
 
     /// Leads the hand to a place in mm.

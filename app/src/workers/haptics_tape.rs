@@ -3,13 +3,15 @@
 use super::haptics::Setting;
 use super::recorded::{Again, Replayed, computed_again};
 use palpate_drivers::rig_file::fields::{Fields, in_words};
-use palpate_model::haptics::{DELAY_MAX, DriveKind, Period};
+use palpate_model::haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::haptics::scene_file::{body_text, read_body};
-use palpate_protocols::haptics::taped::{COLUMNS, TapeRecorder, TapedRow, taped_row};
-use palpate_protocols::haptics::{Simulated, Ticking};
-use palpate_sessions::ticks::{Recording, SETTINGS};
+use palpate_protocols::haptics::taped::{
+    COLUMNS, LED_COLUMNS, LedRecorder, LedRow, TapeRecorder, TapedLed, TapedRow, led_row, taped_row,
+};
+use palpate_protocols::haptics::{Led, Simulated, Ticking};
+use palpate_sessions::ticks::{Recorded, Recording, SETTINGS, has_columns};
 use std::path::Path;
 
 /// Drives by name.
@@ -21,18 +23,33 @@ pub fn recorder(
     body: ModifiedKelvin,
     setting: &Setting,
 ) -> Result<TapeRecorder, String> {
-    TapeRecorder::start(folder, &text(body, setting), COLUMNS)
+    TapeRecorder::start(folder, &text(body, setting, true), COLUMNS)
+}
+
+/// The same of a run whose hand is led from outside.
+pub fn led_recorder(
+    folder: &Path,
+    body: ModifiedKelvin,
+    setting: &Setting,
+    is_guarded: bool,
+) -> Result<LedRecorder, String> {
+    LedRecorder::start(folder, &text(body, setting, is_guarded), LED_COLUMNS)
+}
+
+/// Ends the recording of a led run, if there is one.
+pub fn recorded(TapedLed { led, recorder }: TapedLed) -> Option<Result<Recorded, String>> {
+    recorder.map(|recorder| recorder.finish(Again::left(&led)))
 }
 
 /// What a run was made of, as a text that reads back to the same bits.
-fn text(body: ModifiedKelvin, setting: &Setting) -> String {
+fn text(body: ModifiedKelvin, setting: &Setting, is_guarded: bool) -> String {
     let is_current = matches!(setting.drive, DriveKind::Current { .. });
     let drive = DRIVES.iter().find(|(_, current)| *current == is_current);
     let friction = setting.friction.map_or(String::new(), |friction| {
         format!("friction_n = {:?}\n", friction.0)
     });
     format!(
-        "[body]\n{}\n\n[device]\nperiod_ns = {}\ndrive = \"{}\"\ndamping_n_s_per_mm = {:?}\n{friction}delay_ticks = {}\ndepth_mm = {:?}\nspeed_mm_per_s = {:?}\n",
+        "[body]\n{}\n\n[device]\nperiod_ns = {}\ndrive = \"{}\"\ndamping_n_s_per_mm = {:?}\n{friction}delay_ticks = {}\ndepth_mm = {:?}\nspeed_mm_per_s = {:?}\nguards = {is_guarded}\n",
         body_text(&body),
         setting.period.nanos(),
         drive.map_or("", |(name, _)| name),
@@ -43,7 +60,8 @@ fn text(body: ModifiedKelvin, setting: &Setting) -> String {
     )
 }
 
-fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, Setting), String> {
+/// The body, the device and the hand, and whether guards and controller were at work.
+fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, Setting, bool), String> {
     let mut fields = Fields::read(text).map_err(|mistake| in_words(file, &[mistake]))?;
     let body = read_body(&mut fields, "body");
     let most = 1e6;
@@ -55,6 +73,8 @@ fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, Setting), String> {
     let delay = fields.whole("device.delay_ticks", 0, DELAY_MAX as u64);
     let depth = fields.needed("device.depth_mm", 0.0, most);
     let speed = fields.needed("device.speed_mm_per_s", 0.0, most);
+    // Older recordings do not say it: all of theirs were guarded.
+    let is_guarded = fields.flag("device.guards").unwrap_or(true);
     let all = (body, period, is_current, damping, delay, depth, speed);
     let mistakes = fields.finish();
     let (
@@ -90,7 +110,7 @@ fn parse(file: &str, text: &str) -> Result<(ModifiedKelvin, Setting), String> {
         deepest: Depth(depth),
         speed: MmPerS(speed),
     };
-    Ok((body, setting))
+    Ok((body, setting, is_guarded))
 }
 
 impl Again<3, 5> for Simulated {
@@ -105,20 +125,39 @@ impl Again<3, 5> for Simulated {
     }
 }
 
+impl Again<3, 6> for Led {
+    fn tick(&mut self, row: &LedRow) -> LedRow {
+        let elapsed = row.whole[1];
+        self.lead().to(row.real[0]);
+        Ticking::tick(self, elapsed);
+        led_row(elapsed, self)
+    }
+
+    fn left(&self) -> u64 {
+        self.live().last.snapshot.sum()
+    }
+}
+
 /// Computes every tick of a recording again.
-pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, String> {
-    let found = Recording::read(folder, COLUMNS)?;
+pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
     let called = folder.join(SETTINGS).display().to_string();
-    let (body, setting) = parse(&called, &found.settings)?;
-    let device = Simulated::new(&setting.simulation(body, true));
-    let mut device = device.map_err(|err| format!("{called}: {err}"))?;
-    Ok(computed_again(
-        "master and slave",
-        &found,
-        COLUMNS,
-        &mut device,
-        progress,
-    ))
+    let wrong = |err: MasterSlaveError| format!("{called}: {err}");
+    let simulation = |settings: &str| {
+        let (body, setting, is_guarded) = parse(&called, settings)?;
+        Ok::<_, String>((setting.simulation(body, is_guarded), setting.speed))
+    };
+    if has_columns(folder, &LED_COLUMNS.0, &LED_COLUMNS.1)? {
+        let found = Recording::read(folder, LED_COLUMNS)?;
+        let (settings, speed) = simulation(&found.settings)?;
+        let mut led = Led::new(&settings, speed).map_err(wrong)?;
+        let name = "master and slave, led by hand";
+        return computed_again(name, &found, LED_COLUMNS, &mut led, is_going);
+    }
+    let found = Recording::read(folder, COLUMNS)?;
+    let (settings, _) = simulation(&found.settings)?;
+    let mut device = Simulated::new(&settings).map_err(wrong)?;
+    let name = "master and slave";
+    computed_again(name, &found, COLUMNS, &mut device, is_going)
 }
 
 #[cfg(test)]
@@ -137,9 +176,10 @@ mod tests {
             ..usual
         };
         for setting in [usual, odd] {
-            let text = text(ModifiedKelvin::THESIS, &setting);
+            let text = text(ModifiedKelvin::THESIS, &setting, setting == usual);
             let found = parse("settings.toml", &text);
-            assert_eq!(found, Ok((ModifiedKelvin::THESIS, setting)), "{text}");
+            let right = (ModifiedKelvin::THESIS, setting, setting == usual);
+            assert_eq!(found, Ok(right), "{text}");
         }
         for (text, told) in [
             ("[device]\ndrive = \"steam\"", "line 2: device.drive"),

@@ -109,14 +109,14 @@ pub trait Again<const W: usize, const R: usize> {
     fn left(&self) -> u64;
 }
 
-/// Computes every tick of a recording again, to the first that differs.
+/// Computes every tick of a recording again, to the first that differs. `is_going` hears the share done and ends it early.
 pub fn computed_again<const W: usize, const R: usize>(
     name: &str,
     found: &Recording<W, R>,
     (whole, real): ([&'static str; W], [&'static str; R]),
     again: &mut impl Again<W, R>,
-    progress: &mut dyn FnMut(f64),
-) -> Replayed {
+    is_going: &mut dyn FnMut(f64) -> bool,
+) -> Result<Replayed, String> {
     let mut first = None;
     let mut ticks = 0;
     for (index, row) in found.rows.iter().enumerate() {
@@ -135,8 +135,8 @@ pub fn computed_again<const W: usize, const R: usize>(
             });
             break;
         }
-        if index.is_multiple_of(1000) {
-            progress(index as f64 / found.rows.len() as f64);
+        if index.is_multiple_of(1000) && !is_going(index as f64 / found.rows.len() as f64) {
+            return Err("ended before it was done".to_owned());
         }
     }
     let hash = again.left();
@@ -154,7 +154,7 @@ pub fn computed_again<const W: usize, const R: usize>(
             (true, lost)
         }
     };
-    Replayed {
+    Ok(Replayed {
         name: name.to_owned(),
         ticks,
         is_identical: first.is_none(),
@@ -162,5 +162,5 @@ pub fn computed_again<const W: usize, const R: usize>(
         is_whole,
         lost,
         end_hash: format!("{hash:016x}"),
-    }
+    })
 }

@@ -152,7 +152,7 @@ impl Again<3, 10> for Scene {
 }
 
 /// Computes every tick of a recording again from its inputs.
-pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, String> {
+pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
     let (whole, sensed) = SENSED_COLUMNS;
     let is_sensed = has_columns(folder, &whole, &sensed)?;
     let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
@@ -165,8 +165,8 @@ pub fn replay(folder: &Path, progress: &mut dyn FnMut(f64)) -> Result<Replayed, 
     let mut scene = file.scene(nodes)?;
     let name = format!("scene '{}'", file.name);
     if is_sensed {
-        return Ok(computed_again(&name, &found, columns, &mut scene, progress));
+        return computed_again(&name, &found, columns, &mut scene, is_going);
     }
     let mut led = LedScene::new(*scene.settings()).map_err(|err| format!("{called}: {err}"))?;
-    Ok(computed_again(&name, &found, columns, &mut led, progress))
+    computed_again(&name, &found, columns, &mut led, is_going)
 }

@@ -6,6 +6,7 @@ use palpate_model::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, Sce
 use palpate_model::surface::{Grid, Heights, MeshError};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_protocols::haptics::SceneLoop;
+use palpate_protocols::haptics::scene::SceneRecorder;
 use palpate_protocols::haptics::timing::Kept;
 use std::collections::VecDeque;
 
@@ -158,10 +159,14 @@ pub struct Touch {
 
 impl Touch {
     /// Starts the loop; the hand goes along `path` and then where it is pointed.
-    pub fn start(settings: SceneSettings, path: Option<ScenePath>) -> Result<Self, String> {
+    pub fn start(
+        settings: SceneSettings,
+        path: Option<ScenePath>,
+        recorder: Option<SceneRecorder>,
+    ) -> Result<Self, String> {
         let scene = Scene::new(settings).map_err(|err| err.to_string())?;
         let moment = Moment::of(&scene);
-        let live = SceneLoop::start(scene, path, None)?;
+        let live = SceneLoop::start(scene, path, recorder)?;
         Ok(Self {
             settings,
             moment,
@@ -229,11 +234,11 @@ impl Touch {
         self.is_running() && self.is_led
     }
 
-    /// Ends it after the tick under way; what was seen stays.
-    pub fn stop(&mut self) {
-        if let Some(live) = self.live.take() {
-            self.kept = live.timing();
-        }
+    /// What is still to be ended, whose recording waits for the disk; what was seen stays.
+    pub fn stop(&mut self) -> Option<SceneLoop> {
+        let live = self.live.take()?;
+        self.kept = live.timing();
+        Some(live)
     }
 
     /// What it is made of.

@@ -117,6 +117,12 @@ impl Led {
         })
     }
 
+    /// Where the hand was led in the last tick, in mm.
+    #[must_use]
+    pub fn place(&self) -> f64 {
+        self.place
+    }
+
     /// What leads its hand.
     #[must_use]
     pub fn lead(&self) -> Lead {

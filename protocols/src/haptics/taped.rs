@@ -1,6 +1,7 @@
-//! The simulated master-slave system with every tick recorded, so that it can be computed again.
+//! The simulated master-slave system with every tick recorded, so that it can be computed again: its hand on a path of its own, or
+//! led from outside.
 
-use super::{Simulated, Ticking};
+use super::{Led, Live, Simulated, Ticking};
 use palpate_model::haptics::simulation::SimulationTick;
 use palpate_sessions::ticks::{Recorder, Row};
 
@@ -53,5 +54,59 @@ impl Ticking for Taped {
 
     fn show(&self, view: &mut SimulationTick) {
         self.device.show(view);
+    }
+}
+
+/// Columns of a recorded system whose hand was led from outside.
+pub const LED_COLUMNS: ([&str; 3], [&str; 6]) = (
+    COLUMNS.0,
+    [
+        "lead_mm",
+        "depth_mm",
+        "model_n",
+        "force_n",
+        "torque_nmm",
+        "bias_v",
+    ],
+);
+
+/// A recorded tick of it.
+pub type LedRow = Row<3, 6>;
+
+/// Writes them.
+pub type LedRecorder = Recorder<3, 6>;
+
+/// What is recorded of its newest tick, which came `elapsed` ticks after the one before.
+#[must_use]
+pub fn led_row(elapsed: u64, led: &Led) -> LedRow {
+    let Row { whole, real } = taped_row(elapsed, &led.live().last);
+    let [depth, model, force, torque, bias] = real;
+    Row {
+        whole,
+        real: [led.place(), depth, model, force, torque, bias],
+    }
+}
+
+/// The led device, and where its ticks are recorded, if they are.
+#[derive(Debug)]
+pub struct TapedLed {
+    /// The device.
+    pub led: Led,
+    /// Its recording.
+    pub recorder: Option<LedRecorder>,
+}
+
+impl Ticking for TapedLed {
+    type View = Live;
+
+    fn tick(&mut self, elapsed: u64) {
+        self.led.tick(elapsed);
+        if let Some(recorder) = &self.recorder {
+            recorder.push(led_row(elapsed, &self.led));
+        }
+    }
+
+    fn show(&self, view: &mut Live) {
+        self.led.show(view);
     }
 }

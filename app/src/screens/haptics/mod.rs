@@ -5,6 +5,7 @@ mod middle;
 mod right;
 
 use crate::command::{Command, Commands};
+use crate::screens::tape::TapePanel;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
@@ -14,7 +15,9 @@ use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::tick_box::tick_box;
 use crate::workers::feel::Feel;
 use crate::workers::haptics::{Checked, Setting, body_of, check};
+use crate::workers::haptics_tape::{led_recorder, recorded, replay};
 use crate::workers::path_dialog::Ask;
+use crate::workers::recorded::Replayed;
 use crate::workers::task::Task;
 use eframe::egui::{Button, Context, Label, RichText, Slider, Ui, vec2};
 use form::HapticsForm;
@@ -50,6 +53,7 @@ pub struct HapticsScreen {
     task: Task<Looked>,
     feel: Option<Feel>,
     refusal: Option<String>,
+    tape: TapePanel,
     view: View,
 }
 
@@ -78,6 +82,12 @@ impl HapticsScreen {
         self.feel.as_ref()
     }
 
+    /// A recording that was computed again last.
+    #[must_use]
+    pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
+        self.tape.replayed()
+    }
+
     /// Takes a session or a table as the body's.
     pub fn take(&mut self, path: &Path) {
         self.form.take(path);
@@ -87,6 +97,7 @@ impl HapticsScreen {
     pub fn poll(&mut self) {
         self.task.poll();
         self.form.check();
+        self.tape.poll();
         if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
             self.refusal = Some(reason);
         }
@@ -141,13 +152,20 @@ impl HapticsScreen {
         if self.is_running() {
             return;
         }
+        let folder = self.tape.folder();
         let started = self.checked().and_then(|looked| {
-            let setting = &looked.setting;
-            let settings = setting.simulation(looked.checked.body, !self.is_open);
-            Feel::start(&settings, setting.speed)
+            let (setting, body) = (&looked.setting, looked.checked.body);
+            let settings = setting.simulation(body, !self.is_open);
+            let recorder = folder.as_ref();
+            let recorder =
+                recorder.map(|folder| led_recorder(folder, body, setting, !self.is_open));
+            Feel::start(&settings, setting.speed, recorder.transpose()?)
         });
         match started {
             Ok(feel) => {
+                if folder.is_some() {
+                    self.tape.begun();
+                }
                 self.feel = Some(feel);
                 self.view = View::Live;
                 self.refusal = None;
@@ -158,8 +176,8 @@ impl HapticsScreen {
 
     /// Stops the loop.
     pub fn stop_loop(&mut self) {
-        if let Some(feel) = &mut self.feel {
-            feel.stop();
+        if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
+            self.tape.end(move || beat.end().and_then(recorded));
         }
     }
 
@@ -189,6 +207,7 @@ impl HapticsScreen {
             None => {}
         }
         self.feel_ui(ui, verdict, commands);
+        self.tape.ui(ui, is_running, replay);
     }
 
     fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {

@@ -79,6 +79,16 @@ impl SceneForm {
         };
     }
 
+    /// Takes other numbers of the same scene.
+    pub fn take(&mut self, file: SceneFile) {
+        *self = Self {
+            file: std::mem::take(&mut self.file),
+            path: self.path,
+            notes: std::mem::take(&mut self.notes),
+            ..Self::of(file)
+        };
+    }
+
     /// Checks every field.
     pub fn check(&mut self) {
         let within = |value: f64, [low, high]: [f64; 2]| match (low..=high).contains(&value) {
@@ -101,12 +111,18 @@ impl SceneForm {
 
     /// What the scene is made of, or the first thing that is wrong.
     pub fn settings(&self) -> Result<SceneSettings, String> {
+        let file = self.scene_file()?;
+        file.settings(file.nodes.unwrap_or_default())
+    }
+
+    /// The same as a scene file.
+    pub fn scene_file(&self) -> Result<SceneFile, String> {
         let value = |name: &str, field: &QuantityField| {
             let value = field.value.clone();
             value.map_err(|reason| format!("{name}: {reason}"))
         };
         let nodes = value("nodes", &self.nodes)? as usize;
-        let file = SceneFile {
+        Ok(SceneFile {
             side_mm: value("side", &self.side)?,
             nodes: Some(nodes),
             slope: value("slope", &self.slope)?,
@@ -114,8 +130,7 @@ impl SceneForm {
             rate_hz: value("rate", &self.rate)?,
             is_guarded: self.is_guarded,
             ..self.read.clone()
-        };
-        file.settings(nodes)
+        })
     }
 
     /// Draws which scene it is, and what leads the hand.
@@ -161,12 +176,25 @@ impl SceneForm {
         let [(least, _), (most, _)] = INERT;
         let words = format!("{least} and {most} do nothing here: nodes move along z alone");
         quiet_ui(ui, &words);
+        let recovery = self.read.recovery_s.unwrap_or(self.read.body.tau_eps);
+        let cut = match self.read.cut_mm > 0.0 {
+            true => format!("; movements below {} mm go no further", self.read.cut_mm),
+            false => String::new(),
+        };
+        quiet_ui(
+            ui,
+            &format!("back to rest in {recovery:.3} s to a third{cut}"),
+        );
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
         tick_box(ui, &mut self.is_guarded, "guards and controller");
         let device = &self.read.device;
         let words = format!(
-            "simulated device: up to {} N, {} N for long, {} N/mm, places in steps of {} mm, friction {} N",
+            "simulated device: {:.0} g, reach {:.0} x {:.0} x {:.0} mm, up to {} N, {} N for long, {} N/mm, places in steps of {} mm, friction {} N",
+            1e3 * device.mass_kg,
+            device.workspace_mm[0],
+            device.workspace_mm[1],
+            device.workspace_mm[2],
             device.force_max_n,
             device.force_continuous_n,
             device.stiffness_max_n_per_mm,

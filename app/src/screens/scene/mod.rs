@@ -3,24 +3,29 @@
 
 mod form;
 mod middle;
+mod plan;
 mod right;
 
 use crate::command::{Command, Commands};
 use crate::scene::view::SceneView;
+use crate::screens::tape::TapePanel;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::path_dialog::Ask;
-use crate::workers::scene::scene_of;
+use crate::workers::recorded::Replayed;
+use crate::workers::scene::{replay, scene_of};
 use crate::workers::task::Task;
 use crate::workers::touch::{Ahead, Moment, Touch, ahead};
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
 use form::SceneForm;
 use middle::Side;
 use palpate_model::scene::{Hand6, SceneSettings};
+use palpate_protocols::haptics::scene::{COLUMNS, SceneRecorder};
 use palpate_protocols::haptics::scene_file::SceneFile;
+use plan::Planned;
 use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
@@ -36,6 +41,8 @@ pub struct SceneScreen {
     is_shown: bool,
     touch: Option<Touch>,
     refusal: Option<String>,
+    tape: TapePanel,
+    planned: Option<Planned>,
     side: Side,
     view: SceneView,
     /// The length of the side that the view was made for, in mm.
@@ -54,6 +61,8 @@ impl Default for SceneScreen {
             is_shown: false,
             touch: None,
             refusal: None,
+            tape: TapePanel::default(),
+            planned: None,
             side: Side::Ahead,
             view: SceneView::of([side; 2]),
             viewed_mm: side,
@@ -101,9 +110,16 @@ impl SceneScreen {
         }
     }
 
+    /// A recording that was computed again last.
+    #[must_use]
+    pub fn replayed(&self) -> Option<&Result<Replayed, String>> {
+        self.tape.replayed()
+    }
+
     /// Fetches what is new.
     pub fn poll(&mut self) {
         self.form.check();
+        self.tape.poll();
         self.ahead.poll();
         self.reading.poll();
         if self.is_reading && self.reading.standing().is_none() {
@@ -170,12 +186,19 @@ impl SceneScreen {
         if self.is_running() {
             return;
         }
+        let folder = self.tape.folder();
         let started = self.form.settings().and_then(|settings| {
             self.look_at(&settings);
-            Touch::start(settings, self.form.path)
+            let text = self.form.scene_file()?.text();
+            let recorder = folder.as_ref();
+            let recorder = recorder.map(|folder| SceneRecorder::start(folder, &text, COLUMNS));
+            Touch::start(settings, self.form.path, recorder.transpose()?)
         });
         match started {
             Ok(touch) => {
+                if folder.is_some() {
+                    self.tape.begun();
+                }
                 self.touch = Some(touch);
                 self.side = Side::Live;
                 self.refusal = None;
@@ -186,8 +209,9 @@ impl SceneScreen {
 
     /// Stops it.
     pub fn stop(&mut self) {
-        if let Some(touch) = &mut self.touch {
-            touch.stop();
+        if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
+            self.tape
+                .end(move || live.stop().and_then(|end| end.recorded));
         }
     }
 
@@ -253,5 +277,7 @@ impl SceneScreen {
         };
         ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
         ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
+        self.plan_ui(ui, is_running);
+        self.tape.ui(ui, is_running, replay);
     }
 }
