@@ -19,6 +19,8 @@ const UNUSED_S: f64 = 5.0;
 pub struct FramePace {
     used_at: f64,
     is_unused: Arc<AtomicBool>,
+    /// Whether another thread has asked since the last frame: each time wakes the window's thread.
+    is_asked: Arc<AtomicBool>,
 }
 
 impl FramePace {
@@ -30,6 +32,7 @@ impl FramePace {
         }
         let is_unused = now > self.used_at + UNUSED_S;
         self.is_unused.store(is_unused, Ordering::Relaxed);
+        self.is_asked.store(false, Ordering::Relaxed);
         ctx.request_repaint_after(match is_moving {
             true => MOVING,
             false => resting(is_unused),
@@ -38,8 +41,13 @@ impl FramePace {
 
     /// Asks for a frame from another thread, where there is news.
     pub fn waker(&self, ctx: &Context) -> impl Fn() + Send + 'static {
-        let (ctx, is_unused) = (ctx.clone(), Arc::clone(&self.is_unused));
-        move || ctx.request_repaint_after(resting(is_unused.load(Ordering::Relaxed)))
+        let (is_unused, is_asked) = (Arc::clone(&self.is_unused), Arc::clone(&self.is_asked));
+        let ctx = ctx.clone();
+        move || {
+            if !is_asked.swap(true, Ordering::Relaxed) {
+                ctx.request_repaint_after(resting(is_unused.load(Ordering::Relaxed)));
+            }
+        }
     }
 }
 

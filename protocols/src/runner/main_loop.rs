@@ -23,6 +23,9 @@ const TICK: Nanos = Nanos::from_millis(10);
 /// How often a rig on wires is asked what has come: an interlock decides so late at most.
 const STRIDE_WIRED: Nanos = Nanos::from_millis(2);
 
+/// How often a simulated rig is looked at between runs, when nothing can move: as often as an eye follows numbers.
+const STRIDE_AT_REST: Nanos = Nanos::from_millis(50);
+
 /// A counter at rest may flicker by so much.
 const DISPLACED_PULSES: i64 = 1;
 
@@ -254,6 +257,7 @@ impl MainLoop {
         match self.pace() {
             TimeScale::Max => STRIDE_MAX,
             _ if !self.rig.is_virtual() => STRIDE_WIRED,
+            _ if !self.is_running() => STRIDE_AT_REST,
             TimeScale::Factor(factor) => {
                 Nanos(((TICK.0 as f64 * factor) as u64).clamp(1_000_000, STRIDE_MAX.0))
             }

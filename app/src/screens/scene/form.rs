@@ -183,7 +183,7 @@ impl SceneForm {
         };
         quiet_ui(
             ui,
-            &format!("back to rest in {recovery:.3} s to a third{cut}"),
+            &format!("back to rest with a time constant of {recovery:.3} s{cut}"),
         );
         section_ui(ui, "Loop");
         quantity_ui(ui, "rate", "ticks a second", &mut self.rate);
