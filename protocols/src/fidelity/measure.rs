@@ -1,7 +1,7 @@
 //! What one step is held to, measured sample by sample.
 
 use super::Achieved;
-use crate::plans::{HoldForce, LoadTo, PlannedStep, Step};
+use crate::plans::{Follow, HoldForce, LoadTo, PlannedStep, Step};
 use palpate_model::rig::{AxisStatus, RigDescription};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::Newtons;
@@ -281,7 +281,10 @@ impl Measuring {
             Step::Hold {
                 duration: wanted, ..
             }
-            | Step::Rest { duration: wanted } => {
+            | Step::Rest { duration: wanted }
+            | Step::Follow(Follow {
+                duration: wanted, ..
+            }) => {
                 add("duration", "s", wanted.0, duration, of_duration);
             }
             _ => {}

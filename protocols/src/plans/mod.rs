@@ -17,7 +17,7 @@ pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::RampHold;
 pub use step::{
-    FindBase, FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
+    FindBase, FindContact, Follow, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
 };
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
