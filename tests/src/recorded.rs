@@ -98,6 +98,7 @@ fn ask(
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
+        leader: None,
     };
     let (reply, answer) = sync_channel(1);
     let (wake, woken) = sync_channel(1);

@@ -2,6 +2,7 @@
 
 use super::board::{Board, LogState};
 use super::clock::wall_now;
+use super::leading::{LeadFeed, Leader};
 use super::live_feed::LiveFeed;
 use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
@@ -42,6 +43,7 @@ pub(super) struct ActiveRun {
     told_given_up: Seconds,
     order: u64,
     pub(super) live: LiveFeed,
+    lead: LeadFeed,
     /// `None` at full pace, where the computer cannot be late.
     watch: Option<HostWatch>,
     time_use: BTreeMap<&'static str, u64>,
@@ -60,6 +62,7 @@ impl ActiveRun {
         folder: PathBuf,
         origin: Nanos,
         unattended: (AfterStop, Answers),
+        leader: Option<Leader>,
         watch: Option<HostWatch>,
     ) -> Self {
         let (after_stop, answers) = unattended;
@@ -83,6 +86,7 @@ impl ActiveRun {
             told_given_up: Seconds(0.0),
             order: 0,
             live,
+            lead: LeadFeed::new(leader),
             watch,
             time_use: BTreeMap::new(),
             log_failure: None,
@@ -153,6 +157,7 @@ impl ActiveRun {
             self.log_row(now, &reading, &state);
         }
         let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
+        let lead = reading.and_then(|reading| self.lead.push(now, &reading, &state));
         if let Some(text) = self.live.take_failure() {
             self.board.note(text.clone(), true);
             let told = Told::Event { text };
@@ -172,6 +177,9 @@ impl ActiveRun {
         }
         if let Some(estimate) = estimate {
             self.feed(now, Input::LiveFit(estimate), send);
+        }
+        if let Some(depth) = lead {
+            self.feed(now, Input::Lead { depth }, send);
         }
         self.after_feed(now, send);
     }

@@ -2,6 +2,7 @@
 
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
+use super::leading::Leader;
 use super::watch::HostWatch;
 use crate::engine::{Config, ENGINE_VERSION};
 use crate::plans::Plan;
@@ -59,6 +60,8 @@ pub struct RunRequest {
     pub after_stop: AfterStop,
     /// Who answers prompts.
     pub answers: Answers,
+    /// What leads a step that follows; without it such a step waits for a lead in vain and ends.
+    pub leader: Option<Leader>,
 }
 
 /// A run did not start.
@@ -177,6 +180,7 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
         path,
         bench.origin,
         (request.after_stop, request.answers),
+        request.leader.clone(),
         bench.watch,
     ))
 }

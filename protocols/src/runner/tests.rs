@@ -40,6 +40,7 @@ fn request(out: &Path) -> RunRequest {
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
     }
+    leader: None,
 }
 
 /// A loop on a rig with a run that was just started.
