@@ -271,7 +271,12 @@ impl State {
         let planned = self.config.plan.steps.get(self.step_index);
         let cycle = planned.map_or(0, |planned| planned.cycle);
         match self.phase {
-            Phase::Ramp | Phase::Hold | Phase::Unload | Phase::Creep | Phase::Sine | Phase::Follow => cycle.max(1),
+            Phase::Ramp
+            | Phase::Hold
+            | Phase::Unload
+            | Phase::Creep
+            | Phase::Sine
+            | Phase::Follow => cycle.max(1),
             Phase::Rest | Phase::Weigh => cycle,
             _ => 0,
         }

@@ -75,9 +75,7 @@ impl TimeUse {
             | Phase::Sine
             | Phase::Follow
             | Phase::Retract
-            | Phase::Jog => {
-                &mut self.motion_s
-            }
+            | Phase::Jog => &mut self.motion_s,
             Phase::Hold | Phase::Creep | Phase::Weigh => &mut self.hold_s,
             Phase::Rest | Phase::Prompt | Phase::Paused | Phase::Stopped | Phase::Ended => {
                 &mut self.waiting_s

@@ -137,9 +137,7 @@ impl Known {
             | Step::LoadTo(_)
             | Step::HoldForce(_)
             | Step::Sine(_)
-            | Step::Follow(_) => {
-                self.is_inside = true
-            }
+            | Step::Follow(_) => self.is_inside = true,
             Step::Unload { .. } | Step::Retract { .. } => self.is_inside = false,
             // Another specimen has its surface elsewhere. Without one there is only the base to find.
             Step::Prompt(prompt) => match prompt.hand {

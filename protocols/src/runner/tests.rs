@@ -39,8 +39,8 @@ fn request(out: &Path) -> RunRequest {
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
+        leader: None,
     }
-    leader: None,
 }
 
 /// A loop on a rig with a run that was just started.
