@@ -33,6 +33,7 @@ pub(crate) struct Following {
     /// When the last lead came, or the step began.
     led_at: Nanos,
     is_lost: bool,
+    is_stopping: bool,
     is_refusal_told: bool,
 }
 
@@ -54,6 +55,7 @@ impl Following {
             wanted: None,
             led_at: cx.now,
             is_lost: false,
+            is_stopping: false,
             is_refusal_told: false,
         })
     }
@@ -68,20 +70,22 @@ impl Following {
     fn advance(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
         let at_rest = cx.at_rest()?;
         let silent = cx.now.since(self.led_at).seconds();
-        if silent <= SILENT_MAX {
-            self.is_lost = false;
-        } else if !self.is_lost {
-            self.is_lost = true;
+        let is_lost = silent > SILENT_MAX;
+        if is_lost && !self.is_lost {
             self.wanted = None;
             cx.record(Record::LeadLost { silent });
-            if !at_rest {
+        }
+        self.is_lost = is_lost;
+        let is_over = reading.tick >= self.until_tick || silent > LOST;
+        if !at_rest {
+            if (is_lost || is_over) && !self.is_stopping {
+                self.is_stopping = true;
                 cx.stop_move();
             }
-        }
-        if !at_rest {
             return Ok(Progress::Continue);
         }
-        if reading.tick >= self.until_tick || silent > LOST {
+        self.is_stopping = false;
+        if is_over {
             return Ok(Progress::Done);
         }
         if let Some(wanted) = self.wanted {

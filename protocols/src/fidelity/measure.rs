@@ -1,7 +1,7 @@
 //! What one step is held to, measured sample by sample.
 
 use super::Achieved;
-use crate::plans::{Follow, HoldForce, LoadTo, PlannedStep, Step};
+use crate::plans::{HoldForce, LoadTo, PlannedStep, Step};
 use palpate_model::rig::{AxisStatus, RigDescription};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::Newtons;
@@ -281,11 +281,13 @@ impl Measuring {
             Step::Hold {
                 duration: wanted, ..
             }
-            | Step::Rest { duration: wanted }
-            | Step::Follow(Follow {
-                duration: wanted, ..
-            }) => {
+            | Step::Rest { duration: wanted } => {
                 add("duration", "s", wanted.0, duration, of_duration);
+            }
+            Step::Follow(follow) => {
+                // The move under way is braked first.
+                let allowed = of_duration + follow.speed.0 / self.acceleration;
+                add("duration", "s", follow.duration.0, duration, allowed);
             }
             _ => {}
         }

@@ -235,9 +235,9 @@ impl Walk<'_> {
                     "the slave goes where it is led, at {} at most and no deeper than {}",
                     follow.speed, follow.depth_max
                 ));
-                // It ends at rest.
-                let last = self.move_secs(way, follow.speed);
-                Span(duration, duration + last, false)
+                // The move under way is braked first.
+                let braking = follow.speed.0 / self.rig.acceleration.0;
+                Span(duration, duration + braking + SETTLE_SECS, false)
             }
             Step::Unload {
                 speed,
