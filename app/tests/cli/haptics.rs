@@ -248,7 +248,7 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
     let told = json(&palpate(at.path(), &words("one")));
     assert_eq!(told["command"], "haptics-slave", "{told}");
     assert_eq!(told["ending"], "finish", "{told}");
-    assert_eq!(told["verdict"], "good", "{told}");
+    assert_eq!(told["verdict"], "valid", "{told}");
     let slave = &told["slave"];
     let number = |name: &str| slave[name].as_f64().unwrap_or(f64::NAN);
     assert!(
