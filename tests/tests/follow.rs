@@ -11,6 +11,7 @@ use palpate_model::rig::{AxisStatus, Fault, Limits, Phase, Reading, RigCommand};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_protocols::analysis::{Stretch, samples_of};
 use palpate_protocols::engine::{EndingKind, Input, Interlock, Operator, Record};
 use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
 use palpate_protocols::plans::Follow;
@@ -425,6 +426,11 @@ fn a_slave_led_by_a_master_measures_the_specimen_and_replays_to_the_bit() {
     let (again, same) = slaved(path, follow(20.0, 9.0, 8.0));
     assert_eq!(again.rows, session.rows);
     assert_eq!(same, told);
+    // A fit takes the first way in: the hand turns after 5 s, its slave soon after.
+    let fitted = samples_of(&session, Stretch::default()).unwrap();
+    let measured = fitted.iter().filter(|one| one.is_measured());
+    let last = measured.map(|one| one.t.0).fold(0.0, f64::max);
+    assert!((4.5..6.0).contains(&last), "{last}");
     // A lead that differs is another run.
     let mut other = session;
     let lead = other.entries.iter_mut().rfind(|entry| {

@@ -199,7 +199,6 @@ impl Sine {
 
 /// A slave that follows a lead, within bounds that no lead can move.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub struct Follow {
     /// How long.
     pub duration: Seconds,
