@@ -85,7 +85,7 @@ fn a_specimen_that_is_softer_than_the_body_shows() {
 fn a_master_that_hears_nothing_of_its_slave_lets_go() {
     // Pressed and at rest, how far the handle goes in while its slave is silent for so long, ten times over.
     let yields = |silent: u64| {
-        let mut leader = leader(ramp(18.0, 30.0));
+        let mut leader = leader(ramp(30.0, 30.0));
         let mut place = 0.0;
         for at in 1..=6000 {
             place = leader.lead(&felt(at, place, 1.0)).unwrap();
@@ -99,8 +99,8 @@ fn a_master_that_hears_nothing_of_its_slave_lets_go() {
     let held = yields(150);
     let let_go = yields(900);
     assert!(held.abs() < 0.1, "{held}");
-    // More than 2 N at the handle, of which friction keeps 0.8, on the 0.8 N/mm of the hand.
-    assert!(let_go > 0.5, "{let_go}");
+    // About 3 N at the handle, of which friction keeps 0.8, on the 0.8 N/mm of the hand.
+    assert!(let_go > 1.5, "{let_go}");
 }
 
 #[test]

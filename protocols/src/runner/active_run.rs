@@ -62,7 +62,6 @@ impl ActiveRun {
         folder: PathBuf,
         origin: Nanos,
         unattended: (AfterStop, Answers),
-        leader: Option<Leader>,
         watch: Option<HostWatch>,
     ) -> Self {
         let (after_stop, answers) = unattended;
@@ -86,7 +85,7 @@ impl ActiveRun {
             told_given_up: Seconds(0.0),
             order: 0,
             live,
-            lead: LeadFeed::new(leader),
+            lead: LeadFeed::new(None),
             watch,
             time_use: BTreeMap::new(),
             log_failure: None,
@@ -98,6 +97,12 @@ impl ActiveRun {
             run.log_health(begin);
         }
         run
+    }
+
+    /// The same, with what leads its step that follows.
+    pub fn led_by(mut self, leader: Option<Leader>) -> Self {
+        self.lead = LeadFeed::new(leader);
+        self
     }
 
     /// The engine's state, except inside [`Self::feed`].

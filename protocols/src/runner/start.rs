@@ -173,14 +173,14 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
         plan: request.plan.clone(),
         is_homed: bench.is_homed,
     };
-    Ok(ActiveRun::new(
+    let run = ActiveRun::new(
         config,
         preview,
         (writer, session_id),
         path,
         bench.origin,
         (request.after_stop, request.answers),
-        request.leader.clone(),
         bench.watch,
-    ))
+    );
+    Ok(run.led_by(request.leader.clone()))
 }
