@@ -96,11 +96,12 @@ fn a_master_that_hears_nothing_of_its_slave_lets_go() {
         }
         place - before
     };
+    // The tissue under the force gives way a little.
     let held = yields(150);
     let let_go = yields(900);
-    assert!(held.abs() < 0.1, "{held}");
+    assert!(held.abs() < 0.4, "{held}");
     // About 3 N at the handle, of which friction keeps 0.8, on the 0.8 N/mm of the hand.
-    assert!(let_go > 1.5, "{let_go}");
+    assert!(let_go > 3.0, "{let_go}");
 }
 
 #[test]
