@@ -13,6 +13,7 @@ use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_protocols::analysis::{Stretch, samples_of};
 use palpate_protocols::engine::{EndingKind, Input, Interlock, Operator, Record};
+use palpate_protocols::fidelity::of_session;
 use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
 use palpate_protocols::plans::Follow;
 use palpate_protocols::replay::replay;
@@ -485,6 +486,13 @@ fn what_leads_may_fail_and_the_session_says_so() {
             .count()
     };
     assert_eq!((records("lead_lost"), records("refused")), (1, 1));
+    let remarks = of_session(&session).unwrap().remarks;
+    assert!(
+        remarks
+            .iter()
+            .any(|remark| remark.contains("nothing has led the slave")),
+        "{remarks:?}"
+    );
     let followed = session
         .rows
         .iter()

@@ -173,6 +173,10 @@ fn a_slave_on_wires_follows_a_master_in_real_time() {
         let lost = session.entries.iter();
         let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
         assert_eq!(lost.count(), 0);
+        // Its loop is in real time: a tick a millisecond of what followed, missed ones among them.
+        let kept = slaved.master_loop.unwrap().kept;
+        let ticks = kept.late.count + kept.missed;
+        assert!((5_500..20_000).contains(&ticks), "{ticks}");
     }
 }
 

@@ -327,7 +327,7 @@ fn one_run(seed: u64) -> EndingKind {
         2.0
     };
     // What leads goes anywhere, even where nothing is.
-    let mut leading = SplitMix::seeded(!seed);
+    let (mut leading, mut place) = (SplitMix::seeded(!seed), 10.0);
     let is_stuck = fault.is_some_and(|fault| matches!(fault.kind, FaultKind::Stuck));
     while lab.outcome.is_none() && lab.state().holding().is_none() && lab.now < end {
         lab.advance();
@@ -335,10 +335,11 @@ fn one_run(seed: u64) -> EndingKind {
             let choice = any_choice(&mut random, &plan);
             lab.operator(choice);
         }
+        if leading.below(500) == 0 {
+            place = [between(&mut leading, -50.0, 100.0), f64::NAN, 1e300][leading.below(40) / 19];
+        }
         if leading.below(20) == 0 {
-            let depth =
-                [between(&mut leading, -50.0, 100.0), f64::NAN, 1e300][leading.below(40) / 19];
-            let depth = Some(Depth(depth));
+            let depth = Some(Depth(place));
             lab.give(Input::Lead { depth });
         }
         let truth = lab.rig.inner().truth();

@@ -13,7 +13,7 @@ use palpate_model::haptics::check::CheckSample;
 use palpate_model::haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
-use palpate_protocols::haptics::slave::{Difference, Slaved};
+use palpate_protocols::haptics::slave::{Difference, MasterLoop, Slaved};
 use palpate_protocols::haptics::timing::Spread;
 
 /// A check in words.
@@ -141,6 +141,14 @@ pub fn slave_text(slaved: &Slaved) -> String {
             "damping: the device has {:.1} N s/m and needs {:.1} at that depth; with its force through the slave it would need {through:.1}, so the force is that of the model at the handle",
             slaved.damping_has,
             slaved.damping_needed.max(0.0)
+        ));
+    }
+    if let Some(MasterLoop { priority, kept }) = &slaved.master_loop {
+        lines.push(format!(
+            "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
+            kept.late.count,
+            1e3 * kept.late.p99_9.0,
+            kept.missed
         ));
     }
     lines.join("\n")

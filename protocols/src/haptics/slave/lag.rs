@@ -1,6 +1,7 @@
 //! How far a slave is behind, and how well the force at the handle agrees with what its cell felt.
 
 use super::{FILTER_MS, SlaveSettings};
+use crate::haptics::timing::Kept;
 use crate::runner::Felt;
 use palpate_model::Nanos;
 use palpate_model::haptics::margin::{Device, Watch};
@@ -78,6 +79,18 @@ pub struct Slaved {
     pub damping_needed: f64,
     /// Damping it has, in N s/m.
     pub damping_has: f64,
+    /// The master's loop; none where it ticks with the samples.
+    pub master_loop: Option<MasterLoop>,
+}
+
+/// A master's loop in real time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MasterLoop {
+    /// The priority that the system granted, in words.
+    pub priority: String,
+    /// How it kept its time.
+    #[serde(flatten)]
+    pub kept: Kept,
 }
 
 /// A sum of squares and the largest.
@@ -239,6 +252,7 @@ impl Meter {
             damping_through_slave: lag_ms.map(|lag| needed(1e-3 * lag.median / period)),
             damping_needed: needed(self.watch.device.delay_ticks),
             damping_has: 1e3 * self.watch.device.damping,
+            master_loop: None,
         })
     }
 }

@@ -8,7 +8,7 @@
 mod lag;
 
 use lag::Meter;
-pub use lag::{Difference, Slaved, Spread};
+pub use lag::{Difference, MasterLoop, Slaved, Spread};
 
 use super::{Beat, Ticking};
 use crate::runner::{Felt, Leading};
@@ -173,7 +173,14 @@ impl SlaveLeader {
     /// What came of it; none if nothing was led.
     #[must_use]
     pub fn slaved(&self) -> Option<Slaved> {
-        self.meter.slaved()
+        let mut slaved = self.meter.slaved()?;
+        if let Some(Going::ByItself(beat)) = &self.going {
+            slaved.master_loop = Some(MasterLoop {
+                priority: beat.granted().to_string(),
+                kept: beat.kept(),
+            });
+        }
+        Some(slaved)
     }
 
     /// Contact must stand above the noise of this cell, averaged as it is.
