@@ -10,7 +10,7 @@ import { decompress } from "fzstd";
 const decompressHandlers = { zstd: (data, size) => decompress(data, new Uint8Array(Number(size))) };
 const RECORD_VERSION = 2; // The newest that is known here.
 const PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh " +
-  "check-home paused imported").split(" ");
+  "check-home paused imported follow").split(" ");
 
 /** The whole numbers of a packed array, 64 bits each: seven bits a byte, lowest first, 128 where more follow. */
 function numbers(data) {

@@ -16,7 +16,7 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 RECORD_VERSION = 2  # The newest that is known here.
 PHASES = ("idle self-test home tare contact rest ramp hold retract stopped ended jog unload creep sine prompt weigh "
-          "check-home paused imported").split()
+          "check-home paused imported follow").split()
 
 
 def varint(data, at):

@@ -93,6 +93,19 @@ fn lift_off(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
     Some(last + 1 - LIFT_OFF_RUN)
 }
 
+/// A slave that follows is on its way back once it is so much nearer to the surface than it has been: ten pulses of the
+/// source's slider, more than a hand trembles by after its slave.
+const TURN_MM: f64 = 0.15;
+
+/// The first sample, if any, at which a slave that follows is on its way back: the body that is fitted knows none.
+fn turn(phases: &[Phase], samples: &[FitSample]) -> Option<usize> {
+    let mut deepest = f64::NEG_INFINITY;
+    phases.iter().zip(samples).position(|(phase, one)| {
+        deepest = deepest.max(one.depth.0);
+        *phase == Phase::Follow && one.depth.0 < deepest - TURN_MM
+    })
+}
+
 /// Nothing to fit or to analyse could be read.
 #[derive(Debug, Error)]
 pub enum SourceError {
@@ -353,7 +366,7 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
             })
         })
         .collect();
-    if let Some(from) = lift_off(&phases, &samples) {
+    if let Some(from) = lift_off(&phases, &samples).or_else(|| turn(&phases, &samples)) {
         for sample in &mut samples[from..] {
             sample.sigma = Newtons(f64::INFINITY);
         }
@@ -367,7 +380,7 @@ pub fn samples_of(session: &Session, stretch: Stretch) -> Result<Vec<FitSample>,
 
 fn is_fitted(row: &Row, stretch: Stretch) -> bool {
     let is_asked = match row.phase {
-        Phase::Ramp | Phase::Hold => true,
+        Phase::Ramp | Phase::Hold | Phase::Follow => true,
         Phase::Unload => stretch == Stretch::WithUnload,
         _ => false,
     };

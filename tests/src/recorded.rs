@@ -5,7 +5,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::{Plan, RampHold};
 use palpate_protocols::runner::{
-    AfterStop, Answers, Labels, Request, RunRequest, Runner, StartError, TimeScale,
+    AfterStop, Answers, Labels, Leader, Request, RunRequest, Runner, StartError, TimeScale,
 };
 use palpate_sessions::Session;
 use std::path::Path;
@@ -44,7 +44,7 @@ pub fn of_any_plan(
 ) -> Result<Session, StartError> {
     let folder = tempfile::tempdir().expect("a folder");
     let out = folder.path().join("session");
-    let started = ask(rig, calibration, plan, TimeScale::Max, &out)?;
+    let started = ask(rig, calibration, plan, TimeScale::Max, &out, None)?;
     to_its_end(started);
     Ok(Session::open(&out).expect("the session"))
 }
@@ -78,7 +78,26 @@ pub fn start(
     scale: TimeScale,
     out: &Path,
 ) -> (Runner, Receiver<()>) {
-    ask(rig, calibration, plan, scale, out).expect("a start")
+    ask(rig, calibration, plan, scale, out, None).expect("a start")
+}
+
+/// A plan with a step that follows, at full pace or in real time, as a session read back from disk.
+///
+/// # Panics
+/// If the run is not started or says nothing for a minute.
+#[must_use]
+pub fn of_led_plan(
+    rig: Box<dyn Rig>,
+    calibration: Calibration,
+    plan: Plan,
+    scale: TimeScale,
+    leader: Leader,
+) -> Session {
+    let folder = tempfile::tempdir().expect("a folder");
+    let out = folder.path().join("session");
+    let started = ask(rig, calibration, plan, scale, &out, Some(leader)).expect("a start");
+    to_its_end(started);
+    Session::open(&out).expect("the session")
 }
 
 fn ask(
@@ -87,6 +106,7 @@ fn ask(
     plan: Plan,
     scale: TimeScale,
     out: &Path,
+    leader: Option<Leader>,
 ) -> Result<(Runner, Receiver<()>), StartError> {
     let request = RunRequest {
         plan,
@@ -98,6 +118,7 @@ fn ask(
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
+        leader,
     };
     let (reply, answer) = sync_channel(1);
     let (wake, woken) = sync_channel(1);

@@ -4,17 +4,27 @@
 
 use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings};
 use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
-use palpate_drivers::open_wired;
 use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_drivers::{Rig, open_wired};
 use palpate_model::Nanos;
+use palpate_model::calibration::Calibration;
+use palpate_model::haptics::Period;
+use palpate_model::haptics::rig::{Hand, HandPath};
+use palpate_model::haptics::simulation::SimulationSettings;
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings};
+use palpate_protocols::plans::{FindContact, Follow, Plan, Step};
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::{Request, Runner, TimeScale, driver_clock};
 use palpate_sessions::Session;
+use palpate_tests::lab::{retract, set_up};
 use palpate_tests::{recorded, shipped};
 use std::path::Path;
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::Duration;
 
@@ -79,6 +89,97 @@ fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) 
     false
 }
 
+/// The rig of an emulated controller, by a rig file, and the calibration of its cell.
+fn bench(folder: &Path, port: &Path) -> Result<(Box<dyn Rig>, Calibration), String> {
+    let file = folder.join("bench.toml");
+    let text = format!(
+        "device = \"galil\"\nport = \"{}\"\nmm_per_pulse = 0.015\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
+         acceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n",
+        port.display()
+    );
+    std::fs::write(&file, text).map_err(|err| err.to_string())?;
+    let rig = open_wired(&file.display().to_string(), &driver_clock());
+    let calibration = SimRig::new(SimSettings::default()).calibration();
+    Ok((rig.map_err(|err| err.to_string())?, calibration))
+}
+
+/// Whether a run finished. Samples that come late end one, as they must; nothing else may.
+fn is_finished(session: &Session) -> Result<bool, String> {
+    let end = session.end.as_ref().ok_or("the session has no end")?;
+    let is_late = LATE.iter().any(|words| end.reason.contains(words));
+    match end.outcome == "finish" {
+        false if !is_late => Err(format!("{}: {}", end.outcome, end.reason)),
+        is_finished => Ok(is_finished),
+    }
+}
+
+#[test]
+fn a_slave_on_wires_follows_a_master_in_real_time() {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("galil");
+    if !Path::new("/dev/ptmx").exists() {
+        println!("skipped: this system has no pseudo-terminals");
+        return;
+    }
+    let _emulator = Emulator::at(&port).unwrap();
+    let (rig, calibration) = bench(folder.path(), &port).unwrap();
+    let follow = Follow {
+        duration: Seconds(6.0),
+        speed: MmPerS(6.0),
+        depth_max: Depth(4.0),
+    };
+    // As quickly as contact is found at all: how well is not the question here.
+    let contact = FindContact {
+        approach_speed: MmPerS(6.0),
+        retreat_mm: 1.0,
+        pass_speed: MmPerS(0.6),
+        recovery: Seconds(0.5),
+        std_error_mm_max: 1.0,
+        press: None,
+        ..FindContact::default()
+    };
+    let mut steps = set_up(Seconds(1.0), contact);
+    steps.extend([Step::Follow(follow), retract()]);
+    let hand = Hand::firm(HandPath::Sine {
+        middle: 3.0,
+        amplitude: 3.0,
+        hz: 0.2,
+    });
+    let body = ModifiedKelvin::THESIS;
+    let leader = SlaveLeader::new(SlaveSettings {
+        master: SimulationSettings::of(body, Period::MILLISECOND, hand),
+        body,
+        depth_max: follow.depth_max,
+        rig: rig.description().clone(),
+        is_virtual: false,
+    });
+    let leader = Arc::new(Mutex::new(leader.unwrap()));
+    let plan = Plan::of("slave", 1, steps);
+    let scale = TimeScale::Factor(1.0);
+    let session = recorded::of_led_plan(rig, calibration, plan, scale, Arc::clone(&leader) as _);
+    let is_finished = is_finished(&session).unwrap();
+    println!("finished: {is_finished}; {} samples", session.rows.len());
+    let followed = session.rows.iter().filter(|row| row.phase == Phase::Follow);
+    let deepest = followed.filter_map(|row| row.depth).fold(0.0, f64::max);
+    assert!(deepest <= 4.0 + 1e-9, "{deepest}");
+    assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
+    if is_finished {
+        let slaved = leader.lock().unwrap().slaved().unwrap();
+        println!("{slaved:?}");
+        assert!(deepest > 1.0, "{deepest}");
+        // A move of the hand's 3.8 mm/s takes a quarter of a second.
+        let lag = slaved.lag_ms.unwrap().median;
+        assert!((50.0..600.0).contains(&lag), "{lag}");
+        let lost = session.entries.iter();
+        let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
+        assert_eq!(lost.count(), 0);
+        // Its loop is in real time: a tick a millisecond of what followed, missed ones among them.
+        let kept = slaved.master_loop.unwrap().kept;
+        let ticks = kept.late.count + kept.missed;
+        assert!((5_500..20_000).contains(&ticks), "{ticks}");
+    }
+}
+
 #[test]
 fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
     let folder = tempfile::tempdir().unwrap();
@@ -88,15 +189,7 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
         return;
     }
     let emulator = Emulator::at(&port).unwrap();
-    let file = folder.path().join("bench.toml");
-    let text = format!(
-        "device = \"galil\"\nport = \"{}\"\nmm_per_pulse = 0.015\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
-         acceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n",
-        port.display()
-    );
-    std::fs::write(&file, text).unwrap();
-    let rig = open_wired(&file.display().to_string(), &driver_clock()).unwrap();
-    let calibration = SimRig::new(SimSettings::default()).calibration();
+    let (rig, calibration) = bench(folder.path(), &port).unwrap();
     let plan = shipped("check-home", &[]);
     let out = folder.path().join("session");
     let (runner, woken) = recorded::start(rig, calibration, plan, TimeScale::Factor(1.0), &out);
@@ -110,21 +203,8 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
     assert!(wait(&runner, &woken, has_ended), "the run does not end");
 
     let session = Session::open(&out).unwrap();
-    let end = session.end.as_ref().unwrap();
-    println!(
-        "{}: {}; {} samples",
-        end.outcome,
-        end.reason,
-        session.rows.len()
-    );
-    // Samples that come late end a run, as they must; nothing else may.
-    let is_late = |reason: &str| LATE.iter().any(|words| reason.contains(words));
-    assert!(
-        end.outcome == "finish" || is_late(&end.reason),
-        "{}: {}",
-        end.outcome,
-        end.reason
-    );
+    let is_finished = is_finished(&session).unwrap();
+    println!("finished: {is_finished}; {} samples", session.rows.len());
     let rig = session.manifest.rig.as_ref().unwrap();
     assert!(rig.identity.contains("watchdog"), "{}", rig.identity);
     assert!(session.rows.len() > 100, "{}", session.rows.len());

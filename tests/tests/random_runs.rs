@@ -9,10 +9,11 @@ use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{HandAction, Limits, RigCommand};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
-use palpate_protocols::engine::{EndingKind, Operator};
+use palpate_protocols::engine::{EndingKind, Input, Operator};
 use palpate_protocols::plans::{
-    Action, FindBase, FindContact, HoldForce, HoldRate, HoldUntil, LoadTo, Monitor, OnFailure,
-    OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step, Weigh,
+    Action, FindBase, FindContact, Follow, HoldForce, HoldRate, HoldUntil, LoadTo, Monitor,
+    OnFailure, OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step,
+    Weigh,
 };
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::StartError;
@@ -37,7 +38,7 @@ fn speed(random: &mut SplitMix, most: f64) -> MmPerS {
 }
 
 fn any_step(random: &mut SplitMix) -> Step {
-    match random.below(15) {
+    match random.below(16) {
         0 => Step::Jog {
             distance_mm: between(random, -30.0, 30.0),
             speed: speed(random, 20.0),
@@ -103,6 +104,11 @@ fn any_step(random: &mut SplitMix) -> Step {
             amplitude_mm: between(random, 0.1, 5.0),
             frequency_hz: between(random, 0.2, 5.0),
             cycles: 2,
+        }),
+        14 => Step::Follow(Follow {
+            duration: Seconds(between(random, 0.5, 5.0)),
+            speed: speed(random, 20.0),
+            depth_max: Depth(between(random, 0.5, 40.0)),
         }),
         _ => Step::Retract {
             speed: speed(random, 20.0),
@@ -320,12 +326,21 @@ fn one_run(seed: u64) -> EndingKind {
     } else {
         2.0
     };
+    // What leads goes anywhere, even where nothing is.
+    let (mut leading, mut place) = (SplitMix::seeded(!seed), 10.0);
     let is_stuck = fault.is_some_and(|fault| matches!(fault.kind, FaultKind::Stuck));
     while lab.outcome.is_none() && lab.state().holding().is_none() && lab.now < end {
         lab.advance();
         if interferes && random.below(4000) == 0 {
             let choice = any_choice(&mut random, &plan);
             lab.operator(choice);
+        }
+        if leading.below(500) == 0 {
+            place = [between(&mut leading, -50.0, 100.0), f64::NAN, 1e300][leading.below(40) / 19];
+        }
+        if leading.below(20) == 0 {
+            let depth = Some(Depth(place));
+            lab.give(Input::Lead { depth });
         }
         let truth = lab.rig.inner().truth();
         // What the axis still does when the limit is seen: the way of the brake, the answer, and the 0.1 mm that

@@ -76,6 +76,7 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
         } else {
             Answers::Operator
         },
+        leader: None,
     };
     let snapshot = super::run::execute(bench.rig, args.rig.time_scale, request, output)?;
     let Some(view) = &snapshot.run else {

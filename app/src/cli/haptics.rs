@@ -5,6 +5,7 @@ use super::new_file;
 use super::output::Output;
 use super::run::number;
 use super::scene::{ReplayArgs, told};
+use super::slave::{self, SlaveArgs};
 use crate::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
@@ -30,6 +31,8 @@ pub enum HapticsCommand {
     Replay(ReplayArgs),
     /// Push the master's rack with a simulated slider and compare the force commanded with the force measured
     Follow(FollowArgs),
+    /// Lead the slave of a rig with a simulated master, and compare the force at its handle with what the slave's cell feels
+    Slave(SlaveArgs),
     /// Time the loop on this computer at several rates, idle and beside busy threads
     Bench(BenchArgs),
 }
@@ -43,6 +46,7 @@ impl HapticsCommand {
             Self::Run(args) => args.json,
             Self::Replay(args) => args.json,
             Self::Follow(args) => args.json,
+            Self::Slave(args) => args.json,
             Self::Bench(args) => args.json,
         }
     }
@@ -237,12 +241,17 @@ pub(super) fn run(command: &HapticsCommand, output: &Output) -> Result<(), Failu
         HapticsCommand::Run(args) => run_loop(args, output),
         HapticsCommand::Replay(args) => run_replay(args, output),
         HapticsCommand::Follow(args) => run_follow(args, output),
+        HapticsCommand::Slave(args) => slave::run(args, output),
         HapticsCommand::Bench(args) => run_bench(args, output),
     }
 }
 
 /// The body of a source, with what is to be known of it as notes.
-fn body(source: &Path, deepest: Depth, output: &Output) -> Result<ModifiedKelvin, Failure> {
+pub(super) fn body(
+    source: &Path,
+    deepest: Depth,
+    output: &Output,
+) -> Result<ModifiedKelvin, Failure> {
     let found = body_of(source).map_err(Failure::usage)?;
     let notes = found.notes.iter().cloned();
     notes

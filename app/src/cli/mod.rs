@@ -32,6 +32,7 @@ mod run;
 mod scene;
 mod select;
 mod shell;
+mod slave;
 mod trade;
 mod verdict;
 mod wired;

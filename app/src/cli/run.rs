@@ -6,15 +6,17 @@ use super::output::Output;
 use super::programme;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
+use crate::report::haptics::slave_text;
 use clap::Args;
 use palpate_drivers::Rig;
 use palpate_protocols::base::FoundBase;
 use palpate_protocols::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_protocols::engine::{EndingKind, Operator};
+use palpate_protocols::haptics::slave::{SlaveLeader, Slaved};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_protocols::runner::{
-    AfterStop, Answers, Labels, Request, RunRequest, RunView, Runner, Snapshot, StartError,
+    AfterStop, Answers, Labels, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
     TimeScale, wall_now,
 };
 use palpate_sessions::recover::examine;
@@ -22,9 +24,9 @@ use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
+use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Probe that is written down where nobody says which.
@@ -156,6 +158,8 @@ struct RunReport {
     late_worst_s: Option<f64>,
     late_given_up_s: Option<f64>,
     live: Option<palpate_model::fit::LiveEstimate>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    slave: Option<Slaved>,
 }
 
 /// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
@@ -187,14 +191,18 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
             ))
         })?;
     }
-    carry_out(written.plan, bench, how, labels, output)
+    carry_out(written.plan, bench, how, labels, None, output)
 }
 
-fn carry_out(
+/// What leads the slave of a run, if it has one.
+pub(super) type Slave = Arc<Mutex<SlaveLeader>>;
+
+pub(super) fn carry_out(
     plan: Plan,
     bench: OpenRig,
     how: &HowArgs,
     labels: Labels,
+    slave: Option<Slave>,
     output: &Output,
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
@@ -213,6 +221,7 @@ fn carry_out(
         to_acknowledge: gate.to_acknowledge(),
         after_stop,
         answers,
+        leader: slave.clone().map(|slave| slave as Leader),
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(
@@ -251,7 +260,7 @@ fn carry_out(
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed("the runner ended without a run"));
     };
-    report(view, output)
+    report(view, slave.as_ref(), output)
 }
 
 /// What today's daily check of the rig says to a plan.
@@ -294,7 +303,7 @@ pub(super) fn execute(
 }
 
 /// Who and what, as told by the arguments.
-fn labels(args: &HowArgs) -> Result<Labels, Failure> {
+pub(super) fn labels(args: &HowArgs) -> Result<Labels, Failure> {
     let mut labels = Labels {
         operator: args.operator.clone(),
         specimen: args.specimen.clone(),
@@ -374,7 +383,7 @@ fn progress_text(view: &RunView) -> String {
     )
 }
 
-fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
+fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), Failure> {
     let Some(outcome) = &view.outcome else {
         return Err(Failure::failed("the run did not end"));
     };
@@ -384,7 +393,7 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         None => view.samples,
     };
     let report = RunReport {
-        command: "run",
+        command: slave.map_or("run", |_| "haptics-slave"),
         plan: view.plan_name.clone(),
         session: view.folder.clone(),
         ending: outcome.ending.name(),
@@ -401,6 +410,14 @@ fn report(view: &RunView, output: &Output) -> Result<(), Failure> {
         late_worst_s: view.lateness.map(|late| late.worst.0),
         late_given_up_s: view.lateness.map(|late| late.given_up.0),
         live: view.live.clone(),
+        slave: slave.and_then(|slave| {
+            let leader = slave.lock().unwrap_or_else(PoisonError::into_inner);
+            leader
+                .failure()
+                .iter()
+                .for_each(|reason| output.note(&format!("nothing led the slave: {reason}")));
+            leader.slaved()
+        }),
     };
     if let Some(late) = report.late_given_up_s.filter(|late| *late > 0.0) {
         output.note(&format!(
@@ -447,6 +464,7 @@ fn run_text(report: &RunReport) -> String {
     if let Some(peak) = report.force_peak_n {
         lines.push(format!("peak force {peak:.3} N"));
     }
+    lines.extend(report.slave.iter().map(slave_text));
     if let (Some(verdict), Some(reason)) = (report.verdict, &report.verdict_reason) {
         lines.push(format!("{verdict}: {reason}"));
     }

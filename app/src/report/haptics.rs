@@ -13,6 +13,7 @@ use palpate_model::haptics::check::CheckSample;
 use palpate_model::haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
+use palpate_protocols::haptics::slave::{Difference, MasterLoop, Slaved};
 use palpate_protocols::haptics::timing::Spread;
 
 /// A check in words.
@@ -102,6 +103,54 @@ pub fn run_text(paced: &Paced) -> String {
     let mut lines = vec![format!("priority: {}", paced.priority)];
     lines.extend(table(std::slice::from_ref(paced)));
     lines.extend(paced.recorded.map(|recorded| recorded.words()));
+    lines.join("\n")
+}
+
+/// A slave that followed, in words.
+#[must_use]
+pub fn slave_text(slaved: &Slaved) -> String {
+    let less = |one: &Difference| format!("{:.3} N rms, {:.3} N at most", one.rms_n, one.worst_n);
+    let mut lines = vec![
+        format!(
+            "slave: down to {:.3} mm; contact changed {} times",
+            slaved.depth_max_mm, slaved.contact_changes
+        ),
+        format!(
+            "greatest force: {:.3} N at the handle, {:.3} N of the model where the slave is, {:.3} N of its cell",
+            slaved.handle_max_n, slaved.model_max_n, slaved.cell_max_n
+        ),
+        format!(
+            "the model where the slave is less the cell: {} (the body is not the specimen)",
+            less(&slaved.model_less_cell)
+        ),
+        format!(
+            "the handle less the cell: {} (that, the guard and the lag)",
+            less(&slaved.handle_less_cell)
+        ),
+    ];
+    let behind = slaved.lag_mm;
+    let late = slaved.lag_ms.map_or(String::new(), |lag| {
+        format!(", {:.0} ms, {:.0} ms at worst", lag.median, lag.worst)
+    });
+    lines.push(format!(
+        "lag of the slave: {:.3} mm, {:.3} mm at worst{late}",
+        behind.median, behind.worst
+    ));
+    if let Some(through) = slaved.damping_through_slave {
+        lines.push(format!(
+            "damping: the device has {:.1} N s/m and needs {:.1} at that depth; with its force through the slave it would need {through:.1}, so the force is that of the model at the handle",
+            slaved.damping_has,
+            slaved.damping_needed.max(0.0)
+        ));
+    }
+    if let Some(MasterLoop { priority, kept }) = &slaved.master_loop {
+        lines.push(format!(
+            "the master's loop: {} ticks, 999 of 1000 late by {:.1} ms at most, {} missed; priority {priority}",
+            kept.late.count,
+            1e3 * kept.late.p99_9.0,
+            kept.missed
+        ));
+    }
     lines.join("\n")
 }
 

@@ -157,7 +157,7 @@ fn remark(phase: Phase, parameters: &[Parameter]) -> Option<String> {
         | Phase::Rest => "the probe has not indented",
         Phase::Ramp => "more of the ramp is needed",
         Phase::Hold => "more of the hold is needed",
-        Phase::Creep | Phase::Sine => "the live fit follows ramps and holds",
+        Phase::Creep | Phase::Sine | Phase::Follow => "the live fit follows ramps and holds",
         Phase::Unload
         | Phase::Retract
         | Phase::Stopped

@@ -223,3 +223,71 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
         stderr(&taken)
     );
 }
+
+#[test]
+fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
+    let at = tempfile::tempdir().unwrap();
+    let words = |out| {
+        [
+            "haptics",
+            "slave",
+            "thesis",
+            "--seconds",
+            "12",
+            "--depth",
+            "6",
+            "--profile",
+            "ideal",
+            "--time-scale",
+            "max",
+            "--out",
+            out,
+            "--json",
+        ]
+    };
+    let told = json(&palpate(at.path(), &words("one")));
+    assert_eq!(told["command"], "haptics-slave", "{told}");
+    assert_eq!(told["ending"], "finish", "{told}");
+    assert_eq!(told["verdict"], "valid", "{told}");
+    let slave = &told["slave"];
+    let number = |name: &str| slave[name].as_f64().unwrap_or(f64::NAN);
+    assert!(
+        number("depth_max_mm") > 2.0 && number("depth_max_mm") < 6.0 + 1e-9,
+        "{told}"
+    );
+    assert!(number("cell_max_n") > 0.05, "{told}");
+    assert!(slave["lag_ms"]["median"].as_f64().unwrap() > 20.0, "{told}");
+    // The same again is the same, but for the folder.
+    let again = json(&palpate(at.path(), &words("two")));
+    assert_eq!(again["slave"], told["slave"]);
+    let replayed = palpate(at.path(), &["replay", "one"]);
+    assert_eq!(replayed.status.code(), Some(0), "{}", stderr(&replayed));
+    let fitted = json(&palpate(at.path(), &["fit", "one", "--json"]));
+    assert!(fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.8), "{fitted}");
+    // The preview moves nothing and names the bounds.
+    let preview = palpate(
+        at.path(),
+        &["haptics", "slave", "thesis", "--depth", "6", "--preview"],
+    );
+    assert!(
+        stdout(&preview).contains("no deeper than 6"),
+        "{}",
+        stdout(&preview)
+    );
+    for bad in [
+        ["--depth", "0"],
+        ["--depth", "500"],
+        ["--speed", "nan"],
+        ["--speed", "21"],
+        ["--seconds", "4000"],
+        ["--rig", "nowhere"],
+    ] {
+        let out = palpate(
+            at.path(),
+            &[&["haptics", "slave", "thesis"], &bad[..]].concat(),
+        );
+        assert_eq!(out.status.code(), Some(2), "{bad:?} {}", stderr(&out));
+    }
+    let out = palpate(at.path(), &["haptics", "slave", "nothing-there"]);
+    assert_eq!(out.status.code(), Some(2), "{}", stderr(&out));
+}

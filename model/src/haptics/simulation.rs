@@ -176,21 +176,25 @@ impl Simulation {
 
     /// One tick of everything.
     pub fn tick(&mut self) -> SimulationTick {
+        let tick = self.tick_with(self.cell, true);
+        // The slave is where it was sent by the end of the tick, and its cell feels the specimen there.
+        self.cell = self.specimen.tick(tick.snapshot.depth).force;
+        tick
+    }
+
+    /// One tick with a slave elsewhere, whose cell felt this last, and with force only if it is wanted.
+    pub fn tick_with(&mut self, cell: Newtons, is_on: bool) -> SimulationTick {
         let Sensed { counts, .. } = self.plant.sense();
         let input = Input {
             counts,
             elapsed: self.away + 1,
-            cell: self.cell,
+            cell,
             slave_pulses: None,
-            is_on: true,
+            is_on,
         };
-        let output = self.system.tick(&input);
         self.away = 0;
-        self.last = output;
-        // The slave is where it was sent by the end of the tick, and its cell feels the specimen there.
-        let depth = self.system.snapshot().depth;
-        self.cell = self.specimen.tick(depth).force;
-        self.command = Command::Drive(self.torque.drive(output.bias));
+        self.last = self.system.tick(&input);
+        self.command = Command::Drive(self.torque.drive(self.last.bias));
         self.moved(input)
     }
 

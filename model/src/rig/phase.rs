@@ -75,6 +75,8 @@ phases! {
     Paused = 18, "paused";
     /// Not known: the sample was imported from another program's file.
     Imported = 19, "imported";
+    /// Depth follows a lead from outside, such as the master of a master-slave system.
+    Follow = 20, "follow";
 }
 
 impl fmt::Display for Phase {

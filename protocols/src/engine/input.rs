@@ -38,6 +38,12 @@ pub enum Input {
     },
     /// The live fit has a new answer. It enters only here, so a replay decides from the record.
     LiveFit(LiveEstimate),
+    /// Where a step that follows is to go now: a depth from contact, or none where what leads gave no number. It
+    /// enters only here, so a replay decides from the record.
+    Lead {
+        /// The depth.
+        depth: Option<Depth>,
+    },
     /// No sample arrived for a while; time passed.
     Tick,
 }
@@ -188,6 +194,11 @@ pub enum Record {
         wanted: f64,
         /// Time at depth so far.
         held: Seconds,
+    },
+    /// A lead stopped coming: the axis stops where it is.
+    LeadLost {
+        /// For how long none had come.
+        silent: Seconds,
     },
     /// The force hardly changes any more: the hold ends before its planned duration.
     HoldSteady {
@@ -435,6 +446,10 @@ impl fmt::Display for Record {
                 parameter.name(),
                 percent(*relative),
                 percent(*wanted)
+            ),
+            Self::LeadLost { silent } => write!(
+                f,
+                "nothing has led the slave for {silent:.1}; it stops, and the step ends unless a lead comes"
             ),
             Self::HoldSteady {
                 slope_n_per_s,

@@ -9,6 +9,7 @@ mod between;
 mod contact;
 mod context;
 mod creep;
+mod follow;
 mod hold;
 mod home;
 mod input;

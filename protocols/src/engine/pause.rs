@@ -26,7 +26,8 @@ fn kind(active: &Active, step: Option<&Step>) -> Kind {
             Kind::Wait
         }
         Active::SelfTest(_) | Active::Tare(_) | Active::Weigh(_) => Kind::Complete,
-        Active::Home(_) | Active::Contact(_) | Active::Base(_) => Kind::Repeat,
+        // What leads may be elsewhere by then, and the slave goes there.
+        Active::Home(_) | Active::Contact(_) | Active::Base(_) | Active::Follow(_) => Kind::Repeat,
         Active::Load(_) => Kind::Measure("an interrupted indentation is another experiment"),
         Active::Move => match step {
             Some(Step::Ramp { .. }) => {

@@ -3,6 +3,7 @@
 use super::base::BaseSearch;
 use super::contact::ContactSearch;
 use super::creep::Creeping;
+use super::follow::Following;
 use super::hold::Holding;
 use super::home::Homing;
 use super::input::{EndingKind, Outcome};
@@ -128,6 +129,7 @@ pub(super) enum Active {
     },
     Load(Loading),
     Creep(Creeping),
+    Follow(Following),
     Weigh(Box<Weighing>),
     Prompt {
         deadline: Nanos,
@@ -269,7 +271,12 @@ impl State {
         let planned = self.config.plan.steps.get(self.step_index);
         let cycle = planned.map_or(0, |planned| planned.cycle);
         match self.phase {
-            Phase::Ramp | Phase::Hold | Phase::Unload | Phase::Creep | Phase::Sine => cycle.max(1),
+            Phase::Ramp
+            | Phase::Hold
+            | Phase::Unload
+            | Phase::Creep
+            | Phase::Sine
+            | Phase::Follow => cycle.max(1),
             Phase::Rest | Phase::Weigh => cycle,
             _ => 0,
         }

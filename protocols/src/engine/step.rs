@@ -4,6 +4,7 @@ use super::base::BaseSearch;
 use super::contact::ContactSearch;
 use super::context::{Context, Progress, outside_travel};
 use super::creep::Creeping;
+use super::follow::{self, Following};
 use super::hold::{self, Holding};
 use super::home::Homing;
 use super::input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record};
@@ -46,6 +47,7 @@ pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) 
             cx.state.live = Some(estimate);
             hold::on_live_fit(&mut cx);
         }
+        Input::Lead { depth } => follow::on_lead(&mut cx, depth),
     }
     (state, effects)
 }
@@ -120,6 +122,7 @@ fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
         Active::Rest { .. } => Progress::Continue,
         Active::Load(load) => load.on_reading(cx),
         Active::Creep(creep) => creep.on_reading(cx, reading),
+        Active::Follow(following) => following.on_reading(cx, reading),
         Active::Weigh(weighing) => weighing.on_reading(cx, reading),
         Active::Prompt { deadline } => prompt::on_time(cx, deadline),
     };
@@ -216,6 +219,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
         Step::LoadTo(plan) => Active::Load(Loading::begin(cx, plan)?),
         Step::Hold { duration, rate, .. } => Active::Hold(Holding::begin(cx, duration, rate)),
         Step::HoldForce(plan) => Active::Creep(Creeping::begin(cx, plan)?),
+        Step::Follow(plan) => Active::Follow(Following::begin(cx, plan)?),
         Step::Rest { duration } => Active::Rest {
             until_tick: cx.state.tick + cx.state.ticks(duration),
         },

@@ -284,6 +284,11 @@ impl Measuring {
             | Step::Rest { duration: wanted } => {
                 add("duration", "s", wanted.0, duration, of_duration);
             }
+            Step::Follow(follow) => {
+                // The move under way is braked first.
+                let allowed = of_duration + follow.speed.0 / self.acceleration;
+                add("duration", "s", follow.duration.0, duration, allowed);
+            }
             _ => {}
         }
         remark

@@ -70,9 +70,12 @@ impl TimeUse {
             | Phase::CheckHome
             | Phase::Tare
             | Phase::Contact => &mut self.set_up_s,
-            Phase::Ramp | Phase::Unload | Phase::Sine | Phase::Retract | Phase::Jog => {
-                &mut self.motion_s
-            }
+            Phase::Ramp
+            | Phase::Unload
+            | Phase::Sine
+            | Phase::Follow
+            | Phase::Retract
+            | Phase::Jog => &mut self.motion_s,
             Phase::Hold | Phase::Creep | Phase::Weigh => &mut self.hold_s,
             Phase::Rest | Phase::Prompt | Phase::Paused | Phase::Stopped | Phase::Ended => {
                 &mut self.waiting_s
@@ -208,6 +211,12 @@ impl FidelityMeter {
                 self.current = None;
                 self.remark(record.to_string());
             }
+            Record::LeadLost { .. } => {
+                if let Some(current) = &mut self.current {
+                    current.has_no_duration();
+                }
+                self.remark(record.to_string());
+            }
             Record::MonitorTripped { .. } | Record::InterlockTripped { .. } => {
                 self.remark(record.to_string());
             }
@@ -239,7 +248,13 @@ impl FidelityMeter {
         self.found.samples += 1;
         let is_measuring = matches!(
             row.phase,
-            Phase::Ramp | Phase::Hold | Phase::Creep | Phase::Sine | Phase::Unload | Phase::Weigh
+            Phase::Ramp
+                | Phase::Hold
+                | Phase::Creep
+                | Phase::Sine
+                | Phase::Follow
+                | Phase::Unload
+                | Phase::Weigh
         );
         self.found.measured += u64::from(is_measuring);
         let before = self.last.map_or(0, |last| last.host.0);

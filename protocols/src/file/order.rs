@@ -133,9 +133,11 @@ impl Known {
             Step::CheckHome { .. } => self.is_inside = false,
             Step::Tare { .. } => self.tare = true,
             Step::FindContact(_) | Step::FindBase(_) => self.contact = true,
-            Step::Ramp { .. } | Step::LoadTo(_) | Step::HoldForce(_) | Step::Sine(_) => {
-                self.is_inside = true
-            }
+            Step::Ramp { .. }
+            | Step::LoadTo(_)
+            | Step::HoldForce(_)
+            | Step::Sine(_)
+            | Step::Follow(_) => self.is_inside = true,
             Step::Unload { .. } | Step::Retract { .. } => self.is_inside = false,
             // Another specimen has its surface elsewhere. Without one there is only the base to find.
             Step::Prompt(prompt) => match prompt.hand {
@@ -166,6 +168,7 @@ pub fn word(step: &Step) -> &'static str {
         Step::LoadTo(_) => "load",
         Step::HoldForce(_) => "hold-force",
         Step::Sine(_) => "sine",
+        Step::Follow(_) => "follow",
         Step::Rest { .. } => "rest",
         Step::Prompt(_) => "prompt",
         Step::Weigh(_) => "weigh",

@@ -9,6 +9,7 @@ mod led;
 pub mod scene;
 pub mod scene_file;
 mod simulated;
+pub mod slave;
 mod stylus;
 pub mod taped;
 pub mod timing;

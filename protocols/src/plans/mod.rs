@@ -4,6 +4,7 @@ pub mod hold_rate;
 pub mod hold_until;
 pub mod monitor;
 pub mod ramp_hold;
+mod slave;
 pub mod step;
 
 use palpate_model::rig::Limits;
@@ -17,7 +18,8 @@ pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::RampHold;
 pub use step::{
-    FindBase, FindContact, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step, Weigh,
+    FindBase, FindContact, Follow, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step,
+    Weigh,
 };
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].

@@ -9,6 +9,30 @@ use serde::{Deserialize, Serialize};
 /// contact position and well clear of the tissue that the probe draws after it.
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
+/// The way out of the tissue behind a measurement.
+pub(super) const LEAVE: Step = Step::Retract {
+    speed: MmPerS(6.0),
+    clearance_mm: 10.0,
+};
+
+/// What comes before a measurement: self-test, home, tare and contact.
+pub(super) fn approach() -> Vec<Step> {
+    vec![
+        Step::SelfTest {
+            duration: Seconds(0.5),
+        },
+        Step::Home {
+            speed: MmPerS(9.0),
+            touch_speed: MmPerS(0.3),
+        },
+        // Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
+        Step::Tare {
+            duration: Seconds(4.0),
+        },
+        Step::FindContact(FindContact::default()),
+    ]
+}
+
 /// What a technician chooses for a ramp and hold.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RampHold {
@@ -43,19 +67,8 @@ impl RampHold {
     /// The plan, from self-test to retract.
     #[must_use]
     pub fn plan(&self) -> Plan {
-        let mut steps = vec![
-            Step::SelfTest {
-                duration: Seconds(0.5),
-            },
-            Step::Home {
-                speed: MmPerS(9.0),
-                touch_speed: MmPerS(0.3),
-            },
-            // Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
-            Step::Tare {
-                duration: Seconds(4.0),
-            },
-            Step::FindContact(FindContact::default()),
+        let mut steps = approach();
+        steps.extend([
             Step::Ramp {
                 speed: self.speed,
                 depth: self.depth,
@@ -65,15 +78,12 @@ impl RampHold {
                 until: self.until,
                 rate: None,
             },
-        ];
+        ]);
         steps.extend(self.unload.map(|speed| Step::Unload {
             speed,
             clearance_mm: UNLOAD_CLEARANCE_MM,
         }));
-        steps.push(Step::Retract {
-            speed: MmPerS(6.0),
-            clearance_mm: 10.0,
-        });
+        steps.push(LEAVE);
         Plan::of("ramp-hold", 1, steps)
     }
 }

@@ -53,6 +53,8 @@ pub enum Step {
     HoldForce(HoldForce),
     /// Follow a sine deeper than where the probe stands.
     Sine(Sine),
+    /// Go where a lead from outside says, such as the master of a master-slave system.
+    Follow(Follow),
     /// Stay where the probe is and let the tissue recover.
     Rest {
         /// How long.
@@ -195,6 +197,17 @@ impl Sine {
     }
 }
 
+/// A slave that follows a lead, within bounds that no lead can move.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Follow {
+    /// How long.
+    pub duration: Seconds,
+    /// Fastest move.
+    pub speed: MmPerS,
+    /// Depth beyond which it does not follow.
+    pub depth_max: Depth,
+}
+
 /// A question to a person.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Prompt {
@@ -322,6 +335,7 @@ impl Step {
             Self::LoadTo(_) => Phase::Ramp,
             Self::HoldForce(_) => Phase::Creep,
             Self::Sine(_) => Phase::Sine,
+            Self::Follow(_) => Phase::Follow,
             Self::Rest { .. } => Phase::Rest,
             Self::Prompt(_) => Phase::Prompt,
             Self::Weigh(_) => Phase::Weigh,
@@ -342,6 +356,7 @@ impl Step {
                 | Self::LoadTo(_)
                 | Self::HoldForce(_)
                 | Self::Sine(_)
+                | Self::Follow(_)
                 | Self::Unload { .. }
         )
     }
@@ -356,7 +371,8 @@ impl Step {
             | Self::Ramp { .. }
             | Self::LoadTo(_)
             | Self::HoldForce(_)
-            | Self::Sine(_) => true,
+            | Self::Sine(_)
+            | Self::Follow(_) => true,
             Self::SelfTest { .. }
             | Self::Home { .. }
             | Self::CheckHome { .. }
@@ -381,6 +397,7 @@ impl Step {
                 | Self::LoadTo(_)
                 | Self::HoldForce(_)
                 | Self::Sine(_)
+                | Self::Follow(_)
                 | Self::Unload { .. }
                 | Self::Retract { .. }
                 | Self::CheckHome { .. }

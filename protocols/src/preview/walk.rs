@@ -217,6 +217,28 @@ impl Walk<'_> {
                 let secs = self.secs(ticks + self.answer_ticks());
                 Span(secs, secs, self.is_answer_exact())
             }
+            Step::Follow(follow) => {
+                self.check_contact();
+                self.check_speed(follow.speed);
+                self.check_depth(follow.depth_max);
+                self.check_span(follow.duration);
+                let (duration, way) = (follow.duration.0, follow.depth_max.0);
+                // Where it goes is not known before; what bounds it is.
+                let there = self.move_secs(way - self.expected.depth(), follow.speed);
+                self.expected.go(phase, way, there.min(duration));
+                self.expected.stay(phase, (duration - there).max(0.0));
+                self.reach = Reach {
+                    low: -travel,
+                    high: way,
+                };
+                self.note(format!(
+                    "the slave goes where it is led, at {} at most and no deeper than {}",
+                    follow.speed, follow.depth_max
+                ));
+                // The move under way is braked first.
+                let braking = follow.speed.0 / self.rig.acceleration.0;
+                Span(duration, duration + braking + SETTLE_SECS, false)
+            }
             Step::Unload {
                 speed,
                 clearance_mm,

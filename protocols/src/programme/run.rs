@@ -254,6 +254,7 @@ impl Work<'_> {
                 Answers::Confirm => AfterStop::Close,
             },
             answers: self.laboratory.answers,
+            leader: None,
         };
         let later = self.time_after(&place).map_err(refused)?;
         self.journal.push(&Entry::Begun {

@@ -2,6 +2,7 @@
 
 use super::board::{Board, LogState};
 use super::clock::wall_now;
+use super::leading::{LeadFeed, Leader};
 use super::live_feed::LiveFeed;
 use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
@@ -42,6 +43,7 @@ pub(super) struct ActiveRun {
     told_given_up: Seconds,
     order: u64,
     pub(super) live: LiveFeed,
+    lead: LeadFeed,
     /// `None` at full pace, where the computer cannot be late.
     watch: Option<HostWatch>,
     time_use: BTreeMap<&'static str, u64>,
@@ -83,6 +85,7 @@ impl ActiveRun {
             told_given_up: Seconds(0.0),
             order: 0,
             live,
+            lead: LeadFeed::new(None),
             watch,
             time_use: BTreeMap::new(),
             log_failure: None,
@@ -94,6 +97,12 @@ impl ActiveRun {
             run.log_health(begin);
         }
         run
+    }
+
+    /// The same, with what leads its step that follows.
+    pub fn led_by(mut self, leader: Option<Leader>) -> Self {
+        self.lead = LeadFeed::new(leader);
+        self
     }
 
     /// The engine's state, except inside [`Self::feed`].
@@ -153,6 +162,7 @@ impl ActiveRun {
             self.log_row(now, &reading, &state);
         }
         let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
+        let lead = reading.and_then(|reading| self.lead.push(now, &reading, &state));
         if let Some(text) = self.live.take_failure() {
             self.board.note(text.clone(), true);
             let told = Told::Event { text };
@@ -172,6 +182,9 @@ impl ActiveRun {
         }
         if let Some(estimate) = estimate {
             self.feed(now, Input::LiveFit(estimate), send);
+        }
+        if let Some(depth) = lead {
+            self.feed(now, Input::Lead { depth }, send);
         }
         self.after_feed(now, send);
     }

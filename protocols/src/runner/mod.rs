@@ -7,6 +7,7 @@
 mod active_run;
 mod board;
 mod clock;
+mod leading;
 mod live_feed;
 mod main_loop;
 mod snapshot;
@@ -18,6 +19,7 @@ mod watch;
 pub(crate) use active_run::to_json;
 pub(crate) use board::{Board, LogState};
 pub use clock::{Metronome, Stopwatch, TimeScale, driver_clock, wall_now};
+pub use leading::{Felt, Leader, Leading};
 pub(crate) use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};
 pub use palpate_sessions::Labels;

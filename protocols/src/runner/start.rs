@@ -2,6 +2,7 @@
 
 use super::active_run::ActiveRun;
 use super::clock::wall_now;
+use super::leading::Leader;
 use super::watch::HostWatch;
 use crate::engine::{Config, ENGINE_VERSION};
 use crate::plans::Plan;
@@ -59,6 +60,8 @@ pub struct RunRequest {
     pub after_stop: AfterStop,
     /// Who answers prompts.
     pub answers: Answers,
+    /// What leads a step that follows; without it such a step waits for a lead in vain and ends.
+    pub leader: Option<Leader>,
 }
 
 /// A run did not start.
@@ -170,7 +173,7 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
         plan: request.plan.clone(),
         is_homed: bench.is_homed,
     };
-    Ok(ActiveRun::new(
+    let run = ActiveRun::new(
         config,
         preview,
         (writer, session_id),
@@ -178,5 +181,6 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
         bench.origin,
         (request.after_stop, request.answers),
         bench.watch,
-    ))
+    );
+    Ok(run.led_by(request.leader.clone()))
 }

@@ -39,6 +39,7 @@ fn request(out: &Path) -> RunRequest {
         to_acknowledge: Vec::new(),
         after_stop: AfterStop::Close,
         answers: Answers::Confirm,
+        leader: None,
     }
 }
 

@@ -240,6 +240,7 @@ impl ProtocolForm {
             to_acknowledge: Vec::new(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
+            leader: None,
         })
     }
 
@@ -329,6 +330,7 @@ impl ProtocolForm {
             to_acknowledge: bench.to_acknowledge.clone(),
             after_stop: AfterStop::Wait,
             answers: Answers::Operator,
+            leader: None,
         })
     }
 

@@ -1,0 +1,258 @@
+//! How far a slave is behind, and how well the force at the handle agrees with what its cell felt.
+
+use super::{FILTER_MS, SlaveSettings};
+use crate::haptics::timing::Kept;
+use crate::runner::Felt;
+use palpate_model::Nanos;
+use palpate_model::haptics::margin::{Device, Watch};
+use palpate_model::signal::MovingMean;
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use serde::Serialize;
+use std::collections::VecDeque;
+
+/// The lag is taken once a millisecond: a move takes tens of them.
+const LAG_EVERY: Nanos = Nanos::from_millis(1);
+
+/// Places of the master kept to look for the slave's: five seconds, after which a slave without a lead has ended.
+const PLACES_MAX: usize = 5000;
+
+/// Lags kept: an hour of them.
+const LAGS_MAX: usize = 3_600_000;
+
+/// Middle and worst of something measured many times.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Spread {
+    /// Half are below.
+    pub median: f64,
+    /// The largest.
+    pub worst: f64,
+}
+
+impl Spread {
+    fn of(values: &[f32]) -> Option<Self> {
+        let mut sorted = values.to_vec();
+        sorted.sort_unstable_by(f32::total_cmp);
+        Some(Self {
+            median: f64::from(*sorted.get(sorted.len() / 2)?),
+            worst: f64::from(*sorted.last()?),
+        })
+    }
+}
+
+/// How two forces differ, in N.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
+pub struct Difference {
+    /// The largest either way.
+    pub worst_n: f64,
+    /// Root of the mean square.
+    pub rms_n: f64,
+}
+
+/// What came of a slave that followed.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Slaved {
+    /// Samples taken.
+    pub samples: u64,
+    /// Greatest depth of the slave in mm.
+    pub depth_max_mm: f64,
+    /// Greatest force commanded at the handle, the mean of 50 ms as of all forces here, in N.
+    pub handle_max_n: f64,
+    /// Greatest force of the model at the depth of the slave.
+    pub model_max_n: f64,
+    /// Greatest force of the slave's cell.
+    pub cell_max_n: f64,
+    /// The model at the depth of the slave, less the cell: the body is not the specimen.
+    pub model_less_cell: Difference,
+    /// The handle less the cell: the same, and the lag of the slave.
+    pub handle_less_cell: Difference,
+    /// How long ago the master was where the slave is, in ms; none if it hardly moved.
+    pub lag_ms: Option<Spread>,
+    /// How far the slave is from the master, in mm.
+    pub lag_mm: Spread,
+    /// How often the slave's cell told contact or its loss.
+    pub contact_changes: u64,
+    /// Damping that the device would need at the greatest depth if its force came through the slave, at the median lag,
+    /// in N s/m.
+    pub damping_through_slave: Option<f64>,
+    /// Damping it needs there as it is: the model at the master's place, in N s/m.
+    pub damping_needed: f64,
+    /// Damping it has, in N s/m.
+    pub damping_has: f64,
+    /// The master's loop; none where it ticks with the samples.
+    pub master_loop: Option<MasterLoop>,
+}
+
+/// A master's loop in real time.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct MasterLoop {
+    /// The priority that the system granted, in words.
+    pub priority: String,
+    /// How it kept its time.
+    #[serde(flatten)]
+    pub kept: Kept,
+}
+
+/// A sum of squares and the largest.
+#[derive(Clone, Copy, Debug, Default)]
+struct Differences {
+    worst: f64,
+    squares: f64,
+    count: u64,
+}
+
+impl Differences {
+    fn push(&mut self, difference: f64) {
+        self.worst = self.worst.max(difference.abs());
+        self.squares += difference * difference;
+        self.count += 1;
+    }
+
+    fn told(&self) -> Difference {
+        Difference {
+            worst_n: self.worst,
+            rms_n: (self.squares / self.count.max(1) as f64).sqrt(),
+        }
+    }
+}
+
+/// Takes a slave sample by sample.
+#[derive(Debug)]
+pub(super) struct Meter {
+    body: ModifiedKelvin,
+    watch: Watch,
+    depth_max: Depth,
+    mm_per_pulse: f64,
+    /// The body under the slave.
+    model: KelvinState,
+    /// Handle, model, cell: all averaged alike, so that all are as late.
+    filters: [MovingMean; 3],
+    maxima: [f64; 3],
+    model_less_cell: Differences,
+    handle_less_cell: Differences,
+    at: Option<Nanos>,
+    lag_at: Option<Nanos>,
+    places: VecDeque<(Nanos, f64)>,
+    lags_mm: Vec<f32>,
+    lags_ms: Vec<f32>,
+    samples: u64,
+    deepest: f64,
+    contact_changes: u64,
+}
+
+impl Meter {
+    pub fn new(settings: &SlaveSettings) -> Self {
+        let rig = &settings.rig;
+        let filter = MovingMean::new(rig.means_in(FILTER_MS) * rig.samples_per_ms() as usize);
+        Self {
+            body: settings.body,
+            watch: settings.master.system.watch(),
+            depth_max: settings.depth_max,
+            mm_per_pulse: rig.mm_per_pulse,
+            model: KelvinState::at_rest(),
+            filters: [filter.clone(), filter.clone(), filter],
+            maxima: [0.0; 3],
+            model_less_cell: Differences::default(),
+            handle_less_cell: Differences::default(),
+            at: None,
+            lag_at: None,
+            places: VecDeque::new(),
+            lags_mm: Vec::new(),
+            lags_ms: Vec::new(),
+            samples: 0,
+            deepest: f64::NEG_INFINITY,
+            contact_changes: 0,
+        }
+    }
+
+    pub fn push(&mut self, felt: &Felt, master: Depth, handle: Newtons, contact_changes: u64) {
+        self.samples += 1;
+        self.contact_changes = contact_changes;
+        self.deepest = self.deepest.max(felt.depth.0);
+        let passed = felt.at.since(self.at.unwrap_or(felt.at)).seconds();
+        self.at = Some(felt.at);
+        // Above the surface nothing presses, and the memory fades.
+        let pressed = Depth(felt.depth.0.max(0.0));
+        let model = self.model.step(&self.body, pressed, passed).0.max(0.0);
+        let forces = [handle.0, model, felt.force.0];
+        let mut means = [0.0; 3];
+        for (i, force) in forces.into_iter().enumerate() {
+            means[i] = self.filters[i].push(force);
+        }
+        // A mean of a few samples is noise.
+        if self.filters[2].is_full() {
+            for (most, mean) in self.maxima.iter_mut().zip(means) {
+                *most = most.max(mean);
+            }
+            let [handle, model, cell] = means;
+            self.model_less_cell.push(model - cell);
+            self.handle_less_cell.push(handle - cell);
+        }
+        let is_due = self
+            .lag_at
+            .is_none_or(|last| felt.at.since(last) >= LAG_EVERY);
+        if is_due {
+            self.lag_at = Some(felt.at);
+            self.take_lag(felt, master.0.min(self.depth_max.0));
+        }
+    }
+
+    /// Where the master was when it was where the slave is now: the last time it passed that place.
+    fn take_lag(&mut self, felt: &Felt, master: f64) {
+        if self.places.len() == PLACES_MAX {
+            self.places.pop_front();
+        }
+        self.places.push_back((felt.at, master));
+        if self.lags_mm.len() == LAGS_MAX {
+            return;
+        }
+        let behind = master - felt.depth.0;
+        self.lags_mm.push(behind.abs() as f32);
+        // Within a pulse it is there.
+        if behind.abs() <= self.mm_per_pulse {
+            return;
+        }
+        let mut before = self.places.iter().rev();
+        let passed = before.find(|(_, place)| (place - felt.depth.0) * behind <= 0.0);
+        if let Some((at, _)) = passed {
+            let lag: Seconds = felt.at.since(*at).seconds();
+            self.lags_ms.push((1e3 * lag.0) as f32);
+        }
+    }
+
+    pub fn slaved(&self) -> Option<Slaved> {
+        let lag_mm = Spread::of(&self.lags_mm)?;
+        let lag_ms = Spread::of(&self.lags_ms);
+        let [handle_max_n, model_max_n, cell_max_n] = self.maxima;
+        let at = Depth(self.deepest.max(0.0));
+        let period = self.watch.period.seconds().0;
+        let needed = |ticks: f64| {
+            let device = Device {
+                delay_ticks: ticks,
+                ..self.watch.device
+            };
+            let watch = Watch {
+                device,
+                ..self.watch
+            };
+            // N s/m as catalogues have it.
+            1e3 * watch.at(at, MmPerS(0.0)).needed
+        };
+        Some(Slaved {
+            samples: self.samples,
+            depth_max_mm: self.deepest,
+            handle_max_n,
+            model_max_n,
+            cell_max_n,
+            model_less_cell: self.model_less_cell.told(),
+            handle_less_cell: self.handle_less_cell.told(),
+            lag_ms,
+            lag_mm,
+            contact_changes: self.contact_changes,
+            damping_through_slave: lag_ms.map(|lag| needed(1e-3 * lag.median / period)),
+            damping_needed: needed(self.watch.device.delay_ticks),
+            damping_has: 1e3 * self.watch.device.damping,
+            master_loop: None,
+        })
+    }
+}
