@@ -26,6 +26,7 @@ pub mod scene_bench;
 pub mod select;
 pub mod task;
 pub mod touch;
+pub mod trail;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
