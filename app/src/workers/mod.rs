@@ -71,6 +71,11 @@ impl<T: Send + 'static> Job<T> {
         Ok(())
     }
 
+    /// Waits for the answer, if one is to come; none if its work failed.
+    pub fn wait(&mut self) -> Option<T> {
+        self.answer.take()?.recv().ok()
+    }
+
     /// The answer, once.
     pub fn poll(&mut self) -> Option<T> {
         match self.answer.as_ref()?.try_recv() {
