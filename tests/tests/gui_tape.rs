@@ -126,10 +126,10 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     });
     flow.click("Stop the loop");
     check_told(&mut flow, &folder, "force_n");
-    // Led elsewhere, the hand presses otherwise.
+    // Led away instead, the hand would not press.
     let whole = lines(&folder);
     let elsewhere = whole.iter().filter(|line| !line.starts_with("end"));
-    let elsewhere = elsewhere.map(|line| line.replace(",30.0,", ",20.0,"));
+    let elsewhere = elsewhere.map(|line| line.replace(",30.0,", ",-2.0,"));
     write(&folder, &elsewhere.collect::<Vec<_>>());
     flow.click("Replay it");
     hear(&mut flow, "was recorded as");
