@@ -29,6 +29,7 @@ use crate::theme;
 use crate::widgets::places::places;
 use crate::window::WindowOptions;
 use crate::workers::fit::{Refit, Refitter};
+use crate::workers::haptics_tape::is_tape;
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
 use crate::workers::recovery::Recovery;
@@ -39,6 +40,7 @@ use palpate_model::surface::SceneCurves;
 use palpate_model::trade::TradeCurves;
 use palpate_protocols::engine::Operator;
 use palpate_protocols::runner::{Request, RunRequest, Runner, Snapshot, StartError};
+use palpate_sessions::ticks::TICKS;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
@@ -375,18 +377,22 @@ impl WorkbenchApp {
                 Command::LoopStart => {
                     if self.loop_verdict().is_ok() {
                         self.screen = Screen::Haptics;
-                        self.haptics.start_loop();
+                        self.haptics.start_loop(ctx);
                     }
                 }
                 Command::LoopStop => self.haptics.stop_loop(),
                 Command::SceneStart => {
                     if self.scene_verdict().is_ok() {
                         self.screen = Screen::Scene;
-                        self.scene.start();
+                        self.scene.start(ctx);
                     }
                 }
                 Command::SceneStop => self.scene.stop(),
                 Command::OpenScene => self.scene.read(ctx),
+                Command::MeasureScene => {
+                    self.screen = Screen::Trade;
+                    self.trade.show_scene();
+                }
                 Command::Review(sessions) => {
                     self.screen = Screen::Review;
                     self.review.open(sessions, ctx);
@@ -555,6 +561,19 @@ impl WorkbenchApp {
         } else if !tables.is_empty() {
             self.screen = Screen::Library;
             self.catalog.take_files(&tables);
+        }
+        let (recordings, sessions): (Vec<_>, Vec<_>) = sessions
+            .into_iter()
+            .partition(|path| path.join(TICKS).is_file());
+        if let Some(folder) = recordings.first() {
+            // What is of neither is told to be so on the scene's.
+            if is_tape(folder).unwrap_or(false) {
+                self.screen = Screen::Haptics;
+                self.haptics.take_recording(folder);
+            } else {
+                self.screen = Screen::Scene;
+                self.scene.take_recording(folder);
+            }
         }
         if !sessions.is_empty() {
             // A log that was dropped stands for its session.
@@ -744,6 +763,8 @@ impl eframe::App for WorkbenchApp {
     }
 
     fn on_exit(&mut self) {
+        self.haptics.close();
+        self.scene.close();
         self.remember_last();
         if let Err(err) = self.settings.store() {
             let _ =

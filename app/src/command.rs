@@ -58,6 +58,8 @@ pub enum Command {
     SceneStop,
     /// Read the scene file whose path is typed; the built-in scene where none is.
     OpenScene,
+    /// Show where the curves of a scene are measured.
+    MeasureScene,
     /// Change between the light and the dark theme.
     SwitchTheme,
     /// Look at sessions on the review screen, instead of those there.

@@ -231,3 +231,34 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     assert!(flow.says(&format!("plan: {0} x {0} nodes", settings.nodes)));
     flow.click("Stop the scene");
 }
+
+#[test]
+fn a_missed_budget_is_told_before_anything_was_measured_and_a_button_leads_to_the_measurement() {
+    let mut flow = open();
+    let path = flow.folder.path().join("strict.toml");
+    // No computer makes a tick in a millionth of a microsecond.
+    let text = "name = \"strict\"\n[mesh]\nnodes = 51\n[tolerances]\ntick_us = 1e-6\n";
+    std::fs::write(&path, text).unwrap();
+    flow.type_into("file", &path.display().to_string());
+    flow.click("Open");
+    flow.wait("the file", |window| {
+        window.query_by_label("strict").is_some()
+    });
+    flow.click("Start the scene");
+    flow.wait("times", |window| {
+        let touch = window.state().scene().touch();
+        touch.is_some_and(|touch| touch.kept().work.count > 0)
+    });
+    flow.window.run_steps(2);
+    assert!(flow.says("over the budget of 0.000001 µs"));
+    // It is that of the scene that ran, whatever stands in the form.
+    flow.click("Stop the scene");
+    flow.click("Built in");
+    flow.wait("the usual scene", |window| {
+        window.query_by_label("thesis body").is_some()
+    });
+    flow.window.run_steps(2);
+    assert!(flow.says("500 µs") && flow.says("over the budget of 0.000001 µs"));
+    flow.click("Measure on Trade...");
+    assert!(flow.says("nothing measured on this machine yet") && flow.says("mm of error"));
+}

@@ -7,10 +7,9 @@ use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::path_dialog::FolderDialog;
-use crate::workers::recorded::{RecordedTicks, Replayed};
+use crate::workers::recorded::{Ended, Replayed, ended_words};
 use crate::workers::task::Task;
-use eframe::egui::{Label, RichText, Ui};
-use palpate_sessions::ticks::Recorded;
+use eframe::egui::{Context, Label, RichText, Ui};
 use std::path::{Path, PathBuf};
 
 /// How a recording is computed again.
@@ -23,45 +22,96 @@ pub(super) struct TapePanel {
     from: String,
     dialog: FolderDialog,
     refusal: Option<String>,
+    /// The window of a recording on its way, which is drawn again when that has ended.
+    recording: Option<Context>,
     /// The end of a recording, which waits for the disk.
-    ending: Job<Option<Result<Recorded, String>>>,
+    ending: Job<Ended>,
     told: Option<Result<String, String>>,
     task: Task<Replayed>,
 }
 
 impl TapePanel {
-    /// The folder that the next run is recorded in, if it is.
-    pub fn folder(&self) -> Option<PathBuf> {
+    /// Begins a recording with `start`, if a folder for the next run is named.
+    pub fn begin<R>(
+        &mut self,
+        ctx: &Context,
+        start: impl FnOnce(&Path) -> Result<R, String>,
+    ) -> Result<Option<R>, String> {
+        if self.ending.is_busy() {
+            return Err("the last recording is still being written; wait a moment".into());
+        }
+        self.told = None;
         let to = self.to.trim();
-        (!to.is_empty()).then(|| PathBuf::from(to))
-    }
-
-    /// A recording has begun.
-    pub fn begun(&mut self) {
+        if to.is_empty() {
+            return Ok(None);
+        }
+        let recorder = start(Path::new(to))?;
         // What is recorded can be replayed, and the next run needs a folder of its own.
         self.from = std::mem::take(&mut self.to);
-        self.told = Some(Ok("recording".to_owned()));
+        self.told = Some(Ok("every tick is recorded".to_owned()));
+        self.recording = Some(ctx.clone());
+        Ok(Some(recorder))
     }
 
-    /// Ends it on a thread; `work` gives what was recorded, if it was.
-    pub fn end(
-        &mut self,
-        work: impl FnOnce() -> Option<Result<Recorded, String>> + Send + 'static,
-    ) {
-        // The window is drawn at least once a second.
-        if let Err(err) = self.ending.start("recording-end", work, || ()) {
-            self.told = Some(Err(format!("the recording cannot be ended: {err}")));
+    /// Ends a loop, and on a thread its recording if it has one: nobody who stops a loop waits for a disk.
+    pub fn end(&mut self, work: impl FnOnce() -> Ended + Send + 'static) {
+        let Some(ctx) = self.recording.clone() else {
+            // Let go, the loop ends.
+            drop(work);
+            return;
+        };
+        let wake = move || ctx.request_repaint();
+        if self.ending.start("recording-end", work, wake).is_err() {
+            self.ended(None);
         }
+    }
+
+    fn ended(&mut self, ended: Ended) {
+        if self.recording.take().is_some() {
+            self.told = Some(match ended {
+                Some(ended) => ended.map(ended_words),
+                None => Err("the loop failed, and its recording was cut off".to_owned()),
+            });
+        }
+    }
+
+    /// The loop failed or did not begin: its recording, if it has one, gets no end.
+    pub fn cut_off(&mut self) {
+        // One that is being written out is of the loop before.
+        if !self.ending.is_busy() {
+            self.ended(None);
+        }
+    }
+
+    /// Waits until the last recording is written: for a window that closes.
+    pub fn settle(&mut self) {
+        if self.ending.is_busy() {
+            let ended = self.ending.wait().flatten();
+            self.ended(ended);
+        }
+    }
+
+    /// Takes the folder of a recording.
+    pub fn take(&mut self, folder: &Path) {
+        self.from = folder.display().to_string();
+    }
+
+    /// Whether a recording is computed again.
+    pub fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
     }
 
     /// Fetches answers that have come.
     pub fn poll(&mut self) {
         self.task.poll();
-        if let Some(Some(recorded)) = self.ending.poll() {
-            self.told = Some(recorded.map(|one| RecordedTicks::from(one).words()));
+        if self.ending.is_busy() {
+            let ended = self.ending.poll();
+            if !self.ending.is_busy() {
+                self.ended(ended.flatten());
+            }
         }
         if let Some(folder) = self.dialog.poll() {
-            self.from = folder.display().to_string();
+            self.take(&folder);
         }
     }
 

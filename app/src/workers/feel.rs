@@ -1,5 +1,6 @@
 //! The haptic loop as the window runs it: a thread of its own that ticks, and what was seen of it so far.
 
+use super::trail::{LOOK_S, forget_old};
 use palpate_model::haptics::Flags;
 use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
@@ -7,12 +8,6 @@ use palpate_protocols::haptics::taped::{LedRecorder, TapedLed};
 use palpate_protocols::haptics::timing::Kept;
 use palpate_protocols::haptics::{Beat, Lead, Led, TrailPoint};
 use std::collections::VecDeque;
-
-/// How much of the past is kept for the plots, in s.
-pub const PAST_S: f64 = 10.0;
-
-/// Between two looks at how the loop keeps its time, in s: numbers that change faster cannot be read.
-const LOOK_S: f64 = 0.5;
 
 /// For how long a cause of less force stays on the screen, in s.
 const CAUSE_S: f64 = 0.3;
@@ -73,13 +68,7 @@ impl Feel {
         self.known = live.count();
         self.last = live.last;
         let now = self.last.t.0;
-        while self
-            .trail
-            .front()
-            .is_some_and(|point| point.t < now - PAST_S)
-        {
-            self.trail.pop_front();
-        }
+        forget_old(&mut self.trail, now, |point| point.t);
         if now - self.looked >= LOOK_S {
             let kept = beat.kept();
             self.missed = kept.missed - self.kept.missed;

@@ -1,7 +1,7 @@
 //! A run of the master-slave system recorded, and the recording computed again.
 
 use super::haptics::Setting;
-use super::recorded::{Again, Replayed, computed_again};
+use super::recorded::{Again, Ended, Replayed, computed_again};
 use palpate_drivers::rig_file::fields::{Fields, in_words};
 use palpate_model::haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
@@ -11,7 +11,7 @@ use palpate_protocols::haptics::taped::{
     COLUMNS, LED_COLUMNS, LedRecorder, LedRow, TapeRecorder, TapedLed, TapedRow, led_row, taped_row,
 };
 use palpate_protocols::haptics::{Led, Simulated, Ticking};
-use palpate_sessions::ticks::{Recorded, Recording, SETTINGS, has_columns};
+use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use std::path::Path;
 
 /// Drives by name.
@@ -37,8 +37,10 @@ pub fn led_recorder(
 }
 
 /// Ends the recording of a led run, if there is one.
-pub fn recorded(TapedLed { led, recorder }: TapedLed) -> Option<Result<Recorded, String>> {
-    recorder.map(|recorder| recorder.finish(Again::left(&led)))
+pub fn recorded(TapedLed { led, recorder }: TapedLed) -> Ended {
+    let left = Again::left(&led);
+    let told = recorder?.finish(left);
+    Some(told.map(|told| (told, left)))
 }
 
 /// What a run was made of, as a text that reads back to the same bits.
@@ -138,8 +140,20 @@ impl Again<3, 6> for Led {
     }
 }
 
-/// Computes every tick of a recording again.
+/// Whether a recording is of this system, its hand on a path or led.
+pub fn is_tape(folder: &Path) -> Result<bool, String> {
+    let ((whole, real), (_, led)) = (COLUMNS, LED_COLUMNS);
+    Ok(has_columns(folder, &whole, &real)? || has_columns(folder, &whole, &led)?)
+}
+
+/// Computes every tick of a recording again. `is_going` hears the share done and ends it early.
 pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
+    if !is_tape(folder)? {
+        return Err(format!(
+            "{} has no columns of a master and slave's recording; give a folder that the screen Haptics or 'palpate haptics run --record' made",
+            folder.display()
+        ));
+    }
     let called = folder.join(SETTINGS).display().to_string();
     let wrong = |err: MasterSlaveError| format!("{called}: {err}");
     let simulation = |settings: &str| {

@@ -26,6 +26,7 @@ pub mod scene_bench;
 pub mod select;
 pub mod task;
 pub mod touch;
+pub mod trail;
 
 use std::sync::mpsc::{Receiver, TryRecvError, sync_channel};
 
@@ -68,6 +69,11 @@ impl<T: Send + 'static> Job<T> {
             })?;
         self.answer = Some(receiver);
         Ok(())
+    }
+
+    /// Waits for the answer, if one is to come; none if its work failed.
+    pub fn wait(&mut self) -> Option<T> {
+        self.answer.take()?.recv().ok()
     }
 
     /// The answer, once.

@@ -3,6 +3,17 @@
 use palpate_sessions::ticks::{End, Recorded, Recording, Row};
 use serde::Serialize;
 
+/// What became of a recording when its loop was ended, with a hash of what the loop left; nothing where there was none, or
+/// where the loop failed and cut it off.
+pub type Ended = Option<Result<(Recorded, u64), String>>;
+
+/// A recording that was ended, in words.
+#[must_use]
+pub fn ended_words((recorded, left): (Recorded, u64)) -> String {
+    let words = RecordedTicks::from(recorded).words();
+    format!("{words}; hash at the end {left:016x}")
+}
+
 /// What of a run was recorded.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct RecordedTicks {

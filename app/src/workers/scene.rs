@@ -1,13 +1,13 @@
 //! A scene in real time, its recording, and the recording computed again.
 
 use super::haptics::{Paced, body_of};
-use super::recorded::{Again, RecordedTicks, Replayed, computed_again};
+use super::recorded::{Again, Ended, RecordedTicks, Replayed, computed_again};
 use palpate_model::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
-use palpate_protocols::haptics::SceneLoop;
 use palpate_protocols::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
 use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_protocols::haptics::{SceneEnd, SceneLoop};
 use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use serde::Serialize;
 use std::path::Path;
@@ -137,6 +137,14 @@ impl Again<3, 10> for LedScene {
     }
 }
 
+/// What became of the recording of a scene that was ended, if it has one.
+#[must_use]
+pub fn recorded(end: SceneEnd) -> Ended {
+    let left = end.scene.hash();
+    let told = end.recorded?;
+    Some(told.map(|told| (told, left)))
+}
+
 /// On a device that was sensed.
 impl Again<3, 10> for Scene {
     fn tick(&mut self, row: &SceneRow) -> SceneRow {
@@ -156,6 +164,12 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
     let (whole, sensed) = SENSED_COLUMNS;
     let is_sensed = has_columns(folder, &whole, &sensed)?;
     let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
+    if !has_columns(folder, &columns.0, &columns.1)? {
+        return Err(format!(
+            "{} has no columns of a scene's recording; give a folder that the screen Scene or 'palpate scene record' made",
+            folder.display()
+        ));
+    }
     let found = Recording::read(folder, columns)?;
     let called = folder.join(SETTINGS).display().to_string();
     let file = SceneFile::parse(&called, &found.settings)?;

@@ -1,5 +1,6 @@
 //! The scene as the window has it: computed ahead along a path, or in a loop of its own, and what was seen of it.
 
+use super::trail::{LOOK_S, forget_old};
 use palpate_model::haptics::LawSettings;
 use palpate_model::haptics::margin::{Device, Margin, Watch};
 use palpate_model::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
@@ -10,10 +11,6 @@ use palpate_protocols::haptics::scene::SceneRecorder;
 use palpate_protocols::haptics::timing::Kept;
 use std::collections::VecDeque;
 
-/// How much of the past is kept for the plots, in s.
-pub const PAST_S: f64 = 10.0;
-/// Between two looks at how the loop keeps its time, in s: numbers that change faster cannot be read.
-const LOOK_S: f64 = 0.5;
 /// Ticks between two looks at a scene that is computed ahead.
 const AHEAD_TICKS: u64 = 10;
 
@@ -201,13 +198,7 @@ impl Touch {
         }
         let period = self.settings.period;
         let now = period.time_of(self.moment.tick.tick).seconds().0;
-        while self
-            .trail
-            .front()
-            .is_some_and(|point| point.t < now - PAST_S)
-        {
-            self.trail.pop_front();
-        }
+        forget_old(&mut self.trail, now, |point| point.t);
         if now - self.looked >= LOOK_S {
             self.kept = live.timing();
             self.looked = now;

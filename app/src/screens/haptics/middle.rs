@@ -4,8 +4,9 @@ use super::{HapticsScreen, Looked};
 use crate::plots::margin::{MarginPicture, margin_ui};
 use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::theme::Tokens;
-use crate::workers::feel::{Feel, PAST_S};
+use crate::workers::feel::Feel;
 use crate::workers::haptics::Tried;
+use crate::workers::trail::PAST_S;
 use eframe::egui::{Color32, Label, RichText, Ui, vec2};
 use palpate_protocols::haptics::TrailPoint;
 

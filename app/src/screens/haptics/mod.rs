@@ -61,7 +61,7 @@ impl HapticsScreen {
     /// Whether times measured now would be disturbed.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.is_running()
+        self.task.standing().is_some() || self.tape.is_busy() || self.is_running()
     }
 
     /// Whether the loop runs.
@@ -100,7 +100,13 @@ impl HapticsScreen {
         self.tape.poll();
         if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
             self.refusal = Some(reason);
+            self.tape.cut_off();
         }
+    }
+
+    /// Takes the folder of a recording.
+    pub fn take_recording(&mut self, folder: &Path) {
+        self.tape.take(folder);
     }
 
     /// Checks what stands in the form.
@@ -147,30 +153,30 @@ impl HapticsScreen {
         }
     }
 
-    /// Starts the loop, unless it runs.
-    pub fn start_loop(&mut self) {
+    /// Starts the loop, unless it runs, and records it if a folder is named.
+    pub fn start_loop(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
-        let folder = self.tape.folder();
-        let started = self.checked().and_then(|looked| {
-            let (setting, body) = (&looked.setting, looked.checked.body);
-            let settings = setting.simulation(body, !self.is_open);
-            let recorder = folder.as_ref();
-            let recorder =
-                recorder.map(|folder| led_recorder(folder, body, setting, !self.is_open));
-            Feel::start(&settings, setting.speed, recorder.transpose()?)
+        let checked = self.checked();
+        let checked = checked.map(|looked| (looked.setting, looked.checked.body));
+        let started = checked.and_then(|(setting, body)| {
+            let is_guarded = !self.is_open;
+            let begin = |folder: &Path| led_recorder(folder, body, &setting, is_guarded);
+            let recorder = self.tape.begin(ctx, begin)?;
+            let settings = setting.simulation(body, is_guarded);
+            Feel::start(&settings, setting.speed, recorder)
         });
         match started {
             Ok(feel) => {
-                if folder.is_some() {
-                    self.tape.begun();
-                }
                 self.feel = Some(feel);
                 self.view = View::Live;
                 self.refusal = None;
             }
-            Err(reason) => self.refusal = Some(reason),
+            Err(reason) => {
+                self.refusal = Some(reason);
+                self.tape.cut_off();
+            }
         }
     }
 
@@ -179,6 +185,12 @@ impl HapticsScreen {
         if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
             self.tape.end(move || beat.end().and_then(recorded));
         }
+    }
+
+    /// Stops it for good, its recording on disk.
+    pub fn close(&mut self) {
+        self.stop_loop();
+        self.tape.settle();
     }
 
     /// What is asked for. `verdict` says whether the loop would disturb something.

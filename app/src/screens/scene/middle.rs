@@ -5,7 +5,8 @@ use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::scene::view::Shown;
 use crate::theme::Tokens;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::touch::{PAST_S, TouchPoint};
+use crate::workers::touch::TouchPoint;
+use crate::workers::trail::PAST_S;
 use eframe::egui::{Label, RichText, Ui, vec2};
 
 /// What the middle shows.

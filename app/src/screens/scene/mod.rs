@@ -16,7 +16,7 @@ use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::workers::path_dialog::Ask;
 use crate::workers::recorded::Replayed;
-use crate::workers::scene::{replay, scene_of};
+use crate::workers::scene::{recorded, replay, scene_of};
 use crate::workers::task::Task;
 use crate::workers::touch::{Ahead, Moment, Touch, ahead};
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
@@ -40,6 +40,8 @@ pub struct SceneScreen {
     ahead: Task<Ahead>,
     is_shown: bool,
     touch: Option<Touch>,
+    /// What it is made of.
+    touched: SceneFile,
     refusal: Option<String>,
     tape: TapePanel,
     planned: Option<Planned>,
@@ -60,6 +62,7 @@ impl Default for SceneScreen {
             ahead: Task::default(),
             is_shown: false,
             touch: None,
+            touched: SceneFile::default(),
             refusal: None,
             tape: TapePanel::default(),
             planned: None,
@@ -74,7 +77,7 @@ impl SceneScreen {
     /// Whether times measured now would be disturbed.
     #[must_use]
     pub fn is_busy(&self) -> bool {
-        self.ahead.standing().is_some() || self.is_running()
+        self.ahead.standing().is_some() || self.tape.is_busy() || self.is_running()
     }
 
     /// Whether the scene runs.
@@ -139,7 +142,13 @@ impl SceneScreen {
         };
         if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
             self.refusal = Some(reason);
+            self.tape.cut_off();
         }
+    }
+
+    /// Takes the folder of a recording.
+    pub fn take_recording(&mut self, folder: &Path) {
+        self.tape.take(folder);
     }
 
     /// Takes a scene file.
@@ -181,38 +190,45 @@ impl SceneScreen {
         self.ahead.cancel();
     }
 
-    /// Starts the scene, unless it runs.
-    pub fn start(&mut self) {
+    /// Starts the scene, unless it runs, and records it if a folder is named.
+    pub fn start(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
-        let folder = self.tape.folder();
-        let started = self.form.settings().and_then(|settings| {
+        let started = self.form.scene_file().and_then(|file| {
+            let settings = self.form.settings()?;
             self.look_at(&settings);
-            let text = self.form.scene_file()?.text();
-            let recorder = folder.as_ref();
-            let recorder = recorder.map(|folder| SceneRecorder::start(folder, &text, COLUMNS));
-            Touch::start(settings, self.form.path, recorder.transpose()?)
+            let text = file.text();
+            let begin = |folder: &Path| SceneRecorder::start(folder, &text, COLUMNS);
+            let recorder = self.tape.begin(ctx, begin)?;
+            let touch = Touch::start(settings, self.form.path, recorder)?;
+            Ok((touch, file))
         });
         match started {
-            Ok(touch) => {
-                if folder.is_some() {
-                    self.tape.begun();
-                }
+            Ok((touch, file)) => {
                 self.touch = Some(touch);
+                self.touched = file;
                 self.side = Side::Live;
                 self.refusal = None;
             }
-            Err(reason) => self.refusal = Some(reason),
+            Err(reason) => {
+                self.refusal = Some(reason);
+                self.tape.cut_off();
+            }
         }
     }
 
     /// Stops it.
     pub fn stop(&mut self) {
         if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
-            self.tape
-                .end(move || live.stop().and_then(|end| end.recorded));
+            self.tape.end(move || live.stop().and_then(recorded));
         }
+    }
+
+    /// Stops it for good, its recording on disk.
+    pub fn close(&mut self) {
+        self.stop();
+        self.tape.settle();
     }
 
     /// Another piece of tissue is looked at anew.
@@ -277,7 +293,7 @@ impl SceneScreen {
         };
         ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
         ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
-        self.plan_ui(ui, is_running);
+        self.plan_ui(ui, is_running, commands);
         self.tape.ui(ui, is_running, replay);
     }
 }

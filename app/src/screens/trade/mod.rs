@@ -126,6 +126,11 @@ impl TradeScreen {
         self.scene.answer()?.as_ref().ok()
     }
 
+    /// Shows the curves of a scene.
+    pub fn show_scene(&mut self) {
+        self.view = View::Mesh;
+    }
+
     /// Reads the stored curves of this machine, the first time the screen is shown.
     pub fn shown(&mut self, ctx: &Context) {
         if std::mem::replace(&mut self.is_read, true) {
