@@ -1,8 +1,10 @@
 //! What stands on every screen, the rig's screen, weighing and the search for the surface, by accessible name.
 
+use eframe::egui::accesskit::Role;
 use eframe::egui::{Key, Modifiers, pos2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_app::shell::rail::Screen;
+use palpate_app::widgets::places::places;
 use palpate_app::window::WindowOptions;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::Phase;
@@ -152,6 +154,38 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     flow.click("Find home");
     let run = flow.wait_for_end();
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
+}
+
+#[test]
+fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
+    let mut flow = Flow::open(TimeScale::Max);
+    let mut seen = 0;
+    for screen in Screen::ALL {
+        by_name(&mut flow, &format!("screen {}", screen.name()));
+        let known: Vec<String> = places(&flow.window.ctx)
+            .into_iter()
+            .map(|(name, _)| name)
+            .collect();
+        for role in [
+            Role::CheckBox,
+            Role::RadioButton,
+            Role::ComboBox,
+            Role::TextInput,
+        ] {
+            for node in flow.window.query_all_by_role(role) {
+                let node = node.accesskit_node();
+                let name = node.label().unwrap_or_default();
+                assert!(
+                    node.is_disabled()
+                        || (!name.is_empty() && known.iter().any(|one| one.contains(&name))),
+                    "{}: {role:?} '{name}' of {known:?}",
+                    screen.name()
+                );
+                seen += 1;
+            }
+        }
+    }
+    assert!(seen > 40, "{seen}");
 }
 
 #[test]

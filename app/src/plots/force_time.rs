@@ -3,6 +3,7 @@
 use super::points::{PlotCache, phase_spans};
 use super::style::{band_of, quiet};
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::workers::fit::ExactFit;
 use eframe::egui::{Align2, Color32, RichText, Ui, Vec2b};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text};
@@ -26,8 +27,10 @@ pub fn head_ui(ui: &mut Ui, view: &mut TimeView, cache: &PlotCache) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     ui.horizontal(|ui| {
         ui.label(RichText::new("Force over time").heading().strong());
-        ui.selectable_value(view, TimeView::Whole, "Whole run");
-        ui.selectable_value(view, TimeView::FromRamp, "From ramp");
+        ui.selectable_value(view, TimeView::Whole, "Whole run")
+            .place("Whole run");
+        ui.selectable_value(view, TimeView::FromRamp, "From ramp")
+            .place("From ramp");
         if let Some(remark) = cache.remark() {
             ui.label(RichText::new(remark).color(tokens.text_quiet).small());
         }

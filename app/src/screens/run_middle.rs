@@ -48,7 +48,11 @@ pub fn views_ui(ui: &mut Ui, shown: Middle, run: Option<&RunView>, commands: &mu
             if !is_offered(view, run) {
                 continue;
             }
-            if ui.selectable_label(shown == view, name).clicked() {
+            if ui
+                .selectable_label(shown == view, name)
+                .place(name)
+                .clicked()
+            {
                 commands.push(Command::View(view));
             }
         }

@@ -3,6 +3,7 @@
 use crate::screens::haptics::Offered;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::haptics::{Setting, THESIS};
@@ -141,8 +142,10 @@ impl HapticsForm {
         section_ui(ui, "Device");
         ui.horizontal(|ui| {
             form_label(ui, "drive");
-            ui.radio_value(&mut self.is_current, false, "voltage");
-            ui.radio_value(&mut self.is_current, true, "current");
+            ui.radio_value(&mut self.is_current, false, "voltage")
+                .place("voltage");
+            ui.radio_value(&mut self.is_current, true, "current")
+                .place("current");
         });
         let damps = match self.is_current {
             false => "the motor's back-EMF damps",

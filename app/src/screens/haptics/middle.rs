@@ -4,6 +4,7 @@ use super::{HapticsScreen, Looked};
 use crate::plots::margin::{MarginPicture, margin_ui};
 use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::workers::feel::Feel;
 use crate::workers::haptics::Tried;
 use crate::workers::trail::PAST_S;
@@ -29,7 +30,7 @@ impl HapticsScreen {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (view, name) in [(View::Margin, "Before play"), (View::Live, "Live")] {
-                ui.selectable_value(&mut self.view, view, name);
+                ui.selectable_value(&mut self.view, view, name).place(name);
             }
         });
         let quiet = |ui: &mut Ui, words: &str| {

@@ -135,7 +135,7 @@ impl ModelsForm {
                 .desired_width(width)
                 .char_limit(4096)
                 .hint_text("session folder or table");
-            let typed = ui.add(input).labelled_by(label.id);
+            let typed = ui.add(input).labelled_by(label.id).place("path");
             let is_entered =
                 typed.lost_focus() && ui.input(|input| input.key_pressed(eframe::egui::Key::Enter));
             let is_pressed = ui.button("Add").clicked();
@@ -173,7 +173,7 @@ impl ModelsForm {
                 .desired_width(96.0)
                 .char_limit(24)
                 .hint_text("none");
-            ui.add(input).labelled_by(label.id);
+            ui.add(input).labelled_by(label.id).place("tolerance");
         });
         match self.tolerance() {
             Err(reason) => {

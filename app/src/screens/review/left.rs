@@ -42,7 +42,8 @@ impl ReviewScreen {
         }
         section_ui(ui, "Time zero at");
         for leader in Leader::ALL {
-            ui.radio_value(&mut self.leader, leader, leader.name());
+            ui.radio_value(&mut self.leader, leader, leader.name())
+                .place(leader.name());
         }
         self.leaders_missing_ui(ui);
         section_ui(ui, "Shown over time");
@@ -191,7 +192,8 @@ impl ReviewScreen {
     /// Draws the names of the views.
     pub(super) fn views_ui(&mut self, ui: &mut Ui) {
         for view in View::ALL {
-            ui.selectable_value(&mut self.view, view, view.name());
+            ui.selectable_value(&mut self.view, view, view.name())
+                .place(view.name());
         }
     }
 }

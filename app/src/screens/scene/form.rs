@@ -1,6 +1,7 @@
 //! The scene as typed.
 
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::text_row::text_row;
@@ -159,9 +160,11 @@ impl SceneForm {
         section_ui(ui, "Hand");
         ui.horizontal_wrapped(|ui| {
             for path in ScenePath::ALL {
-                ui.radio_value(&mut self.path, Some(path), path.name());
+                ui.radio_value(&mut self.path, Some(path), path.name())
+                    .place(path.name());
             }
-            ui.radio_value(&mut self.path, None, "pointer and keys");
+            ui.radio_value(&mut self.path, None, "pointer and keys")
+                .place("pointer and keys");
         });
         asked
     }

@@ -4,6 +4,7 @@ use super::SceneScreen;
 use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::scene::view::Shown;
 use crate::theme::Tokens;
+use crate::widgets::places::Place;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::touch::TouchPoint;
 use crate::workers::trail::PAST_S;
@@ -29,7 +30,7 @@ impl SceneScreen {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (side, name) in [(Side::Ahead, "Computed"), (Side::Live, "Live")] {
-                ui.selectable_value(&mut self.side, side, name);
+                ui.selectable_value(&mut self.side, side, name).place(name);
             }
             ui.separator();
             tick_box(ui, &mut self.view.has_lines, "mesh lines");

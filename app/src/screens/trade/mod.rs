@@ -10,6 +10,7 @@ use crate::theme::Tokens;
 use crate::trade::text::{advice, percent, terms};
 use crate::trade::{self, Extent, SCENE_PEAK};
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::table::table_ui;
 use crate::widgets::task_bar::{Pressed, task_ui};
@@ -234,7 +235,7 @@ impl TradeScreen {
             let input = TextEdit::singleline(&mut self.tolerance)
                 .desired_width(96.0)
                 .char_limit(24);
-            ui.add(input).labelled_by(label.id);
+            ui.add(input).labelled_by(label.id).place("tolerance");
         });
         match self.tolerance.parse::<Tolerance>() {
             Ok(tolerance) => {
@@ -304,7 +305,7 @@ impl TradeScreen {
         ui.horizontal(|ui| {
             ui.label(RichText::new("Error over time").heading().strong());
             for (view, name) in VIEWS {
-                ui.selectable_value(&mut self.view, view, name);
+                ui.selectable_value(&mut self.view, view, name).place(name);
             }
         });
         let (shown, level) = match self.drawn() {

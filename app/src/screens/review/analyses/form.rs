@@ -88,7 +88,8 @@ impl Form {
     ) -> Result<Deed, String> {
         ui.horizontal(|ui| {
             for (kind, words) in Kind::ALL {
-                ui.selectable_value(&mut self.kind, kind, words);
+                ui.selectable_value(&mut self.kind, kind, words)
+                    .place(words);
             }
         });
         text_row(ui, "name", "of the new analysis", &mut self.name);

@@ -6,6 +6,7 @@ use crate::report::said;
 use crate::report::{kept, text};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
+use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
 use crate::workers::analyses::{Deed, Known};
@@ -17,7 +18,8 @@ const AS_MEASURED: &str = "as measured";
 
 /// Draws the list and the analysis chosen; true when the session's own fit is asked for.
 pub(super) fn list_ui(ui: &mut Ui, known: &Known, looked: &mut Looked, own: Option<&Own>) -> bool {
-    ui.radio_value(&mut looked.analysis, None, AS_MEASURED);
+    ui.radio_value(&mut looked.analysis, None, AS_MEASURED)
+        .place(AS_MEASURED);
     for one in &known.analyses.all {
         if one.what != Analysed::Withdrawal {
             line_ui(ui, known, one, looked);
@@ -33,7 +35,8 @@ fn line_ui(ui: &mut Ui, known: &Known, one: &Analysis, looked: &mut Looked) {
     match kept::withdrawn(&known.analyses, &one.name) {
         None => {
             let choice = Some(one.name.clone());
-            ui.radio_value(&mut looked.analysis, choice, &one.name);
+            ui.radio_value(&mut looked.analysis, choice, &one.name)
+                .place(&one.name);
         }
         Some(words) => {
             let name = RichText::new(&one.name).strikethrough();
