@@ -9,9 +9,10 @@ use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::review::{Leader, Quantity, Stage};
-use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, TextEdit, Ui, vec2};
+use eframe::egui::{Button, Color32, Label, ProgressBar, RichText, Sense, Ui, vec2};
 use std::path::PathBuf;
 
 /// What was pressed at a session.
@@ -160,16 +161,14 @@ impl ReviewScreen {
     }
 
     fn add_ui(&mut self, ui: &mut Ui) {
-        ui.horizontal(|ui| {
-            let label = ui.label("session");
-            let input = TextEdit::singleline(&mut self.path).desired_width(200.0);
-            ui.add(input).labelled_by(label.id).place("session");
-        });
+        let hint = "the folder of a session";
+        let is_entered = text_row(ui, "session", hint, &mut self.path);
         let verdict = match self.path.trim() {
             "" => Err("type the path of a session's folder".to_owned()),
             _ => Ok(()),
         };
-        if reason_button(ui, "Show besides", vec2(0.0, 22.0), &verdict) {
+        let is_pressed = reason_button(ui, "Show besides", vec2(0.0, 22.0), &verdict);
+        if is_pressed || (is_entered && verdict.is_ok()) {
             let path = PathBuf::from(std::mem::take(&mut self.path).trim());
             self.add(path, ui.ctx());
         }
