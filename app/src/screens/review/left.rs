@@ -171,6 +171,8 @@ impl ReviewScreen {
         if is_pressed || (is_entered && verdict.is_ok()) {
             let path = PathBuf::from(std::mem::take(&mut self.path).trim());
             self.add(path, ui.ctx());
+            // The keys of the plots are next.
+            ui.memory_mut(|memory| memory.stop_text_input());
         }
     }
 
