@@ -4,11 +4,11 @@ use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, Reading, RigCommand};
-use palpate_model::units::{MmPerS, Seconds};
+use palpate_model::units::Seconds;
 use palpate_protocols::engine::{
     Config, Derived, Effect, Input, Operator, Outcome, Record, State, step,
 };
-use palpate_protocols::plans::{FindContact, Plan, Step};
+use palpate_protocols::plans::{FindContact, LEAVE, Plan, Step, approach};
 use std::sync::Arc;
 
 /// Grid of the watchdog, as the runner has it.
@@ -32,26 +32,13 @@ pub struct Seen {
 /// What most plans begin with: self-test, home, tare, contact.
 #[must_use]
 pub fn set_up(tare: Seconds, contact: FindContact) -> Vec<Step> {
-    vec![
-        Step::SelfTest {
-            duration: Seconds(0.5),
-        },
-        Step::Home {
-            speed: MmPerS(9.0),
-            touch_speed: MmPerS(0.3),
-        },
-        Step::Tare { duration: tare },
-        Step::FindContact(contact),
-    ]
+    approach(tare, contact)
 }
 
 /// What they end with.
 #[must_use]
 pub fn retract() -> Step {
-    Step::Retract {
-        speed: MmPerS(6.0),
-        clearance_mm: 10.0,
-    }
+    LEAVE
 }
 
 /// A run under way.

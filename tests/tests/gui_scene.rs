@@ -5,12 +5,21 @@ use egui_kittest::kittest::Queryable;
 use palpate_model::scene::WhyNoForce;
 use palpate_protocols::runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
+use std::path::Path;
 
 fn open() -> Flow {
     let mut flow = Flow::open(TimeScale::Max);
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.window.run_steps(3);
     flow
+}
+
+/// Writes a scene file and reads it in the window; `name` is the scene's.
+fn read(flow: &mut Flow, path: &Path, text: &str, name: &str) {
+    std::fs::write(path, text).expect("a scene file");
+    flow.type_into("file", &path.display().to_string());
+    flow.click("Open");
+    flow.wait("the file", |window| window.query_by_label(name).is_some());
 }
 
 /// The newest depth in mm and force in N.
@@ -101,12 +110,7 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
     let mut flow = open();
     let path = flow.folder.path().join("pad.toml");
     let text = "name = \"soft pad\"\n[tissue]\nside_mm = 40.0\n[mesh]\nnodes = 81\n";
-    std::fs::write(&path, text).unwrap();
-    flow.type_into("file", &path.display().to_string());
-    flow.click("Open");
-    flow.wait("the file", |window| {
-        window.query_by_label("soft pad").is_some()
-    });
+    read(&mut flow, &path, text, "soft pad");
     flow.click("Start the scene");
     let touch = flow.window.state().scene().touch().unwrap();
     assert_eq!(
@@ -201,12 +205,7 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     // Any computer holds these.
     let path = flow.folder.path().join("loose.toml");
     let text = "name = \"loose\"\n[tolerances]\nforce_percent = 1000.0\nshape_mm = 5.0\ntick_us = 100000.0\n";
-    std::fs::write(&path, text).unwrap();
-    flow.type_into("file", &path.display().to_string());
-    flow.click("Open");
-    flow.wait("the file", |window| {
-        window.query_by_label("loose").is_some()
-    });
+    read(&mut flow, &path, text, "loose");
     assert!(!flow.is_enabled("Take the plan"));
     assert!(flow.says("measure what a scene costs on the screen Trade first"));
     flow.window
@@ -238,12 +237,7 @@ fn a_missed_budget_is_told_before_anything_was_measured_and_a_button_leads_to_th
     let path = flow.folder.path().join("strict.toml");
     // No computer makes a tick in a millionth of a microsecond.
     let text = "name = \"strict\"\n[mesh]\nnodes = 51\n[tolerances]\ntick_us = 1e-6\n";
-    std::fs::write(&path, text).unwrap();
-    flow.type_into("file", &path.display().to_string());
-    flow.click("Open");
-    flow.wait("the file", |window| {
-        window.query_by_label("strict").is_some()
-    });
+    read(&mut flow, &path, text, "strict");
     flow.click("Start the scene");
     flow.wait("times", |window| {
         let touch = window.state().scene().touch();

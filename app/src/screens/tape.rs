@@ -1,15 +1,14 @@
 //! A loop's recording: the folder that the next run is written to, what the last one left, and a recording computed again.
 
-use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::remark::quiet_ui;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::path_dialog::FolderDialog;
 use crate::workers::recorded::{Ended, Replayed, ended_words};
 use crate::workers::task::Task;
-use eframe::egui::{Context, Label, RichText, Ui};
+use eframe::egui::{Context, Ui};
 use std::path::{Path, PathBuf};
 
 /// How a recording is computed again.
@@ -122,10 +121,6 @@ impl TapePanel {
 
     /// Draws it. `is_running`: the loop is under way.
     pub fn ui(&mut self, ui: &mut Ui, is_running: bool, replay: Replay) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        let alarm = |ui: &mut Ui, words: &str| {
-            ui.add(Label::new(RichText::new(words).color(tokens.alarm_text)).wrap());
-        };
         section_ui(ui, "Recording");
         ui.add_enabled_ui(!is_running, |ui| {
             let hint = "a new folder; not recorded without";
@@ -133,7 +128,7 @@ impl TapePanel {
         });
         match &self.told {
             Some(Ok(words)) => quiet_ui(ui, words),
-            Some(Err(reason)) => alarm(ui, reason),
+            Some(Err(reason)) => alarm_ui(ui, reason),
             None => {}
         }
         text_row(ui, "replay", "the folder of a recording", &mut self.from);
@@ -145,7 +140,7 @@ impl TapePanel {
             self.refusal = Some(format!("the dialog cannot be opened: {err}"));
         }
         if let Some(refusal) = &self.refusal {
-            alarm(ui, refusal);
+            alarm_ui(ui, refusal);
         }
         let may = match (is_running || self.ending.is_busy(), self.from.trim()) {
             (true, _) => Err("the loop runs".to_owned()),
@@ -171,10 +166,10 @@ impl TapePanel {
                     quiet_ui(ui, line);
                 }
                 if let Some(why) = replayed.failure() {
-                    alarm(ui, &why);
+                    alarm_ui(ui, &why);
                 }
             }
-            Some(Err(reason)) => alarm(ui, reason),
+            Some(Err(reason)) => alarm_ui(ui, reason),
             None => {}
         }
     }

@@ -16,7 +16,7 @@ use std::fmt::Display;
 pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
-pub use ramp_hold::RampHold;
+pub use ramp_hold::{LEAVE, RampHold, approach};
 pub use step::{
     FindBase, FindContact, Follow, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step,
     Weigh,

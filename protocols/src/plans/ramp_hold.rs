@@ -10,13 +10,17 @@ use serde::{Deserialize, Serialize};
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
 /// The way out of the tissue behind a measurement.
-pub(super) const LEAVE: Step = Step::Retract {
+pub const LEAVE: Step = Step::Retract {
     speed: MmPerS(6.0),
     clearance_mm: 10.0,
 };
 
+/// Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
+pub(super) const TARE: Seconds = Seconds(4.0);
+
 /// What comes before a measurement: self-test, home, tare and contact.
-pub(super) fn approach() -> Vec<Step> {
+#[must_use]
+pub fn approach(tare: Seconds, contact: FindContact) -> Vec<Step> {
     vec![
         Step::SelfTest {
             duration: Seconds(0.5),
@@ -25,11 +29,8 @@ pub(super) fn approach() -> Vec<Step> {
             speed: MmPerS(9.0),
             touch_speed: MmPerS(0.3),
         },
-        // Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
-        Step::Tare {
-            duration: Seconds(4.0),
-        },
-        Step::FindContact(FindContact::default()),
+        Step::Tare { duration: tare },
+        Step::FindContact(contact),
     ]
 }
 
@@ -67,7 +68,7 @@ impl RampHold {
     /// The plan, from self-test to retract.
     #[must_use]
     pub fn plan(&self) -> Plan {
-        let mut steps = approach();
+        let mut steps = approach(TARE, FindContact::default());
         steps.extend([
             Step::Ramp {
                 speed: self.speed,

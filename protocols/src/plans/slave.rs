@@ -1,7 +1,7 @@
 //! A slave that follows: find the tissue, go where it is led, leave.
 
-use super::ramp_hold::{LEAVE, approach};
-use super::{Follow, Plan, Step};
+use super::ramp_hold::{LEAVE, TARE, approach};
+use super::{FindContact, Follow, Plan, Step};
 use palpate_model::rig::RigDescription;
 use palpate_model::units::{Depth, MmPerS, Seconds};
 
@@ -31,7 +31,7 @@ impl Follow {
     /// The plan, from self-test to retract.
     #[must_use]
     pub fn plan(self) -> Plan {
-        let mut steps = approach();
+        let mut steps = approach(TARE, FindContact::default());
         steps.extend([Step::Follow(self), LEAVE]);
         Plan::of("slave", 1, steps)
     }
