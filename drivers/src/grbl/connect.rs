@@ -14,6 +14,9 @@ use thiserror::Error;
 
 /// Opening the port resets most boards, and a boot loader waits for a new program for one to two seconds.
 const START_MAX: Nanos = Nanos::from_millis(5_000);
+/// After so long without a byte a reset is asked for: a board that a limit has locked hears nothing else (gnea/grbl,
+/// protocol.c, `protocol_exec_rt_system`). Boot loaders of common boards are through by then.
+const RESET_AFTER: Nanos = Nanos::from_millis(2_500);
 /// Between two questions who is there.
 const ASK_AGAIN: Nanos = Nanos::from_millis(300);
 /// An answer takes longer only while settings are written, which this never does.
@@ -78,6 +81,14 @@ pub enum GrblOpenError {
     /// It is in a state in which nothing can be done.
     #[error("the board is in state {0}; reset it and open the rig again")]
     State(String),
+    /// A limit switch is closed that Grbl itself watches.
+    #[error(
+        "the limit pin of axis {axis} is closed, and the board would lock itself again as soon as it opens; move the slide off the switch by hand, then open the rig again"
+    )]
+    OnALimit {
+        /// The axis.
+        axis: char,
+    },
     /// A setting is not that of the rig file.
     #[error(
         "the board has ${number}={found} ({meaning}) where the rig file needs {wanted}; correct the rig file, or send ${number}={wanted} from a terminal"
@@ -247,6 +258,13 @@ pub fn connect(
     let said = wake(&mut console)?;
     let version = identify(&mut console, settings, said.as_deref())?;
     let status = to_rest(&mut console)?;
+    // Whatever is on that pin opens and closes it while the slide leaves the switch, and each change is an alarm
+    // (limits.c, the pin's interrupt).
+    if settings.home == HomeSwitch::Probe && status.has_pin(settings.axis) {
+        return Err(GrblOpenError::OnALimit {
+            axis: settings.axis,
+        });
+    }
     unlock(&mut console, settings, &status)?;
     let values = read_settings(&mut console)?;
     let steps_per_mm = check(settings, &values)?;
@@ -300,10 +318,12 @@ pub fn connect(
 fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
     let start = console.now();
     let mut found = None;
+    let (mut has_heard, mut has_reset) = (false, false);
     while console.now().since(start) < START_MAX {
         console.write(&[JOG_CANCEL, protocol::QUERY])?;
         let until = console.now() + ASK_AGAIN;
         while let Some(incoming) = console.next(until)? {
+            has_heard = true;
             match incoming {
                 Incoming::Hello(version) => {
                     found = Some(version);
@@ -331,6 +351,10 @@ fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
         if found.is_some() {
             return Ok(found);
         }
+        if !has_heard && !has_reset && console.now().since(start) >= RESET_AFTER {
+            has_reset = true;
+            console.write(&[protocol::RESET])?;
+        }
     }
     Err(GrblOpenError::Silent)
 }
@@ -349,8 +373,11 @@ fn identify(
             break;
         }
     }
-    // In motion it tells nothing about itself.
-    to_rest(console)?;
+    // In motion it tells nothing about itself; held, asleep or behind an open door it takes no line at all.
+    let status = to_rest(console)?;
+    if !matches!(status.state, State::Idle | State::Alarm) {
+        return Err(GrblOpenError::State(format!("{:?}", status.state)));
+    }
     let mut version = None;
     let mut text = String::new();
     for incoming in console.ask("$I")? {

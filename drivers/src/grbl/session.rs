@@ -34,7 +34,8 @@ const OK_MAX: Nanos = Nanos::from_millis(400);
 const CANCEL_AGAIN: Nanos = Nanos::from_millis(40);
 /// Without anybody asking for reports the axis is stopped: a computer that hangs counts as dead.
 const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it.
+/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it, and half a second
+/// more where the axis was in motion (report.c, `report_alarm_message`).
 const RESET_AGAIN: Nanos = Nanos::from_millis(100);
 /// Without a welcome for so long after the first reset, nobody knows what the axis does.
 const RESET_MAX: Nanos = Nanos::from_millis(2_000);

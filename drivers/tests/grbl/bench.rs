@@ -40,6 +40,12 @@ pub struct Wire {
 }
 
 impl Wire {
+    /// What is on the way to the host, as text; it does not arrive any more.
+    pub fn take_said(&mut self) -> String {
+        let bytes: Vec<u8> = self.arriving.drain(..).map(|(_, byte)| byte).collect();
+        String::from_utf8_lossy(&bytes).into_owned()
+    }
+
     pub fn pass(&mut self, by: Nanos) {
         self.now = self.now + by;
         while self.stepped + STEP <= self.now {

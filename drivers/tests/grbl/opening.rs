@@ -1,6 +1,6 @@
 //! A board is looked at before it is used, and nothing of it is changed.
 
-use crate::bench::{slide, try_connect, wired};
+use crate::bench::{Shared, slide, try_connect, wired};
 use palpate_drivers::emulate::DeviceFault;
 use palpate_drivers::emulate::bench::EmulatedAxis;
 use palpate_drivers::emulate::grbl::{self, Eeprom};
@@ -91,6 +91,49 @@ fn a_locked_board_is_unlocked_only_when_the_rig_file_says_so() {
     };
     try_connect(&wire, &settings).expect("it connects");
     assert!(String::from_utf8_lossy(&wire.lock().sent).contains("$X\n"));
+}
+
+/// On a limit switch of its own, the board locked and deaf for everything but a reset.
+fn on_a_limit() -> (Shared, GrblSettings) {
+    let settings = GrblSettings {
+        home: HomeSwitch::Probe,
+        is_unlocking: true,
+        ..slide()
+    };
+    let mut own = board(&[(21, 1.0)]);
+    own.home = grbl::HomeWiring::Probe;
+    let wire = wired(own);
+    {
+        let mut wire = wire.lock();
+        let now = wire.now;
+        wire.board.receive(now, b"$J=G91X400F1200\n");
+        wire.pass(Nanos::from_millis(12_000));
+        let said = wire.take_said();
+        assert!(said.contains("ALARM:1"), "{said}");
+        wire.board.receive(Nanos::ZERO, b"?$I\n");
+        wire.pass(Nanos::from_millis(1_000));
+        assert_eq!(wire.take_said(), "");
+    }
+    (wire, settings)
+}
+
+#[test]
+fn a_board_that_a_limit_has_locked_is_reset_and_opened() {
+    let (wire, settings) = on_a_limit();
+    let err = try_connect(&wire, &settings).expect_err("the switch is closed still");
+    assert_eq!(err, GrblOpenError::OnALimit { axis: 'X' });
+    // By hand.
+    wire.lock().plant.shift(-20.0);
+    try_connect(&wire, &settings).expect("it connects");
+}
+
+#[test]
+fn a_board_that_is_held_is_told() {
+    let wire = wired(grbl::GrblSettings::default());
+    wire.lock().board.receive(Nanos::ZERO, b"!");
+    let err = try_connect(&wire, &slide()).expect_err("refused");
+    assert!(err.to_string().contains("Hold"), "{err}");
+    assert!(err.to_string().contains("reset it"), "{err}");
 }
 
 #[test]

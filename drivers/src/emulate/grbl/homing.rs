@@ -74,7 +74,8 @@ impl Grbl {
 
     fn fail(&mut self, code: u8) {
         self.alarm(code, false);
-        self.say_hello();
+        self.is_line_owed = true;
+        self.is_resetting = true;
     }
 
     /// Machine zero is at the end of the travel that has the greater coordinate (limits.c).

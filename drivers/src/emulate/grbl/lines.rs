@@ -11,12 +11,14 @@ impl Grbl {
             if let Some(motion) = self.waiting.take() {
                 if self.planner.is_full() {
                     self.waiting = Some(motion);
+                    self.start();
                     return;
                 }
                 self.plan(motion);
                 self.say("ok\r\n");
             }
             let is_blocked = self.is_waiting_for_reset
+                || self.now < self.busy_until
                 || self.homing.is_some()
                 || self.is_probing
                 || self.is_cancelling
@@ -104,9 +106,10 @@ impl Grbl {
             return Ok(false);
         }
         if self.eeprom.flag(20) && self.is_beyond(&motion) {
-            // Grbl brakes before it tells; here it stands.
+            // Grbl brakes before it tells; here it stands. The line is done with the reset.
             self.alarm(2, true);
-            return Err(9);
+            self.is_line_owed = true;
+            return Ok(false);
         }
         self.queue(motion)
     }
@@ -180,9 +183,10 @@ impl Grbl {
             }
             "G" => self.say_modes(),
             "C" if self.state == State::Check => {
-                self.say("[MSG:Disabled]\r\n");
+                self.say("[MSG:Disabled]\r\nok\r\n");
                 self.state = State::Idle;
                 self.say_hello();
+                return Ok(false);
             }
             "C" if self.state == State::Idle => {
                 self.state = State::Check;
@@ -211,12 +215,14 @@ impl Grbl {
             }
             "SLP" => {
                 self.state = State::Sleep;
-                self.say("[MSG:Sleeping]\r\n");
+                self.say("ok\r\n[MSG:Sleeping]\r\n");
+                return Ok(false);
             }
             "RST=$" | "RST=*" => {
                 self.eeprom = super::Eeprom::factory();
-                self.say("[MSG:Restoring defaults]\r\n");
+                self.say("[MSG:Restoring defaults]\r\nok\r\n");
                 self.say_hello();
+                return Ok(false);
             }
             _ => return self.store(command).map(|()| true),
         }

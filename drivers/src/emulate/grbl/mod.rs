@@ -29,6 +29,8 @@ const LINE_MAX: usize = 79;
 const FEED_MIN: f64 = 1.0;
 /// From the reset of an Uno to the first words of its program: its boot loader waits for a new one so long.
 const BOOT: Nanos = Nanos::from_millis(1_500);
+/// An alarm is given so much time to be read, in which nothing else is done (report.c, `report_alarm_message`).
+const ALARM_PAUSE: Nanos = Nanos::from_millis(500);
 
 /// How the slide's switches are wired.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -86,6 +88,12 @@ pub struct Grbl {
     /// After a hard or soft limit nothing but a reset is heard.
     is_waiting_for_reset: bool,
     is_cancelling: bool,
+    /// A line that a soft limit has ended is answered with the reset.
+    is_line_owed: bool,
+    /// Nothing is done before.
+    busy_until: Nanos,
+    /// A reset is under way.
+    is_resetting: bool,
     /// Silent until then.
     boots_at: Option<Nanos>,
     is_first_start: bool,
@@ -123,6 +131,9 @@ impl Grbl {
             state: State::Idle,
             is_waiting_for_reset: false,
             is_cancelling: false,
+            is_line_owed: false,
+            busy_until: Nanos::ZERO,
+            is_resetting: false,
             boots_at: None,
             is_first_start: settings.is_unused,
             now: Nanos::ZERO,
@@ -165,6 +176,8 @@ impl Grbl {
 
     /// What follows every reset: the position stays, lines and blocks go.
     fn say_hello(&mut self) {
+        self.is_resetting = false;
+        self.busy_until = self.now;
         self.rx.clear();
         self.line.clear();
         (self.is_comment, self.is_overlong) = (None, false);
@@ -250,6 +263,7 @@ impl Grbl {
     /// An alarm, after which the axis stands still at once.
     fn alarm(&mut self, code: u8, is_critical: bool) {
         self.say(&format!("ALARM:{code}\r\n"));
+        self.busy_until = self.now + ALARM_PAUSE;
         self.planner.clear(self.machine());
         self.waiting = None;
         self.homing = None;
@@ -265,17 +279,32 @@ impl Grbl {
 
     /// Ctrl-X (motion_control.c, `mc_reset`).
     fn reset(&mut self) {
+        // A line that is being done ends with its `ok` all the same (protocol.c, `protocol_main_loop`).
+        self.is_line_owed |= self.waiting.is_some() || self.homing.is_some() || self.is_probing;
         if self.homing.is_some() {
             self.alarm(6, false);
         } else if self.is_moving() {
             self.alarm(3, false);
         }
-        self.say_hello();
+        self.is_resetting = true;
+        self.finish_reset();
+    }
+
+    /// The welcome, once what came before it was told.
+    fn finish_reset(&mut self) {
+        if self.is_resetting && self.now >= self.busy_until {
+            if std::mem::take(&mut self.is_line_owed) {
+                self.say("ok\r\n");
+            }
+            self.say_hello();
+        }
     }
 
     /// A byte that is never queued; `false` for all others.
     fn real_time(&mut self, byte: u8) -> bool {
         match byte {
+            // It is known already.
+            0x18 if self.is_resetting => {}
             b'?' => self.is_asked = self.homing.is_none() && !self.is_waiting_for_reset,
             0x18 => self.reset(),
             _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
@@ -335,8 +364,12 @@ impl Grbl {
             }
         }
         let is_limit = self.is_limit();
-        let is_closing = is_limit && !std::mem::replace(&mut self.was_limit, is_limit);
-        if is_closing && self.eeprom.flag(21) && self.homing.is_none() && self.state != State::Alarm
+        // Opening is a change as well (limits.c, the pin's interrupt).
+        let has_changed = is_limit != std::mem::replace(&mut self.was_limit, is_limit);
+        if has_changed
+            && self.eeprom.flag(21)
+            && self.homing.is_none()
+            && self.state != State::Alarm
         {
             self.alarm(1, true);
         }
@@ -369,7 +402,14 @@ impl EmulatedAxis for Grbl {
             return;
         }
         for byte in bytes {
-            if !self.real_time(*byte) && self.rx.len() < RX_MAX {
+            if self.real_time(*byte) {
+                continue;
+            }
+            if self.rx.len() >= RX_MAX {
+                // Where it waits for nothing, it reads faster than bytes can come.
+                self.read_lines();
+            }
+            if self.rx.len() < RX_MAX {
                 self.rx.push_back(*byte);
             }
         }
@@ -387,8 +427,9 @@ impl EmulatedAxis for Grbl {
             self.power_up();
         }
         self.step();
+        self.finish_reset();
         self.read_lines();
-        if std::mem::take(&mut self.is_asked) {
+        if now >= self.busy_until && std::mem::take(&mut self.is_asked) {
             self.say_status();
         }
     }
