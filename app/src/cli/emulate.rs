@@ -103,8 +103,8 @@ pub struct GrblArgs {
     /// Load cell beside it: hx711 or mark10
     #[arg(long, default_value = "hx711")]
     cell: CellKind,
-    /// Link to the pseudo-terminal of the load cell
-    #[arg(long, value_name = "PATH", conflicts_with = "tcp")]
+    /// Link to the pseudo-terminal of the load cell, which has one also where --tcp is the board's address
+    #[arg(long, value_name = "PATH")]
     cell_pty: Option<PathBuf>,
     /// Home switch on the limit pin of the axis, or on the probe pin with limit switches on the limit pin: limit or probe
     #[arg(long, default_value = "limit")]
@@ -227,11 +227,6 @@ fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
 }
 
 fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
-    if args.wire.tcp.is_some() {
-        return Err(Failure::usage(
-            "a Grbl board and its load cell are serial devices; give --pty and --cell-pty",
-        ));
-    }
     let mut eeprom = Eeprom::slide();
     if args.home == HomePin::Probe {
         // As the limit switches on the limit pin need it; every board takes it.
@@ -276,7 +271,7 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
             model: format!("1.1h with {model}"),
             at,
             cell_at: Some(cell_at),
-            is_serial: true,
+            is_serial: args.wire.tcp.is_none(),
         };
         output.result(&object, || {
             format!("Grbl 1.1h at {at}, {model} at {cell_at}; Ctrl-C ends it")
@@ -321,7 +316,8 @@ fn emulate(
 ) -> Result<(), Failure> {
     let link = wire.pty.clone().flatten();
     let place = match (wire.tcp, cell_link) {
-        (Some(address), _) => Place::Tcp(address),
+        (Some(address), None) => Place::Tcp(address),
+        (Some(address), Some(cell)) => Place::TcpAndPtys(address, vec![cell]),
         (None, None) => Place::Pty(link),
         (None, Some(cell)) => Place::Ptys(vec![link, cell]),
     };

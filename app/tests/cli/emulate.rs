@@ -2,6 +2,7 @@
 
 use super::{palpate, stderr};
 use serde_json::Value;
+use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
@@ -26,8 +27,12 @@ pub(super) fn emulate_galil(more: &[&str]) -> (Emulator, String) {
 }
 
 fn start(more: &[&str]) -> (Emulator, Value) {
+    start_device("galil", more)
+}
+
+fn start_device(device: &str, more: &[&str]) -> (Emulator, Value) {
     let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(["emulate", "galil", "--tcp", "127.0.0.1:0", "--json"])
+        .args(["emulate", device, "--tcp", "127.0.0.1:0", "--json"])
         .args(more)
         .stdin(Stdio::piped())
         .stdout(Stdio::piped())
@@ -78,6 +83,21 @@ fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
     std::thread::sleep(Duration::from_millis(20));
     let loaded: f64 = ask("MG @AN[1]\r").parse().unwrap();
     assert!(loaded > free + 0.1, "{free} {loaded}");
+}
+
+#[test]
+fn a_board_answers_on_a_port_and_its_cell_on_a_line_of_its_own() {
+    let (_emulator, ready) = start_device("grbl", &[]);
+    assert_eq!(ready["is_serial"], false);
+    let mut port = TcpStream::connect(ready["at"].as_str().unwrap()).unwrap();
+    port.set_read_timeout(Some(Duration::from_secs(10)))
+        .unwrap();
+    port.write_all(b"$N\n").unwrap();
+    let mut lines = BufReader::new(port).lines().map(Result::unwrap);
+    assert_eq!(lines.find(|line| line == "$N0="), Some("$N0=".to_owned()));
+    let cell = File::open(ready["cell_at"].as_str().unwrap()).unwrap();
+    let mut values = BufReader::new(cell).lines().map(Result::unwrap);
+    assert!(values.any(|line| line.starts_with("D,")));
 }
 
 #[test]

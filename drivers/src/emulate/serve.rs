@@ -36,6 +36,8 @@ pub enum Place {
     Ptys(Vec<Option<PathBuf>>),
     /// A TCP port; port 0 is any free one.
     Tcp(SocketAddr),
+    /// A TCP port for the first channel, and one pseudo-terminal for each of the others.
+    TcpAndPtys(SocketAddr, Vec<Option<PathBuf>>),
 }
 
 /// How a device is put on a wire.
@@ -110,12 +112,18 @@ impl Line {
     }
 }
 
-enum Plug {
-    /// One a channel.
-    Ptys(Vec<Pty>),
-    Tcp(TcpListener),
-    /// A fault has pulled it.
-    Pulled,
+/// What is plugged in; nothing once a fault has pulled it.
+#[derive(Default)]
+struct Plug {
+    listener: Option<TcpListener>,
+    /// Of a channel. Whoever has none here gets clients of the listener.
+    ptys: Vec<Option<Pty>>,
+}
+
+impl Plug {
+    fn pty(&mut self, channel: usize) -> Option<&mut Pty> {
+        self.ptys.get_mut(channel)?.as_mut()
+    }
 }
 
 /// Lets clients talk to a device until `stop` is set. `orders` are lines that [`Order::parse`] reads, each
@@ -177,7 +185,7 @@ impl<'a> Server<'a> {
             device,
             options,
             start: Instant::now(),
-            plug: Plug::Pulled,
+            plug: Plug::default(),
             address: String::new(),
             bound: None,
             lines,
@@ -192,32 +200,42 @@ impl<'a> Server<'a> {
 
     fn plug_in(&mut self) -> Result<(), ServeError> {
         match &self.options.place {
-            Place::Pty(link) => self.plug_in_ptys(std::slice::from_ref(link))?,
-            Place::Ptys(links) => self.plug_in_ptys(links)?,
-            Place::Tcp(address) => {
-                let address = self.bound.unwrap_or(*address);
-                let open = || -> io::Result<(TcpListener, SocketAddr)> {
-                    let listener = TcpListener::bind(address)?;
-                    listener.set_nonblocking(true)?;
-                    let bound = listener.local_addr()?;
-                    Ok((listener, bound))
-                };
-                let (listener, bound) = open().map_err(|err| ServeError::Open {
-                    place: address.to_string(),
-                    detail: err.to_string(),
-                })?;
-                self.bound = Some(bound);
-                self.address = bound.to_string();
-                self.plug = Plug::Tcp(listener);
+            Place::Pty(link) => self.plug_in_ptys(0, std::slice::from_ref(link))?,
+            Place::Ptys(links) => self.plug_in_ptys(0, links)?,
+            Place::Tcp(address) => self.plug_in_tcp(*address)?,
+            Place::TcpAndPtys(address, links) => {
+                self.plug_in_ptys(1, links)?;
+                let of_ptys = std::mem::take(&mut self.address);
+                self.plug_in_tcp(*address)?;
+                self.address = format!("{}, {of_ptys}", self.address);
             }
         }
         Ok(())
     }
 
-    fn plug_in_ptys(&mut self, links: &[Option<PathBuf>]) -> Result<(), ServeError> {
-        let mut ptys = Vec::new();
+    fn plug_in_tcp(&mut self, address: SocketAddr) -> Result<(), ServeError> {
+        let address = self.bound.unwrap_or(address);
+        let open = || -> io::Result<(TcpListener, SocketAddr)> {
+            let listener = TcpListener::bind(address)?;
+            listener.set_nonblocking(true)?;
+            let bound = listener.local_addr()?;
+            Ok((listener, bound))
+        };
+        let (listener, bound) = open().map_err(|err| ServeError::Open {
+            place: address.to_string(),
+            detail: err.to_string(),
+        })?;
+        self.bound = Some(bound);
+        self.address = bound.to_string();
+        self.plug.listener = Some(listener);
+        Ok(())
+    }
+
+    /// One for each channel from `first` on.
+    fn plug_in_ptys(&mut self, first: usize, links: &[Option<PathBuf>]) -> Result<(), ServeError> {
+        let mut ptys: Vec<Option<Pty>> = (0..first).map(|_| None).collect();
         let mut addresses = Vec::new();
-        for link in links.iter().take(self.lines.len()) {
+        for link in links.iter().take(self.lines.len() - first) {
             let pty = Pty::open(link.as_deref()).map_err(|err| ServeError::Open {
                 place: link.as_deref().map_or_else(
                     || "a pseudo-terminal".to_owned(),
@@ -227,10 +245,10 @@ impl<'a> Server<'a> {
             })?;
             let path = link.as_ref().unwrap_or(&pty.path);
             addresses.push(path.display().to_string());
-            ptys.push(pty);
+            ptys.push(Some(pty));
         }
         self.address = addresses.join(", ");
-        self.plug = Plug::Ptys(ptys);
+        self.plug.ptys = ptys;
         Ok(())
     }
 
@@ -240,7 +258,7 @@ impl<'a> Server<'a> {
             FaultKind::Device(fault) => self.device.suffer(now, fault, turn.is_on),
             FaultKind::Line(_) => {}
             FaultKind::Disconnect if turn.is_on => {
-                self.plug = Plug::Pulled;
+                self.plug = Plug::default();
                 for channel in 0..self.lines.len() {
                     if self.lines[channel].stream.is_some() {
                         self.device.disconnect(now, channel);
@@ -267,19 +285,14 @@ impl<'a> Server<'a> {
             tv_nsec: until.since(now).0 as i64,
         };
         let mut watched: Vec<PollFd<'_>> = Vec::new();
-        match &self.plug {
-            Plug::Tcp(listener) => {
-                watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN))
-            }
+        if let Some(listener) = &self.plug.listener {
+            watched.push(PollFd::from_borrowed_fd(listener.as_fd(), PollFlags::IN));
+        }
+        for (pty, line) in self.plug.ptys.iter().zip(&self.lines) {
             // Without a client a pseudo-terminal reports a hang-up again and again.
-            Plug::Ptys(ptys) => {
-                for (pty, line) in ptys.iter().zip(&self.lines) {
-                    if pty.has_client {
-                        watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags(line)));
-                    }
-                }
+            if let Some(pty) = pty.as_ref().filter(|pty| pty.has_client) {
+                watched.push(PollFd::from_borrowed_fd(pty.as_fd(), flags(line)));
             }
-            Plug::Pulled => {}
         }
         for line in &self.lines {
             if let Some(stream) = &line.stream {
@@ -294,13 +307,15 @@ impl<'a> Server<'a> {
 
     /// New clients get the first free channel; one too many is reset (DMC-1400 command reference, `IH`).
     fn accept(&mut self) {
-        let Plug::Tcp(listener) = &self.plug else {
+        let Some(listener) = &self.plug.listener else {
             return;
         };
         while let Ok((stream, _)) = listener.accept() {
             let now = Nanos(self.start.elapsed().as_nanos() as u64);
             let is_ready = stream.set_nonblocking(true).is_ok() && stream.set_nodelay(true).is_ok();
-            let free = self.lines.iter().position(|line| line.stream.is_none());
+            let has_pty = |channel| matches!(self.plug.ptys.get(channel), Some(Some(_)));
+            let free = (0..self.lines.len())
+                .find(|channel| self.lines[*channel].stream.is_none() && !has_pty(*channel));
             match free.filter(|_| is_ready) {
                 Some(channel) => {
                     self.lines[channel].clear();
@@ -353,9 +368,8 @@ impl<'a> Server<'a> {
 
     /// What a client has sent, and whether it has gone.
     fn read(&mut self, channel: usize) -> (Vec<u8>, bool) {
-        if let Plug::Ptys(ptys) = &mut self.plug {
-            let bytes = ptys.get_mut(channel).map_or_else(Vec::new, Pty::read);
-            return (bytes, false);
+        if let Some(pty) = self.plug.pty(channel) {
+            return (pty.read(), false);
         }
         let mut all = Vec::new();
         let Some(stream) = &mut self.lines[channel].stream else {
@@ -387,15 +401,11 @@ impl<'a> Server<'a> {
         if line.unsent.is_empty() {
             return;
         }
-        let sent = match (&mut self.plug, &mut line.stream) {
-            (Plug::Ptys(ptys), _) => match ptys.get_mut(channel) {
-                Some(pty) => pty.write(&line.unsent),
-                // The channel has no line of its own.
-                None => line.unsent.len(),
-            },
-            (_, Some(stream)) => stream.write(&line.unsent).unwrap_or(0),
+        let sent = match (self.plug.pty(channel), &mut line.stream) {
+            (Some(pty), _) => pty.write(&line.unsent),
+            (None, Some(stream)) => stream.write(&line.unsent).unwrap_or(0),
             // Nobody is there.
-            (_, None) => line.unsent.len(),
+            (None, None) => line.unsent.len(),
         };
         line.unsent.drain(..sent);
     }
@@ -411,13 +421,10 @@ impl<'a> Server<'a> {
                 .lines
                 .iter()
                 .all(|line| line.unsent.is_empty() && line.from_device.next_at().is_none());
-            let is_read = match &mut self.plug {
-                Plug::Ptys(ptys) => ptys.iter_mut().all(|pty| {
-                    pty.read();
-                    !pty.has_client
-                }),
-                _ => true,
-            };
+            let is_read = self.plug.ptys.iter_mut().flatten().all(|pty| {
+                pty.read();
+                !pty.has_client
+            });
             if is_sent && is_read {
                 return;
             }

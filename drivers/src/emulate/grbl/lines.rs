@@ -38,6 +38,8 @@ impl Grbl {
     fn take(&mut self, byte: u8) {
         match byte {
             b'\r' | b'\n' => {
+                // What was asked for at once is told before a line is done (protocol.c).
+                self.tell_status();
                 let line = std::mem::take(&mut self.line);
                 let is_overlong = std::mem::take(&mut self.is_overlong);
                 self.is_comment = None;

@@ -332,6 +332,12 @@ impl Grbl {
         true
     }
 
+    fn tell_status(&mut self) {
+        if self.now >= self.busy_until && std::mem::take(&mut self.is_asked) {
+            self.say_status();
+        }
+    }
+
     /// Blocks that wait begin (`protocol_auto_cycle_start`).
     fn start(&mut self) {
         if self.state == State::Idle && !self.planner.is_idle() {
@@ -429,9 +435,7 @@ impl EmulatedAxis for Grbl {
         self.step();
         self.finish_reset();
         self.read_lines();
-        if now >= self.busy_until && std::mem::take(&mut self.is_asked) {
-            self.say_status();
-        }
+        self.tell_status();
     }
 
     fn place_mm(&self) -> f64 {
