@@ -1,5 +1,7 @@
 //! The Grbl driver against the emulated board: in simulated time, and over real wires.
 
+#[path = "grbl/answers.rs"]
+mod answers;
 #[path = "grbl/bench.rs"]
 mod bench;
 #[path = "grbl/faults.rs"]

@@ -79,6 +79,11 @@ impl Eeprom {
         eeprom
     }
 
+    /// The numbered settings of another.
+    pub fn take_numbers_of(&mut self, other: &Self) {
+        self.values.clone_from(&other.values);
+    }
+
     /// A value; zero for a number that there is not.
     #[must_use]
     pub fn get(&self, number: u16) -> f64 {

@@ -1,30 +1,43 @@
 //! Lines: read out of the buffer one after the other, each answered by `ok` or `error:N`.
 
-use super::gcode::{self, Motion, Parsed};
+use super::gcode::{self, Flow, Motion, Parsed};
 use super::homing::Homing;
 use super::{FEED_MIN, Grbl, LINE_MAX, State};
+use palpate_model::Nanos;
+
+/// A line whose answer comes later.
+#[derive(Clone, Debug)]
+pub(super) enum Pending {
+    /// Ways that wait for room in the planner.
+    Room(Vec<Motion>),
+    /// All before it is to be done first.
+    Rest(Box<Parsed>),
+    /// A dwell, and the ways after it.
+    Until(Nanos, Vec<Motion>),
+}
 
 impl Grbl {
     /// Takes lines while there is nothing to wait for.
     pub(super) fn read_lines(&mut self) {
         loop {
-            if let Some(motion) = self.waiting.take() {
-                if self.planner.is_full() {
-                    self.waiting = Some(motion);
-                    self.start();
-                    return;
-                }
-                self.plan(motion);
-                self.say("ok\r\n");
-            }
             let is_blocked = self.is_waiting_for_reset
+                || self.is_resetting
                 || self.now < self.busy_until
                 || self.homing.is_some()
                 || self.is_probing
                 || self.is_cancelling
-                || matches!(self.state, State::Hold | State::Sleep);
+                || matches!(self.state, State::Hold | State::Door | State::Sleep);
             if is_blocked {
                 return;
+            }
+            if let Some(pending) = self.waiting.take() {
+                let result = self.go_on(pending);
+                self.answer(result);
+                if self.waiting.is_some() {
+                    self.start();
+                    return;
+                }
+                continue;
             }
             let Some(byte) = self.rx.pop_front() else {
                 self.start();
@@ -48,12 +61,7 @@ impl Grbl {
                 } else {
                     self.execute(&String::from_utf8_lossy(&line))
                 };
-                match result {
-                    Ok(true) => self.say("ok\r\n"),
-                    // Its `ok` comes when it is done.
-                    Ok(false) => {}
-                    Err(code) => self.say(&format!("error:{code}\r\n")),
-                }
+                self.answer(result);
             }
             _ if self.is_overlong => {}
             b')' if self.is_comment == Some(b'(') => self.is_comment = None,
@@ -65,8 +73,17 @@ impl Grbl {
         }
     }
 
+    fn answer(&mut self, result: Result<bool, u8>) {
+        match result {
+            Ok(true) => self.say("ok\r\n"),
+            // Its `ok` comes when it is done.
+            Ok(false) => {}
+            Err(code) => self.say(&format!("error:{code}\r\n")),
+        }
+    }
+
     /// Does a line; `false` when its answer comes later.
-    fn execute(&mut self, line: &str) -> Result<bool, u8> {
+    pub(super) fn execute(&mut self, line: &str) -> Result<bool, u8> {
         if line.is_empty() {
             return Ok(true);
         }
@@ -76,52 +93,91 @@ impl Grbl {
         if matches!(self.state, State::Alarm | State::Jog) {
             return Err(9);
         }
-        let parsed = gcode::parse(line, self.modes, false, self.planner.end(), self.offset)?;
+        let here = self.planner.end();
+        let parsed = gcode::parse(line, self.modes, false, here, &self.offsets)?;
+        if parsed.waits_for_rest && !self.planner.is_idle() && self.state != State::Check {
+            self.waiting = Some(Pending::Rest(Box::new(parsed)));
+            return Ok(false);
+        }
         self.obey(parsed)
     }
 
-    fn obey(&mut self, parsed: Parsed) -> Result<bool, u8> {
-        self.modes = parsed.modes;
-        if parsed.is_end {
-            self.modes = gcode::Modes::default();
-            self.say("[MSG:Pgm End]\r\n");
-        }
-        let Some(motion) = parsed.motion.filter(|_| self.state != State::Check) else {
-            return Ok(true);
-        };
-        if motion.kind == 38 {
-            if !self.planner.is_idle() {
-                // It would wait until all is done; this bench has no use for that.
-                return Err(8);
+    /// Goes on with a line that had to wait.
+    fn go_on(&mut self, pending: Pending) -> Result<bool, u8> {
+        match pending {
+            Pending::Rest(parsed) if self.planner.is_idle() => self.obey(*parsed),
+            Pending::Until(until, motions) if self.now >= until => self.queue(motions),
+            Pending::Room(motions) if !self.planner.is_full() => self.queue(motions),
+            other => {
+                self.waiting = Some(other);
+                Ok(false)
             }
-            if self.is_probe() {
-                self.alarm(4, false);
-                return Ok(true);
-            }
-            if motion.to == self.planner.end() {
-                return Err(33);
-            }
-            self.probed.1 = false;
-            self.is_probing = true;
-            self.plan(motion);
-            self.state = State::Run;
-            return Ok(false);
         }
-        if self.eeprom.flag(20) && self.is_beyond(&motion) {
-            // Grbl brakes before it tells; here it stands. The line is done with the reset.
-            self.alarm(2, true);
-            self.is_line_owed = true;
-            return Ok(false);
-        }
-        self.queue(motion)
     }
 
-    fn queue(&mut self, motion: Motion) -> Result<bool, u8> {
-        if self.planner.is_full() {
-            self.waiting = Some(motion);
+    fn obey(&mut self, parsed: Parsed) -> Result<bool, u8> {
+        let (modes, before) = (parsed.modes, self.modes);
+        if parsed.offsets != self.offsets || modes.system != before.system {
+            self.reports.tell_offset();
+        }
+        let is_told = |modes: &gcode::Modes| (modes.spindle, modes.has_coolant);
+        if is_told(&modes) != is_told(&before) {
+            self.reports.tell_overrides();
+        }
+        (self.modes, self.offsets) = (modes, parsed.offsets);
+        match parsed.flow {
+            Flow::Runs => {}
+            Flow::Pauses if self.state == State::Check => {}
+            Flow::Pauses => self.state = State::Hold,
+            Flow::Ends => {
+                self.modes = modes.after_end();
+                self.reports.tell_offset();
+                self.say("[MSG:Pgm End]\r\n");
+            }
+        }
+        if self.state == State::Check {
+            return Ok(true);
+        }
+        let motions: Vec<Motion> = parsed.via.into_iter().chain(parsed.motion).collect();
+        if let Some(seconds) = parsed.dwell {
+            let until = self.now + Nanos((seconds * 1e9) as u64);
+            self.waiting = Some(Pending::Until(until, motions));
             return Ok(false);
         }
+        match motions[..] {
+            [motion] if motion.kind > 80 => self.probe(motion),
+            _ => self.queue(motions),
+        }
+    }
+
+    /// `G38.2` to `G38.5` from rest (motion_control.c, `mc_probe_cycle`).
+    fn probe(&mut self, motion: Motion) -> Result<bool, u8> {
+        self.is_probe_away = motion.kind >= 384;
+        self.probed.1 = false;
+        if self.is_probe() != self.is_probe_away {
+            self.alarm(4, false);
+            return Ok(true);
+        }
+        self.is_probing = true;
         self.plan(motion);
+        self.state = State::Run;
+        Ok(false)
+    }
+
+    fn queue(&mut self, mut motions: Vec<Motion>) -> Result<bool, u8> {
+        while !motions.is_empty() {
+            if self.eeprom.flag(20) && self.is_beyond(&motions[0]) {
+                // Grbl brakes before it tells; here it stands. The line is done with the reset.
+                self.alarm(2, true);
+                self.is_line_owed = true;
+                return Ok(false);
+            }
+            if self.planner.is_full() {
+                self.waiting = Some(Pending::Room(motions));
+                return Ok(false);
+            }
+            self.plan(motions.remove(0));
+        }
         Ok(true)
     }
 
@@ -158,14 +214,13 @@ impl Grbl {
         let Some(words) = line.strip_prefix('=') else {
             return Err(3);
         };
-        let parsed = gcode::parse(words, self.modes, true, self.planner.end(), self.offset)?;
-        let Some(motion) = parsed.motion else {
-            return Err(16);
-        };
-        if self.eeprom.flag(20) && self.is_beyond(&motion) {
+        let here = self.planner.end();
+        let parsed = gcode::parse(words, self.modes, true, here, &self.offsets)?;
+        let motions: Vec<Motion> = parsed.motion.into_iter().collect();
+        if self.eeprom.flag(20) && motions.iter().any(|motion| self.is_beyond(motion)) {
             return Err(15);
         }
-        self.queue(motion)
+        self.queue(motions)
     }
 
     fn system(&mut self, command: &str) -> Result<bool, u8> {
@@ -220,8 +275,17 @@ impl Grbl {
                 self.say("ok\r\n[MSG:Sleeping]\r\n");
                 return Ok(false);
             }
-            "RST=$" | "RST=*" => {
-                self.eeprom = super::Eeprom::factory();
+            "RST=$" | "RST=#" | "RST=*" => {
+                let factory = super::Eeprom::factory();
+                if command != "RST=#" {
+                    self.eeprom.take_numbers_of(&factory);
+                }
+                if command != "RST=$" {
+                    self.offsets = gcode::Offsets::default();
+                }
+                if command == "RST=*" {
+                    self.eeprom = factory;
+                }
                 self.say("[MSG:Restoring defaults]\r\nok\r\n");
                 self.say_hello();
                 return Ok(false);
@@ -237,24 +301,26 @@ impl Grbl {
             text.clone_into(&mut self.eeprom.build_info);
             return Ok(());
         }
-        let (key, value) = command.split_once('=').ok_or(3)?;
-        if let Some(number) = key.strip_prefix('N') {
+        let line = command.strip_prefix('N');
+        let (key, rest) = gcode::number(line.unwrap_or(command)).ok_or(2)?;
+        let value = rest.strip_prefix('=').ok_or(3)?;
+        if line.is_some() {
             if self.state != State::Idle {
                 return Err(8);
             }
-            let number: usize = number.parse().map_err(|_| 2)?;
-            let place = self.eeprom.startup.get_mut(number).ok_or(3)?;
+            // Only what can be done is kept, and so it is done.
+            if !value.is_empty() {
+                self.execute(value)?;
+            }
+            let place = self.eeprom.startup.get_mut(key as usize).ok_or(3)?;
             value.clone_into(place);
             return Ok(());
         }
-        let number: u16 = key.parse().map_err(|_| {
-            if key.starts_with(|c: char| c.is_ascii_digit()) {
-                2
-            } else {
-                3
-            }
-        })?;
-        let value: f64 = value.parse().map_err(|_| 2)?;
+        let (value, rest) = gcode::number(value).ok_or(2)?;
+        if !rest.is_empty() || key > 255.0 {
+            return Err(3);
+        }
+        let number = key as u16;
         self.eeprom.set(number, value)?;
         let here = self.machine();
         if self.planner.is_idle() {

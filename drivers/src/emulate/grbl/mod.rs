@@ -15,7 +15,7 @@ pub use eeprom::Eeprom;
 
 use super::DeviceFault;
 use super::bench::{EmulatedAxis, Switches};
-use gcode::Modes;
+use gcode::{Modes, Offsets};
 use homing::Homing;
 use palpate_model::Nanos;
 use planner::{AXES, Place, Planner};
@@ -73,6 +73,8 @@ enum State {
     Run,
     Jog,
     Hold,
+    /// The safety door was said to be open.
+    Door,
     Alarm,
     Home,
     Check,
@@ -102,14 +104,15 @@ pub struct Grbl {
     line: Vec<u8>,
     is_comment: Option<u8>,
     is_overlong: bool,
-    /// A line that waits for room in the planner.
-    waiting: Option<gcode::Motion>,
+    /// A line that is not answered yet.
+    waiting: Option<lines::Pending>,
     tx: Vec<u8>,
     planner: Planner,
     modes: Modes,
-    offset: Place,
+    offsets: Offsets,
     probed: (Place, bool),
     is_probing: bool,
+    is_probe_away: bool,
     homing: Option<Homing>,
     steps: [i64; AXES],
     /// What the counter reads less than it did, in mm, not told yet.
@@ -145,9 +148,10 @@ impl Grbl {
             tx: Vec::new(),
             planner: Planner::default(),
             modes: Modes::default(),
-            offset: [0.0; AXES],
+            offsets: Offsets::default(),
             probed: ([0.0; AXES], false),
             is_probing: false,
+            is_probe_away: false,
             homing: None,
             steps: [0; AXES],
             shift: 0.0,
@@ -183,6 +187,9 @@ impl Grbl {
         (self.is_comment, self.is_overlong) = (None, false);
         self.waiting = None;
         self.modes = Modes::default();
+        self.offsets.shift = [0.0; AXES];
+        self.offsets.tool = 0.0;
+        self.probed = ([0.0; AXES], false);
         self.homing = None;
         self.is_probing = false;
         self.is_cancelling = false;
@@ -213,6 +220,15 @@ impl Grbl {
             self.state = State::Alarm;
         } else {
             self.state = State::Idle;
+            for line in self.eeprom.startup.clone() {
+                if !line.is_empty() {
+                    let said = match self.execute(&line) {
+                        Ok(_) => "ok".to_owned(),
+                        Err(code) => format!("error:{code}"),
+                    };
+                    self.say(&format!(">{line}:{said}\r\n"));
+                }
+            }
         }
     }
 
@@ -257,13 +273,18 @@ impl Grbl {
 
     fn is_moving(&self) -> bool {
         matches!(self.state, State::Run | State::Jog | State::Home)
-            || (self.state == State::Hold && !self.planner.is_idle())
+            || (matches!(self.state, State::Hold | State::Door) && !self.planner.is_idle())
+    }
+
+    fn has_line_under_way(&self) -> bool {
+        self.waiting.is_some() || self.homing.is_some() || self.is_probing
     }
 
     /// An alarm, after which the axis stands still at once.
     fn alarm(&mut self, code: u8, is_critical: bool) {
         self.say(&format!("ALARM:{code}\r\n"));
         self.busy_until = self.now + ALARM_PAUSE;
+        self.is_line_owed |= is_critical && self.has_line_under_way();
         self.planner.clear(self.machine());
         self.waiting = None;
         self.homing = None;
@@ -280,7 +301,7 @@ impl Grbl {
     /// Ctrl-X (motion_control.c, `mc_reset`).
     fn reset(&mut self) {
         // A line that is being done ends with its `ok` all the same (protocol.c, `protocol_main_loop`).
-        self.is_line_owed |= self.waiting.is_some() || self.homing.is_some() || self.is_probing;
+        self.is_line_owed |= self.has_line_under_way();
         if self.homing.is_some() {
             self.alarm(6, false);
         } else if self.is_moving() {
@@ -321,7 +342,17 @@ impl Grbl {
                 self.state = State::Hold;
                 self.planner.hold();
             }
-            b'~' if self.state == State::Hold && self.planner.is_idle() => {
+            0x84 if matches!(
+                self.state,
+                State::Run | State::Idle | State::Hold | State::Jog
+            ) =>
+            {
+                self.say("[MSG:Check Door]\r\n");
+                self.is_cancelling = self.state == State::Jog;
+                self.state = State::Door;
+                self.planner.hold();
+            }
+            b'~' if matches!(self.state, State::Hold | State::Door) && self.planner.is_idle() => {
                 self.planner.resume();
                 self.state = State::Idle;
                 self.start();
@@ -354,7 +385,7 @@ impl Grbl {
                 self.steps[axis] = (point.place[axis] * self.steps_per_mm(axis)).round() as i64;
             }
             self.speed = point.speed;
-            if self.is_probing && self.is_probe() {
+            if self.is_probing && self.is_probe() != self.is_probe_away {
                 self.probed = (self.machine(), true);
                 self.planner.hold();
             }
@@ -363,8 +394,11 @@ impl Grbl {
             self.speed = 0.0;
             match self.state {
                 State::Jog | State::Run if self.is_cancelling || self.is_probing => {
+                    self.state = State::Idle;
                     self.finish_early();
                 }
+                // A jog does not go on behind a door.
+                State::Door if self.is_cancelling => self.finish_early(),
                 State::Jog | State::Run => self.state = State::Idle,
                 _ => {}
             }
@@ -385,18 +419,18 @@ impl Grbl {
     fn finish_early(&mut self) {
         self.planner.clear(self.machine());
         self.is_cancelling = false;
-        self.state = State::Idle;
-        if std::mem::take(&mut self.is_probing) {
-            if self.probed.1 {
-                self.say_probe();
-                self.say("ok\r\n");
+        if !std::mem::take(&mut self.is_probing) {
+            return;
+        }
+        if !self.probed.1 {
+            if matches!(self.modes.motion, 383 | 385) {
+                self.probed.0 = self.machine();
             } else {
-                self.probed = (self.machine(), false);
-                self.say_probe();
                 self.alarm(5, false);
-                self.say("ok\r\n");
             }
         }
+        self.say_probe();
+        self.say("ok\r\n");
     }
 }
 

@@ -1,6 +1,6 @@
 //! Status reports and what the queries print (doc/markdown/interface.md; forms as in report.c).
 
-use super::planner::{AXES, Place};
+use super::planner::Place;
 use super::{Grbl, RX_MAX, State};
 use std::fmt::Write;
 
@@ -16,6 +16,18 @@ pub struct Counters {
     overrides: u32,
 }
 
+impl Counters {
+    /// In the next report.
+    pub fn tell_offset(&mut self) {
+        self.offset = 0;
+    }
+
+    /// In the next report.
+    pub fn tell_overrides(&mut self) {
+        self.overrides = 0;
+    }
+}
+
 fn list(place: &Place) -> String {
     format!("{:.3},{:.3},{:.3}", place[0], place[1], place[2])
 }
@@ -28,6 +40,8 @@ impl Grbl {
             State::Jog => "Jog",
             State::Hold if self.planner.is_idle() => "Hold:0",
             State::Hold => "Hold:1",
+            State::Door if self.planner.is_idle() => "Door:0",
+            State::Door => "Door:2",
             State::Alarm => "Alarm",
             State::Home => "Home",
             State::Check => "Check",
@@ -41,8 +55,9 @@ impl Grbl {
         let scaled = |place: Place| place.map(|mm| mm * inch);
         let mask = self.eeprom.get(10) as u32;
         let here = self.machine();
+        let offset = self.offsets.of(self.modes.system);
         let mut text = if mask & 1 == 0 {
-            let work = std::array::from_fn(|axis| here[axis] - self.offset[axis]);
+            let work = std::array::from_fn(|axis| here[axis] - offset[axis]);
             format!("<{name}|WPos:{}", list(&scaled(work)))
         } else {
             format!("<{name}|MPos:{}", list(&scaled(here)))
@@ -56,7 +71,12 @@ impl Grbl {
                 RX_MAX - self.rx.len()
             );
         }
-        let _ = write!(text, "|FS:{:.0},0", self.speed * 60.0 * inch);
+        let spindle = if self.modes.spindle == 5 {
+            0.0
+        } else {
+            self.modes.spindle_speed
+        };
+        let _ = write!(text, "|FS:{:.0},{spindle:.0}", self.speed * 60.0 * inch);
         if self.is_probe() || self.is_limit() {
             text.push_str("|Pn:");
             if self.is_probe() {
@@ -72,10 +92,21 @@ impl Grbl {
             self.reports.offset = again(OFFSET_BUSY);
             // The overrides follow in the next report.
             self.reports.overrides = self.reports.overrides.max(1);
-            let _ = write!(text, "|WCO:{}", list(&scaled(self.offset)));
+            let _ = write!(text, "|WCO:{}", list(&scaled(offset)));
         } else if self.reports.overrides == 0 {
             self.reports.overrides = again(OVERRIDES_BUSY);
             text.push_str("|Ov:100,100,100");
+            let accessories: String = [
+                (self.modes.spindle == 3, 'S'),
+                (self.modes.spindle == 4, 'C'),
+                (self.modes.has_coolant, 'F'),
+            ]
+            .into_iter()
+            .filter_map(|(is_on, letter)| is_on.then_some(letter))
+            .collect();
+            if !accessories.is_empty() {
+                let _ = write!(text, "|A:{accessories}");
+            }
         }
         self.reports.offset = self.reports.offset.saturating_sub(1);
         self.reports.overrides = self.reports.overrides.saturating_sub(1);
@@ -93,30 +124,32 @@ impl Grbl {
     }
 
     pub(super) fn say_offsets(&mut self) {
-        for name in [
+        let offsets = self.offsets;
+        let names = [
             "G54", "G55", "G56", "G57", "G58", "G59", "G28", "G30", "G92",
-        ] {
-            let place = if name == "G92" {
-                self.offset
-            } else {
-                [0.0; AXES]
-            };
-            self.say(&format!("[{name}:{}]\r\n", list(&place)));
+        ];
+        let shift = [offsets.shift];
+        let places = offsets.systems.iter().chain(&offsets.stored).chain(&shift);
+        for (name, place) in names.iter().zip(places) {
+            self.say(&format!("[{name}:{}]\r\n", list(place)));
         }
-        self.say("[TLO:0.000]\r\n");
+        self.say(&format!("[TLO:{:.3}]\r\n", offsets.tool));
         self.say_probe();
     }
 
     pub(super) fn say_modes(&mut self) {
-        let motion = match self.modes.motion {
-            38 => "38.2".to_owned(),
+        let modes = self.modes;
+        let motion = match modes.motion {
+            probe @ 382.. => format!("38.{}", probe - 380),
             other => other.to_string(),
         };
-        let units = if self.modes.is_inch { 20 } else { 21 };
-        let distance = if self.modes.is_relative { 91 } else { 90 };
+        let units = if modes.is_inch { 20 } else { 21 };
+        let distance = if modes.is_relative { 91 } else { 90 };
+        let feed_mode = if modes.is_inverse { 93 } else { 94 };
+        let coolant = if modes.has_coolant { 8 } else { 9 };
         self.say(&format!(
-            "[GC:G{motion} G54 G17 G{units} G{distance} G94 M5 M9 T0 F{:.0} S0]\r\n",
-            self.modes.feed
+            "[GC:G{motion} G{} G{} G{units} G{distance} G{feed_mode} M{} M{coolant} T{} F{:.0} S{:.0}]\r\n",
+            54 + modes.system, modes.plane, modes.spindle, modes.tool, modes.feed, modes.spindle_speed
         ));
     }
 
