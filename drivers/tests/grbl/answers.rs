@@ -77,7 +77,7 @@ fn headers_of_post_processors_are_taken() {
     }
     assert_eq!(
         board.say("$G\n"),
-        "[GC:G0 G54 G17 G21 G90 G94 M3 M8 T1 F0 S1000]\r\nok\r\n"
+        "[GC:G0 G54 G17 G21 G90 G94 M3 M8 T0 F0 S1000]\r\nok\r\n"
     );
     assert_eq!(
         board.say("?"),
@@ -90,7 +90,7 @@ fn headers_of_post_processors_are_taken() {
     assert_eq!(board.say("M30\n"), "[MSG:Pgm End]\r\nok\r\n");
     assert_eq!(
         board.say("$G\n"),
-        "[GC:G1 G54 G17 G21 G90 G94 M5 M9 T1 F0 S1000]\r\nok\r\n"
+        "[GC:G1 G54 G17 G21 G90 G94 M5 M9 T0 F0 S1000]\r\nok\r\n"
     );
 }
 
@@ -218,10 +218,32 @@ fn startup_lines_are_tried_kept_and_done() {
         ("$300=1", 3),
         ("$9=1", 3),
         ("$J", 3),
-        ("$N2=G20", 3),
+        ("$J=X1F1G2", 35),
+        ("$$$", 3),
+        ("$G1", 3),
+        ("$H1", 5),
+        ("$SLP1", 3),
+        ("$RST=x", 3),
+        ("$Ix", 3),
     ] {
         assert_eq!(board.say(&format!("{line}\n")), format!("error:{code}\r\n"));
     }
+}
+
+#[test]
+fn overrides_are_told_at_once() {
+    let mut board = Board::new();
+    board.say("?");
+    for (byte, told) in [
+        (0x91, "110,100,100"),
+        (0x96, "110,50,100"),
+        (0x9b, "110,50,90"),
+        (0x90, "100,50,90"),
+    ] {
+        board.byte(byte);
+        assert!(board.say("?").contains(&format!("|Ov:{told}>")));
+    }
+    assert_eq!(board.say("$J=F100\n"), "ok\r\n");
 }
 
 #[test]
@@ -247,8 +269,8 @@ fn a_door_stops_and_is_closed_again() {
 fn a_probe_that_finds_nothing_is_an_alarm_before_its_place() {
     let mut board = Board::new();
     assert_eq!(board.say("G38.2X0.1F600\n"), "");
-    let said = board.pass(1_000);
-    assert_eq!(said, "ALARM:5\r\n[PRB:0.000,0.000,0.000:0]\r\nok\r\n");
+    assert_eq!(board.pass(400), "ALARM:5\r\n");
+    assert_eq!(board.pass(600), "[PRB:0.000,0.000,0.000:0]\r\nok\r\n");
     assert_eq!(
         board.say("$X\nG38.3X0.2F600\n"),
         "[MSG:Caution: Unlocked]\r\nok\r\n"

@@ -1,12 +1,12 @@
 //! Words of a block of G-code: what it asks for, or why it is refused (gnea/grbl, gcode.c; doc/csv/error_codes_en_US.csv).
-//! Arcs alone are left out: a slide has no plane.
+//! Arcs alone are left out: a slide has no plane. They are read, and refused as not supported if nothing else is wrong.
 
 use super::planner::{AXES, Place};
 
 /// Modes that stay from block to block.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Modes {
-    /// 0, 1, 80, or 382 to 385 for `G38.2` to `G38.5`.
+    /// 0 to 3, 80, or 382 to 385 for `G38.2` to `G38.5`.
     pub motion: u16,
     /// 17, 18 or 19.
     pub plane: u8,
@@ -269,7 +269,7 @@ fn take_g(block: &mut Modes, words: &mut Words, whole: i64, part: i64) -> Result
             }
             0
         }
-        0 | 1 | 38 | 80 => {
+        0..=3 | 38 | 80 => {
             if whole != 80 {
                 words.claim_axes(AxisUse::Motion)?;
                 words.has_motion_word = true;
@@ -401,9 +401,8 @@ fn finish(line: Line, mut offsets: Offsets, mut words: Words, flow: Flow) -> Res
     if let Some(speed) = words.value('S') {
         block.spindle_speed = speed;
     }
-    if let Some(tool) = words.value('T') {
-        block.tool = tool as u8;
-    }
+    // A block without it forgets it.
+    block.tool = words.value('T').map_or(0, |tool| tool as u8);
     let dwell = match words.non_modal {
         4 => Some(words.take('P').ok_or(28_u8)?),
         _ => None,
@@ -476,6 +475,9 @@ fn finish(line: Line, mut offsets: Offsets, mut words: Words, flow: Flow) -> Res
         if block.motion != 0 && block.feed == 0.0 {
             return Err(22);
         }
+        if matches!(block.motion, 2 | 3) {
+            return Err(arc(&block, &words, axes));
+        }
         if block.motion > 80 {
             if !has_axes {
                 return Err(26);
@@ -519,9 +521,6 @@ fn finish(line: Line, mut offsets: Offsets, mut words: Words, flow: Flow) -> Res
         let is_plain = words.groups & !(1 << 0 | 1 << 3 | 1 << 6) == 0;
         if !is_plain || !matches!(words.non_modal, 0 | 53) {
             return Err(16);
-        }
-        if motion.is_none() {
-            return Err(26);
         }
         // A jog leaves everything as it was (doc/markdown/jogging.md).
         return Ok(Parsed {
@@ -576,6 +575,23 @@ fn feed(
     })
 }
 
+/// Why an arc is refused.
+fn arc(block: &Modes, words: &Words, axes: [Option<f64>; AXES]) -> u8 {
+    let plane = match block.plane {
+        17 => [0, 1],
+        18 => [2, 0],
+        _ => [1, 2],
+    };
+    let centre = [words.value('I'), words.value('J'), words.value('K')];
+    let is_in_plane = |all: &[Option<f64>; 3]| plane.iter().any(|axis| all[*axis].is_some());
+    match () {
+        () if axes.iter().all(Option::is_none) => 26,
+        () if !is_in_plane(&axes) => 32,
+        () if words.value('R').is_none() && !is_in_plane(&centre) => 35,
+        () => 20,
+    }
+}
+
 /// `G10 L2` and `G10 L20`.
 fn store(
     offsets: &mut Offsets,
@@ -587,7 +603,7 @@ fn store(
     if axes.iter().all(Option::is_none) {
         return Err(26);
     }
-    if words.value('P').is_none() || words.value('L').is_none() {
+    if words.value('P').is_none() && words.value('L').is_none() {
         return Err(28);
     }
     let number = words.take('P').map_or(0, |number| number as usize);
@@ -636,8 +652,8 @@ mod tests {
         assert_eq!(jog("G91X1F5").unwrap().modes, Modes::default());
         for (line, error) in [
             ("X1", 22),
-            ("F100", 26),
             ("G1X1F1", 16),
+            ("X1F1G2", 35),
             ("X1F1M3", 16),
             ("X1F1S5", 36),
             ("X1F1A1", 20),
@@ -679,9 +695,13 @@ mod tests {
             ("M3M5", 21),
             ("M7", 20),
             ("G61.1", 20),
-            ("G2X1Y1I1", 20),
+            ("G2X1Y1F1", 35),
+            ("G2Z1F1", 32),
+            ("G2F1", 26),
+            ("G2X1I1F1", 20),
             ("G4", 28),
-            ("G10P1X1", 28),
+            ("G10X1", 28),
+            ("G10P1X1", 20),
             ("G10L2P7X1", 29),
             ("G10L3P1X1", 20),
             ("G92", 26),

@@ -12,6 +12,8 @@ pub(super) enum Pending {
     Room(Vec<Motion>),
     /// All before it is to be done first.
     Rest(Box<Parsed>),
+    /// The place of a probe that found nothing is told after its alarm.
+    Probed,
     /// A dwell, and the ways after it.
     Until(Nanos, Vec<Motion>),
 }
@@ -107,6 +109,10 @@ impl Grbl {
         match pending {
             Pending::Rest(parsed) if self.planner.is_idle() => self.obey(*parsed),
             Pending::Until(until, motions) if self.now >= until => self.queue(motions),
+            Pending::Probed => {
+                self.say_probe();
+                Ok(true)
+            }
             Pending::Room(motions) if !self.planner.is_full() => self.queue(motions),
             other => {
                 self.waiting = Some(other);
@@ -232,7 +238,9 @@ impl Grbl {
             return self.jog(rest);
         }
         let is_free = matches!(self.state, State::Idle | State::Alarm);
+        let has_more = command.len() > 1;
         match command {
+            _ if has_more && command.starts_with(['$', 'G', 'C', 'X']) => return Err(3),
             "$" if matches!(self.state, State::Run | State::Hold) => return Err(8),
             "$" => {
                 let listing = self.eeprom.listing();
@@ -264,7 +272,7 @@ impl Grbl {
                     self.say(&format!("$N{number}={line}\r\n"));
                 }
             }
-            "H" if !self.eeprom.flag(22) => return Err(5),
+            _ if command.starts_with('H') && !self.eeprom.flag(22) => return Err(5),
             "H" => {
                 self.state = State::Home;
                 self.homing = Some(Homing::default());
@@ -290,6 +298,8 @@ impl Grbl {
                 self.say_hello();
                 return Ok(false);
             }
+            _ if command.starts_with(['#', 'H', 'S', 'R']) => return Err(3),
+            _ if command.starts_with('I') && !command.starts_with("I=") => return Err(3),
             _ => return self.store(command).map(|()| true),
         }
         Ok(true)

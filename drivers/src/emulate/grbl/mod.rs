@@ -121,6 +121,8 @@ pub struct Grbl {
     switches: Switches,
     was_limit: bool,
     is_asked: bool,
+    /// Of feed, rapids and spindle, in percent.
+    overrides: [u16; 3],
     reports: report::Counters,
     is_wrong: bool,
 }
@@ -159,6 +161,7 @@ impl Grbl {
             switches: Switches::default(),
             was_limit: false,
             is_asked: false,
+            overrides: [100; 3],
             reports: report::Counters::default(),
             is_wrong: false,
             settings,
@@ -197,12 +200,15 @@ impl Grbl {
         self.is_asked = false;
         self.speed = 0.0;
         self.reports = report::Counters::default();
+        self.overrides = [100; 3];
         self.planner.clear(self.machine());
+        let mut is_first = false;
         if std::mem::take(&mut self.is_first_start) {
-            // Observed with 1.1h compiled for a PC: unused memory is reported, then listed.
+            // Observed with 1.1h on an emulated ATmega328P: unused memory is reported, then listed.
             self.say("error:7\r\n");
             let listing = self.eeprom.listing();
             self.say(&listing);
+            is_first = true;
         }
         let hello = if self.is_wrong {
             "\r\nGrbl 0.9j ['$' for help]\r\n"
@@ -220,6 +226,9 @@ impl Grbl {
             self.state = State::Alarm;
         } else {
             self.state = State::Idle;
+            if is_first {
+                self.say(">:error:7\r\n>:error:7\r\n");
+            }
             for line in self.eeprom.startup.clone() {
                 if !line.is_empty() {
                     let said = match self.execute(&line) {
@@ -357,10 +366,38 @@ impl Grbl {
                 self.state = State::Idle;
                 self.start();
             }
+            0x90..=0x9d => self.override_by(byte),
+            0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
+                self.modes.has_coolant = !self.modes.has_coolant;
+                self.reports.tell_overrides();
+            }
             b'!' | b'~' | 0x80.. => {}
             _ => return false,
         }
         true
+    }
+
+    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); told, and nothing more.
+    fn override_by(&mut self, byte: u8) {
+        let [feed, rapid, spindle] = &mut self.overrides;
+        let (value, what) = match byte {
+            0x90..=0x94 => (feed, byte - 0x90),
+            0x99.. => (spindle, byte - 0x99),
+            0x95..=0x97 => {
+                *rapid = [100, 50, 25][usize::from(byte - 0x95)];
+                return self.reports.tell_overrides();
+            }
+            _ => return,
+        };
+        let changed = match what {
+            0 => 100,
+            1 => *value + 10,
+            2 => value.saturating_sub(10),
+            3 => *value + 1,
+            _ => value.saturating_sub(1),
+        };
+        *value = changed.clamp(10, 200);
+        self.reports.tell_overrides();
     }
 
     fn tell_status(&mut self) {
@@ -422,15 +459,14 @@ impl Grbl {
         if !std::mem::take(&mut self.is_probing) {
             return;
         }
-        if !self.probed.1 {
-            if matches!(self.modes.motion, 383 | 385) {
-                self.probed.0 = self.machine();
-            } else {
-                self.alarm(5, false);
-            }
+        let is_error = !self.probed.1 && matches!(self.modes.motion, 382 | 384);
+        if !self.probed.1 && !is_error {
+            self.probed.0 = self.machine();
         }
-        self.say_probe();
-        self.say("ok\r\n");
+        if is_error {
+            self.alarm(5, false);
+        }
+        self.waiting = Some(lines::Pending::Probed);
     }
 }
 

@@ -95,7 +95,8 @@ impl Grbl {
             let _ = write!(text, "|WCO:{}", list(&scaled(offset)));
         } else if self.reports.overrides == 0 {
             self.reports.overrides = again(OVERRIDES_BUSY);
-            text.push_str("|Ov:100,100,100");
+            let [feed, rapid, of_spindle] = self.overrides;
+            let _ = write!(text, "|Ov:{feed},{rapid},{of_spindle}");
             let accessories: String = [
                 (self.modes.spindle == 3, 'S'),
                 (self.modes.spindle == 4, 'C'),
