@@ -40,12 +40,12 @@ impl<const N: usize> Triangle<N> {
         self.back_substitute(count, |i| self.r[i][N - 1])
     }
 
-    /// Entry `(i, i)` of the inverse of `AᵀA` over all columns but the response.
-    pub fn inverse_diagonal(&self, index: usize) -> Option<f64> {
+    /// Entry `(i, i)` of the inverse of `AᵀA` over the first `count` columns.
+    pub fn inverse_diagonal(&self, index: usize, count: usize) -> Option<f64> {
         // Row `index` of R^-1: solve for each unit vector and keep that row.
         let mut sum = 0.0;
-        for column in index..N - 1 {
-            let unit = self.back_substitute(N - 1, |i| f64::from(u8::from(i == column)))?;
+        for column in index..count {
+            let unit = self.back_substitute(count, |i| f64::from(u8::from(i == column)))?;
             sum += unit[index].powi(2);
         }
         Some(sum)
@@ -88,7 +88,7 @@ mod tests {
         // A constant alone: (AᵀA)^-1 = 1 / rows.
         let mut constant = Triangle::<2>::default();
         (0..100).for_each(|_| constant.push([1.0, 0.0]));
-        assert!((constant.inverse_diagonal(0).unwrap() - 0.01).abs() < 1e-15);
+        assert!((constant.inverse_diagonal(0, 1).unwrap() - 0.01).abs() < 1e-15);
     }
 
     #[test]

@@ -46,13 +46,10 @@ fn fit(points: &[[f64; 2]], at: f64, degree: usize) -> Option<Local> {
         let square = if degree == 2 { u * u } else { 0.0 };
         triangle.push([1.0, u, square, *y]);
     }
-    // A line leaves the third column empty; a unit row in it alone changes nothing else.
-    if degree == 1 {
-        triangle.push([0.0, 0.0, 1.0, 0.0]);
-    }
-    let found = triangle.solve(3)?;
+    // A line leaves the third column empty.
+    let found = triangle.solve(columns)?;
     let variance = triangle.residual_sum() / (points.len() - columns) as f64;
-    let error = |index: usize| Some((variance * triangle.inverse_diagonal(index)?).sqrt());
+    let error = |index: usize| Some((variance * triangle.inverse_diagonal(index, columns)?).sqrt());
     Some(Local {
         value: [found[0], error(0)?],
         slope: [found[1] / reach, error(1)? / reach],

@@ -238,7 +238,8 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
     let coefficients = triangle.solve(COLUMNS - 1)?;
     let free = count.checked_sub(COLUMNS - 1).filter(|free| *free > 0)?;
     let variance = triangle.residual_sum() / free as f64;
-    let errors = triangle.inverse_diagonal(2)? + triangle.inverse_diagonal(3)?;
+    let errors =
+        triangle.inverse_diagonal(2, COLUMNS - 1)? + triangle.inverse_diagonal(3, COLUMNS - 1)?;
     Some(Fitted {
         coefficients,
         error: (variance * 0.5 * errors).sqrt(),

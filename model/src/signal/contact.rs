@@ -218,7 +218,7 @@ impl<'a> Pass<'a> {
         let (linear, cost) = self.solve(trial, 1)?;
         let rows = self.triangle(trial, Some(linear));
         let variance = cost / (self.points.len() - 5) as f64;
-        let std_error_mm = (variance * rows.inverse_diagonal(3)?).sqrt();
+        let std_error_mm = (variance * rows.inverse_diagonal(3, 5)?).sqrt();
         // Against no contact at all the fit must gain what noise cannot: the gain in units of the
         // variance is chi-square with four degrees, and 100 has a chance of 1e-20 per trial.
         let gain = (self.cost_without_contact() - cost) / variance;

@@ -7,6 +7,11 @@
 //! step; for each contact position and relaxation time its four coefficients, the offset and a steady drift are
 //! linear and solved exactly (variable projection, Golub & Pereyra 1973), and the two others are scanned
 //! coarsely, then refined by Gauss-Newton.
+//!
+//! The viscous force of that body grows with depth times speed, and tissue whose viscous force grows with the
+//! speed alone, such as a standard linear solid, resists at once. Taken for the other kind, it seems to have begun
+//! a millimetre earlier. So where the residuals remember, a body with both viscous forces is tried as well, and
+//! preferred if it leaves less than chance would explain.
 
 use super::contact::{ContactError, ContactEstimate};
 use crate::linalg::Triangle;
@@ -41,10 +46,15 @@ const STEPS_MAX: usize = 40;
 /// Points in a block whose mean shows whether residuals remember: 0.2 s of the engine's points.
 const BLOCK: usize = 10;
 
-/// Offset, drift, four coefficients of the body, then the derivatives by contact and ln tau, then the force.
-const LINEAR: usize = 6;
-const COLUMNS: usize = LINEAR + 2;
-type Row = [f64; COLUMNS + 1];
+/// Filtered powers of depth, filtered depth times speed, and filtered speed.
+const BODY: usize = 5;
+/// Offset, drift, coefficients of the body, derivatives by contact, ln tau and distance; zeros; the force.
+const SPACE: usize = 2 + BODY + 3 + 1;
+type Row = [f64; SPACE];
+
+/// Variances of one force by which a further coefficient must lower the sum of squares, were there no memory: chance
+/// does so once in 16 000.
+const GAIN_MIN: f64 = 16.0;
 
 /// Standard errors by which two touches must be apart to be two: rarer by chance than one in three hundred.
 const APART_SIGMAS: f64 = 3.0;
@@ -53,7 +63,8 @@ const APART_SIGMAS: f64 = 3.0;
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TouchEstimate {
     /// The contact position. Half of the distance between the touches is part of its standard error if it is
-    /// more than noise.
+    /// more than noise, and
+    /// what another body would say, as far as it describes the tissue as well.
     pub contact: ContactEstimate,
     /// How much deeper the second touch met the tissue than the first, in mm, if there were two and this is
     /// more than noise.
@@ -63,29 +74,57 @@ pub struct TouchEstimate {
 /// Estimates the contact position from a whole search. The path must begin out of contact and go on without
 /// gaps; times rise. What follows the last point without force is the second touch.
 pub fn fit_touch(points: &[TouchPoint]) -> Result<TouchEstimate, ContactError> {
-    let search = Search::new(points.to_vec())?;
-    let coarse = search.thinned(points.len().div_ceil(SCAN_POINTS));
-    // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
-    // relaxation time has its own valley, and the deepest shows only at its bottom.
-    let bottoms = coarse.scan().into_iter().filter_map(|start| {
-        let trial = coarse.refined(start);
-        Some((trial, coarse.solve(trial)?.1))
-    });
-    let (near, _) = bottoms
-        .min_by(|one, other| one.1.total_cmp(&other.1))
-        .ok_or(ContactError::NoOnset)?;
-    let trial = search.refined(near);
-    search.estimate(trial).ok_or(ContactError::NoOnset)
+    let mut search = Search::new(points.to_vec())?;
+    let mut starts = search.coarse().scan();
+    let mut found = search.best(&starts).ok_or(ContactError::NoOnset)?;
+    if found.memory > 1.0 {
+        search.has_speed_term = true;
+        let others = search.coarse().scan();
+        match search.best(&others) {
+            Some(mut other)
+                if found.cost - other.cost > GAIN_MIN * other.variance * other.memory =>
+            {
+                // Half of what the bodies disagree by, if one describes the tissue hardly better than the other;
+                // nothing if it does far better.
+                let way = other.trial.contact - found.trial.contact;
+                other.by_choice_mm = 0.5 * way.abs() * (other.cost / found.cost);
+                (starts, found) = (others, other);
+            }
+            _ => search.has_speed_term = false,
+        }
+    }
+    search
+        .estimate(&found, &starts)
+        .ok_or(ContactError::NoOnset)
 }
 
-/// A trial contact position in mm and the logarithm of a relaxation time in s.
+/// A trial contact position in mm, the logarithm of a relaxation time in s, and how much deeper in mm the second
+/// touch meets the tissue.
 #[derive(Clone, Copy, Debug)]
 struct Trial {
     contact: f64,
     log_tau: f64,
+    apart: f64,
+}
+
+/// The bottom of the deepest valley.
+struct Bottom {
+    trial: Trial,
+    /// Sum of squares of the residuals, its share of one force, and what [`Search::memory`] says.
+    cost: f64,
+    variance: f64,
+    memory: f64,
+    /// Error of the contact position for not knowing which body is right.
+    by_choice_mm: f64,
 }
 
 struct Search {
+    /// The body's viscous force grows with the speed alone, too.
+    has_speed_term: bool,
+    /// The second touch may meet the tissue elsewhere than the first.
+    may_be_apart: bool,
+    /// The last point before the second touch, if there is one.
+    between: Option<usize>,
     points: Vec<TouchPoint>,
     shallow: f64,
     deep: f64,
@@ -112,11 +151,54 @@ impl Search {
             return Err(ContactError::NotOneSpeed);
         }
         Ok(Self {
+            has_speed_term: false,
+            may_be_apart: false,
+            between: points.iter().rposition(|point| point.force.is_none()),
             shallow: begin.position.0,
             deep,
             span: end.t.0 - begin.t.0,
             points,
         })
+    }
+
+    /// Coefficients that are linear: offset, drift, and those of the body.
+    fn linear(&self) -> usize {
+        if self.has_speed_term {
+            2 + BODY
+        } else {
+            1 + BODY
+        }
+    }
+
+    /// Parameters that are not: contact, ln tau and perhaps the distance.
+    fn outer(&self) -> usize {
+        if self.may_be_apart { 3 } else { 2 }
+    }
+
+    fn best(&self, starts: &[Trial]) -> Option<Bottom> {
+        let coarse = self.coarse();
+        // A first touch alone hardly tells an early onset of a slow body from a late one of a fast body: every
+        // relaxation time has its own valley, and the deepest shows only at its bottom.
+        let bottoms = starts.iter().filter_map(|start| {
+            let trial = coarse.refined(*start);
+            Some((trial, coarse.solve(trial)?.1))
+        });
+        let (near, _) = bottoms.min_by(|one, other| one.1.total_cmp(&other.1))?;
+        let trial = self.refined(near);
+        let (linear, cost) = self.solve(trial)?;
+        let forces = self.points.iter().filter(|point| point.force.is_some());
+        let variance = cost / (forces.count() - self.linear() - self.outer()) as f64;
+        Some(Bottom {
+            trial,
+            cost,
+            variance,
+            memory: self.memory(trial, &linear, variance),
+            by_choice_mm: 0.0,
+        })
+    }
+
+    fn coarse(&self) -> Self {
+        self.thinned(self.points.len().div_ceil(SCAN_POINTS))
     }
 
     /// The same search with means of so many points in the place of one.
@@ -135,35 +217,48 @@ impl Search {
                 force: forces.map(|f| Newtons(f.iter().sum::<f64>() / f.len() as f64)),
             }
         };
+        let points: Vec<_> = self.points.chunks(group).map(mean_of).collect();
         Self {
-            points: self.points.chunks(group).map(mean_of).collect(),
+            between: points.iter().rposition(|point| point.force.is_none()),
+            points,
             ..*self
         }
     }
 
     /// Follows the path; hands out the body's columns at every force, zero where nothing is touched.
-    fn follow(&self, trial: Trial, mut at: impl FnMut(usize, &TouchPoint, f64, [f64; 4])) {
+    fn follow(&self, trial: Trial, mut at: impl FnMut(usize, &TouchPoint, f64, [f64; BODY])) {
         let body = ModifiedKelvin {
             tau_eps: trial.log_tau.exp(),
             mu: [0.0; 3],
             tau_sig: 0.0,
         };
-        let depth = |point: &TouchPoint| Depth(point.position.0 - trial.contact);
+        let depth = |index: usize, point: &TouchPoint| {
+            let is_second = self.between.is_some_and(|between| index > between);
+            let apart = if is_second { trial.apart } else { 0.0 };
+            Depth(point.position.0 - trial.contact - apart)
+        };
         let reach = self.deep - trial.contact;
         // Columns of like size: powers of the share of the deepest depth.
-        let scales = [reach, reach.powi(2), reach.powi(3), reach.powi(2)].map(f64::recip);
-        let mut state = KelvinState::at_rest_from(depth(&self.points[0]));
+        let scales = scales(reach).map(f64::recip);
+        let mut state = KelvinState::at_rest_from(depth(0, &self.points[0]));
         let mut before = self.points[0].t.0;
         for (index, point) in self.points.iter().enumerate() {
-            let depth = depth(point);
+            let depth = depth(index, point);
             if point.t.0 > before {
                 state.step(&body, depth, Seconds(point.t.0 - before));
                 before = point.t.0;
             }
             if let Some(force) = point.force {
-                let mut columns = [0.0; 4];
+                let mut columns = [0.0; BODY];
                 if depth.0 > 0.0 {
-                    columns = state.columns();
+                    let [f1, f2, f3, g] = state.columns();
+                    // tau times the filtered speed, by parts.
+                    let speed = if self.has_speed_term {
+                        depth.0 - f1
+                    } else {
+                        0.0
+                    };
+                    columns = [f1, f2, f3, g, speed];
                     columns.iter_mut().zip(scales).for_each(|(c, s)| *c *= s);
                 }
                 at(index, point, force.0, columns);
@@ -171,22 +266,25 @@ impl Search {
         }
     }
 
-    fn row(&self, point: &TouchPoint, [f1, f2, f3, g]: [f64; 4]) -> [f64; LINEAR] {
-        [1.0, point.t.0 / self.span, f1, f2, f3, g]
+    /// The linear columns, and the force.
+    fn row(&self, point: &TouchPoint, force: f64, columns: [f64; BODY]) -> Row {
+        let mut row = [0.0; SPACE];
+        row[..2].copy_from_slice(&[1.0, point.t.0 / self.span]);
+        row[2..2 + BODY].copy_from_slice(&columns);
+        row[SPACE - 1] = force;
+        row
     }
 
     /// Linear coefficients and residual sum at a trial; `None` where the trial is meaningless.
-    fn solve(&self, trial: Trial) -> Option<([f64; LINEAR], f64)> {
+    fn solve(&self, trial: Trial) -> Option<(Row, f64)> {
         if !(trial.contact > self.shallow && trial.contact < self.deep) {
             return None;
         }
-        let mut rows = Triangle::<{ LINEAR + 1 }>::default();
+        let mut rows = Triangle::<SPACE>::default();
         self.follow(trial, |_, point, force, columns| {
-            let [c, drift, f1, f2, f3, g] = self.row(point, columns);
-            rows.push([c, drift, f1, f2, f3, g, force]);
+            rows.push(self.row(point, force, columns));
         });
-        let [c, drift, f1, f2, f3, g, _] = rows.solve(LINEAR)?;
-        Some(([c, drift, f1, f2, f3, g], rows.residual_sum()))
+        Some((rows.solve(self.linear())?, rows.residual_sum()))
     }
 
     /// The best contact position of each relaxation time scanned.
@@ -196,7 +294,11 @@ impl Search {
             let trials = (1..CONTACT_COUNT).filter_map(|i| {
                 let share = f64::from(i) / f64::from(CONTACT_COUNT);
                 let contact = self.shallow + share * (self.deep - self.shallow);
-                let trial = Trial { contact, log_tau };
+                let trial = Trial {
+                    contact,
+                    log_tau,
+                    apart: 0.0,
+                };
                 Some((trial, self.solve(trial)?.1))
             });
             let best = trials.min_by(|one, other| one.1.total_cmp(&other.1))?;
@@ -217,17 +319,18 @@ impl Search {
             let Some(step) = self.linearised(trial).and_then(|rows| {
                 let mut triangle = Triangle::default();
                 rows.into_iter().for_each(|(_, row)| triangle.push(row));
-                triangle.solve(COLUMNS)
+                triangle.solve(self.linear() + self.outer())
             }) else {
                 break;
             };
             let better = (0..12).find_map(|halving| {
                 let share = 0.5f64.powi(halving);
                 let next = Trial {
-                    contact: trial.contact + share * step[LINEAR],
+                    contact: trial.contact + share * step[self.linear()],
                     // A factor of e at a time keeps the step where the linearisation holds.
-                    log_tau: (trial.log_tau + share * step[LINEAR + 1].clamp(-1.0, 1.0))
+                    log_tau: (trial.log_tau + share * step[self.linear() + 1].clamp(-1.0, 1.0))
                         .clamp(low, high),
+                    apart: trial.apart + share * step[self.linear() + 2],
                 };
                 let (_, next_cost) = self.solve(next)?;
                 (next_cost < cost).then_some((next, next_cost))
@@ -254,80 +357,87 @@ impl Search {
         // Central differences of an exact response: 1e-4 of the depth and of tau leaves eight digits.
         let (dx, dl) = (1e-4 * reach, 1e-4);
         let response = |by: Trial| {
-            let moved = self.deep - by.contact;
             // The coefficients belong to the scales of the trial itself.
-            let ratio = moved / reach;
-            let ratios = [ratio, ratio.powi(2), ratio.powi(3), ratio.powi(2)];
+            let ratios = scales((self.deep - by.contact) / reach);
             let mut forces = Vec::with_capacity(self.points.len());
             self.follow(by, |_, _, _, columns| {
-                let terms = (0..4).map(|k| linear[k + 2] * columns[k] * ratios[k]);
+                let terms = (0..BODY).map(|k| linear[k + 2] * columns[k] * ratios[k]);
                 forces.push(terms.sum::<f64>());
             });
             forces
         };
-        let shifted = |contact: f64, log_tau: f64| {
-            response(Trial {
-                contact: trial.contact + contact,
-                log_tau: trial.log_tau + log_tau,
-            })
+        let by = |contact: f64, log_tau: f64, apart: f64| {
+            let shifted = |sign: f64| {
+                response(Trial {
+                    contact: trial.contact + sign * contact,
+                    log_tau: trial.log_tau + sign * log_tau,
+                    apart: trial.apart + sign * apart,
+                })
+            };
+            let step = 2.0 * (contact + log_tau + apart);
+            let pairs = shifted(1.0).into_iter().zip(shifted(-1.0));
+            pairs.map(move |(up, down)| (up - down) / step)
         };
-        let (deeper, higher) = (shifted(dx, 0.0), shifted(-dx, 0.0));
-        let (slower, faster) = (shifted(0.0, dl), shifted(0.0, -dl));
-        let mut rows = Vec::with_capacity(deeper.len());
+        let mut by_all = [
+            Some(by(dx, 0.0, 0.0)),
+            Some(by(0.0, dl, 0.0)),
+            self.may_be_apart.then(|| by(0.0, 0.0, dx)),
+        ];
+        let mut rows = Vec::with_capacity(self.points.len());
         self.follow(trial, |index, point, force, columns| {
-            let i = rows.len();
-            let [c, drift, f1, f2, f3, g] = self.row(point, columns);
-            let by_contact = (deeper[i] - higher[i]) / (2.0 * dx);
-            let by_tau = (slower[i] - faster[i]) / (2.0 * dl);
-            let row = [c, drift, f1, f2, f3, g, by_contact, by_tau, force];
+            let mut row = self.row(point, force, columns);
+            for (k, by) in by_all.iter_mut().flatten().enumerate() {
+                row[self.linear() + k] = by.next().unwrap_or(0.0);
+            }
             rows.push((index, row));
         });
         Some(rows)
     }
 
-    fn estimate(&self, trial: Trial) -> Option<TouchEstimate> {
-        let (linear, cost) = self.solve(trial)?;
-        let rows = self.linearised(trial)?;
-        let variance = cost / (rows.len() - COLUMNS) as f64;
-        let memory = self.memory(trial, &linear, variance);
-        let mut triangle = Triangle::default();
-        rows.iter().for_each(|(_, row)| triangle.push(*row));
-        let by_noise = (variance * memory * triangle.inverse_diagonal(LINEAR)?).sqrt();
-        let apart_mm = self.apart(&rows, memory);
-        let std_error_mm = by_noise.hypot(apart_mm.unwrap_or(0.0) / 2.0);
+    fn estimate(&self, bottom: &Bottom, starts: &[Trial]) -> Option<TouchEstimate> {
+        let by_noise = self.std_error(bottom, 0)?;
+        let apart_mm = self.apart(starts);
+        let std_error_mm = by_noise
+            .hypot(apart_mm.unwrap_or(0.0) / 2.0)
+            .hypot(bottom.by_choice_mm);
         // Against offset and drift alone the fit must gain what noise cannot: chi-square with six degrees,
         // for which 100 has a chance of 1e-18 a trial.
-        let gain = (self.cost_without_contact()? - cost) / variance;
+        let gain = (self.cost_without_contact()? - bottom.cost) / bottom.variance;
         let contact = ContactEstimate {
-            position: Position(trial.contact),
+            position: Position(bottom.trial.contact),
             std_error_mm,
-            rmse_n: variance.sqrt(),
+            rmse_n: bottom.variance.sqrt(),
         };
         (gain > 100.0 && std_error_mm.is_finite()).then_some(TouchEstimate { contact, apart_mm })
     }
 
-    /// How much deeper the second touch met the tissue, if that is more than noise: the one further parameter
-    /// by which the fitted force of the second touch alone may shift.
-    fn apart(&self, rows: &[(usize, Row)], memory: f64) -> Option<f64> {
-        let second = self
-            .points
-            .iter()
-            .rposition(|point| point.force.is_none())?;
-        let mut triangle = Triangle::<{ COLUMNS + 2 }>::default();
-        for (index, row) in rows {
-            let [c, drift, f1, f2, f3, g, by_contact, by_tau, force] = *row;
-            let shift = if *index > second { by_contact } else { 0.0 };
-            triangle.push([c, drift, f1, f2, f3, g, by_contact, by_tau, shift, force]);
-        }
-        let shift = triangle.solve(COLUMNS + 1)?[COLUMNS];
-        let variance = triangle.residual_sum() / (rows.len() - COLUMNS - 1) as f64;
-        let error = (variance * memory * triangle.inverse_diagonal(COLUMNS)?).sqrt();
-        (shift.abs() > APART_SIGMAS * error).then_some(shift)
+    /// How much deeper the second touch met the tissue, if that is more than noise: everything is
+    /// found anew with the distance free.
+    fn apart(&self, starts: &[Trial]) -> Option<f64> {
+        self.between?;
+        let free = Self {
+            may_be_apart: true,
+            points: self.points.clone(),
+            ..*self
+        };
+        let moved = free.best(starts)?;
+        let error = free.std_error(&moved, 2)?;
+        (moved.trial.apart.abs() > APART_SIGMAS * error).then_some(moved.trial.apart)
+    }
+
+    /// Of the contact (0), ln tau (1) or the distance (2).
+    fn std_error(&self, bottom: &Bottom, which: usize) -> Option<f64> {
+        let mut triangle = Triangle::default();
+        let rows = self.linearised(bottom.trial)?;
+        rows.iter().for_each(|(_, row)| triangle.push(*row));
+        let (linear, all) = (self.linear(), self.linear() + self.outer());
+        let unit = triangle.inverse_diagonal(linear + which, all)?;
+        Some((bottom.variance * bottom.memory * unit).sqrt())
     }
 
     /// How much more the means of blocks of residuals scatter than those of white noise could, else 1: by so
     /// much the variance of a slow parameter is larger than white noise would make it.
-    fn memory(&self, trial: Trial, linear: &[f64; LINEAR], variance: f64) -> f64 {
+    fn memory(&self, trial: Trial, linear: &Row, variance: f64) -> f64 {
         let (mut blocks, mut squares) = (0.0, 0.0);
         let (mut sum, mut length, mut last) = (0.0, 0, None);
         self.follow(trial, |index, point, force, columns| {
@@ -335,8 +445,9 @@ impl Search {
                 (sum, length) = (0.0, 0);
             }
             last = Some(index);
-            let row = self.row(point, columns);
-            let fitted: f64 = row.iter().zip(linear).map(|(x, a)| x * a).sum();
+            let row = self.row(point, force, columns);
+            let of_line = row.iter().zip(linear).take(self.linear());
+            let fitted: f64 = of_line.map(|(x, a)| x * a).sum();
             sum += force - fitted;
             length += 1;
             if length == BLOCK {
@@ -366,4 +477,9 @@ impl Search {
         rows.solve(2)?;
         Some(rows.residual_sum())
     }
+}
+
+/// Sizes of the columns of a body pressed so deep.
+fn scales(depth: f64) -> [f64; BODY] {
+    [depth, depth.powi(2), depth.powi(3), depth.powi(2), depth]
 }

@@ -41,4 +41,4 @@ pub use step::{PLAN_COMPLETE, step};
 
 /// Version of the engine's decisions. Raised whenever a recorded session could decide
 /// differently; replay compares decisions only where versions match.
-pub const ENGINE_VERSION: u32 = 1;
+pub const ENGINE_VERSION: u32 = 2;
