@@ -34,13 +34,19 @@ fn run(window: &Window) -> RunView {
     window.state().snapshot().run.clone().unwrap()
 }
 
-/// Draws frames until the run is so; a minute at most.
+/// Draws frames until the run is so. A busy machine may take long; nothing new in so many frames is a failure.
+const STILL_MAX: usize = 12_000;
+
 fn wait(window: &mut Window, what: &str, is_so: impl Fn(&RunView) -> bool) {
-    for _ in 0..12_000 {
+    let (mut still, mut before) = (0, None);
+    while still < STILL_MAX {
         window.step();
-        if is_so(&run(window)) {
+        let run = run(window);
+        if is_so(&run) {
             return;
         }
+        still = if before == Some(run.now) { still + 1 } else { 0 };
+        before = Some(run.now);
         std::thread::sleep(Duration::from_millis(5));
     }
     panic!(

@@ -78,7 +78,7 @@ fn a_changed_decision_is_found_where_it_is() {
 
 #[test]
 fn a_changed_raw_sample_changes_what_is_derived() {
-    let mut session = open("ramp-hold-lab");
+    let mut session = open("hold-until-lab");
     let place = session
         .rows
         .iter()
@@ -91,7 +91,7 @@ fn a_changed_raw_sample_changes_what_is_derived() {
         ("force_N", place as u64)
     );
 
-    let mut session = open("ramp-hold-lab");
+    let mut session = open("hold-until-lab");
     session.rows[place].pulses = session.rows[place].pulses.map(|pulses| pulses + 3);
     let difference = replay(&session, &[]).unwrap().first_difference.unwrap();
     assert_eq!(
