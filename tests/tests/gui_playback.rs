@@ -71,6 +71,12 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
             .query_by_label_contains("Replay of ramp-hold-lab")
             .is_some()
     );
+    // It stays at the end, though that is no round number.
+    for _ in 0..20 {
+        window.step();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    assert_eq!(run(&window).now, end.now);
     // Nothing here can start, stop or close anything on a rig.
     for name in ["Stop motion  F12", "Halt  F11", "Close session"] {
         assert!(window.query_by_label(name).is_none(), "{name}");
@@ -92,8 +98,8 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
     wait(&mut window, "ten seconds before", |run| {
         (run.now.seconds().0 - middle + 10.0).abs() < 0.4
     });
-    // At a hundred times it goes on from there.
-    click(&mut window, "100x");
+    // At ten times it goes on from there.
+    click(&mut window, "10x");
     click(&mut window, "Play");
     wait(&mut window, "what comes after", |run| {
         run.now.seconds().0 > middle + 5.0

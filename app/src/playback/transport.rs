@@ -133,8 +133,9 @@ impl Transport {
             let label = ui.label("session time");
             ui.spacing_mut().slider_width = (ui.available_width() - 90.0).max(100.0);
             let mut at = if self.is_playing { shown } else { self.at };
+            // Only shown with one decimal: a slider that rounds would leave the end as soon as it is there.
             let slider = Slider::new(&mut at, 0.0..=self.end)
-                .fixed_decimals(1)
+                .custom_formatter(|at, _| format!("{at:.1}"))
                 .suffix(" s");
             if ui.add(slider).labelled_by(label.id).changed() {
                 self.at = at;
