@@ -28,6 +28,8 @@ pub struct CellDescription {
     pub noise_expected: Volts,
     /// Values a second.
     pub rate: f64,
+    /// How long before it was sent a value was felt: half of the time that its filter looks back.
+    pub delay: Nanos,
     /// Newtons of a volt where the device itself is calibrated, as a force gauge is.
     pub newtons_per_volt: Option<f64>,
 }

@@ -20,7 +20,7 @@ const MICROS_STEP: u64 = 4;
 /// The Uno's boot loader waits about so long before the sketch.
 const BOOT: Nanos = Nanos::from_millis(1_600);
 /// So many conversions pass after a start before the output is settled (data sheet, page 3: 400 ms at 10, 50 ms at 80
-/// samples a second).
+/// samples a second): a value is a mean over them. How they are weighted is not published.
 const SETTLING: u32 = 4;
 /// How long the sketch waits for the chip.
 const MISSING_AFTER: Nanos = Nanos::from_millis(500);
@@ -65,6 +65,8 @@ pub struct EmulatedHx711 {
     next: Nanos,
     sum: f64,
     steps: u32,
+    /// Means of the newest conversions, in volts.
+    newest: [f64; SETTLING as usize],
     count: i32,
     missing_since: Option<Nanos>,
     is_chip_lost: bool,
@@ -88,6 +90,7 @@ impl EmulatedHx711 {
             next: Nanos::ZERO,
             sum: 0.0,
             steps: 0,
+            newest: [0.0; SETTLING as usize],
             count: 0,
             missing_since: None,
             is_chip_lost: false,
@@ -150,11 +153,14 @@ impl EmulatedHx711 {
     }
 
     fn convert(&mut self, at: Nanos) {
-        let volts = if self.steps > 0 {
-            self.sum / f64::from(self.steps)
-        } else {
-            0.0
-        };
+        self.newest.rotate_left(1);
+        if let Some(newest) = self.newest.last_mut() {
+            *newest = match self.steps {
+                0 => 0.0,
+                steps => self.sum / f64::from(steps),
+            };
+        }
+        let volts = self.newest.iter().sum::<f64>() / f64::from(SETTLING);
         (self.sum, self.steps) = (0.0, 0);
         if !self.is_stuck {
             let gain = if self.settings.is_half_gain { 0.5 } else { 1.0 };

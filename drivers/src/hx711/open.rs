@@ -16,6 +16,8 @@ const DEVICE: &str = "HX711 board";
 const START_MAX: Nanos = Nanos::from_millis(5_000);
 /// How often it is asked who it is until then.
 const ASK_EVERY: Nanos = Nanos::from_millis(400);
+/// Conversions that a value is a mean of: after so many the output has settled (data sheet, page 3).
+const SETTLING: f64 = 4.0;
 /// Conversions by which its rate is measured.
 const MEASURED: usize = 9;
 /// So long may they take at 10 a second.
@@ -57,6 +59,7 @@ pub fn open(
         },
         noise_expected: settings.noise,
         rate,
+        delay: Nanos((0.5 * SETTLING / rate * 1e9) as u64),
         newtons_per_volt: None,
     };
     Ok(OpenedCell {

@@ -27,6 +27,8 @@ pub struct CellLine {
     start: Nanos,
     /// Between two samples.
     period: Nanos,
+    /// How long before it was sent a sample was felt.
+    delay: Nanos,
     last_tick: Option<u64>,
     heard: Nanos,
     looked: Nanos,
@@ -37,10 +39,10 @@ pub struct CellLine {
 }
 
 impl CellLine {
-    /// A cell of so many values a second. Ticks count from `start`.
+    /// A cell of so many values a second, felt so long before they are sent. Ticks count from `start`.
     pub fn new(
         cell: Box<dyn CellDialogue>,
-        rate: f64,
+        (rate, delay): (f64, Nanos),
         track: Arc<Mutex<Track>>,
         start: Nanos,
     ) -> Self {
@@ -52,6 +54,7 @@ impl CellLine {
             clock: CellClock::default(),
             start,
             period,
+            delay,
             last_tick: None,
             heard: start,
             looked: start,
@@ -74,7 +77,7 @@ impl CellLine {
         self.events.push_back((now, RigEventBody::Fault(fault)));
     }
 
-    /// When a sample was taken that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
+    /// When a sample was sent that came with `newer` ones behind it, by a cell without a clock: the newest just now, those
     /// before it a period apart, or closer where there is less time since the last one.
     fn laid_back(&self, at: Nanos, newer: u64) -> Nanos {
         let told = self
@@ -102,6 +105,7 @@ impl CellLine {
                     Nanos(self.period.0 / 2 + TICK.0),
                 ),
             };
+            let taken = Nanos(taken.0.saturating_sub(self.delay.0));
             let tick = (taken.since(self.start).0 + TICK.0 / 2) / TICK.0;
             // Two in one thousandth of a second: the second is told for the next.
             let tick = self.last_tick.map_or(tick, |last| tick.max(last + 1));
@@ -222,10 +226,23 @@ mod tests {
     }
 
     #[test]
+    fn a_sample_is_as_old_as_the_filter_of_its_cell_makes_it() {
+        let ms = Nanos::from_millis;
+        let track = Arc::new(Mutex::new(Track::at_rest(0)));
+        let mut line = CellLine::new(Box::<Bytes>::default(), (80.0, ms(25)), track, ms(1_000));
+        line.received(ms(1_100), &[0]);
+        let Some((_, RigEventBody::Reading(reading))) = line.take_event() else {
+            panic!("no reading");
+        };
+        assert_eq!(reading.tick, 75);
+        assert_eq!(reading.age.map(|age| age.by), Some(ms(25)));
+    }
+
+    #[test]
     fn a_burst_is_laid_backwards_and_never_into_the_future() {
         let ms = Nanos::from_millis;
         let track = Arc::new(Mutex::new(Track::at_rest(0)));
-        let mut line = CellLine::new(Box::<Bytes>::default(), 250.0, track, ms(1_000));
+        let mut line = CellLine::new(Box::<Bytes>::default(), (250.0, ms(0)), track, ms(1_000));
         let mut told = Vec::new();
         // One, four that a converter has held back, then two that come closer than the rate.
         for (at, bytes) in [(1_010, &[0][..]), (1_026, &[0, 0, 0, 0]), (1_028, &[0, 0])] {

@@ -70,7 +70,12 @@ impl PartsRig {
             farewell,
         } = opened;
         let start = clock();
-        let line = CellLine::new(dialogue, cell.rate, Arc::clone(&axis.track), start);
+        let line = CellLine::new(
+            dialogue,
+            (cell.rate, cell.delay),
+            Arc::clone(&axis.track),
+            start,
+        );
         let settings = LineSettings {
             device: "cell".into(),
             farewell,
@@ -83,7 +88,7 @@ impl PartsRig {
         let period = 1.0 / cell.rate;
         description.ticks_per_sample = (period * 1e9 / TICK.0 as f64).max(1.0);
         // The first sample of a motion is up to a period behind its beginning.
-        description.pulse_lag.0 += 1.5 * period;
+        description.pulse_lag.0 += 1.5 * period + cell.delay.seconds().0;
         Ok(Self {
             again: None,
             description,

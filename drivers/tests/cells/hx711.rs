@@ -54,10 +54,13 @@ fn the_description_is_what_was_found() {
         adc,
         noise_expected,
         rate,
+        delay,
         newtons_per_volt,
     } = cell.description;
     // 80 a second, 3 % fast, by a clock that is 0.2 % fast itself.
     assert!((rate - 80.0 * 1.03 / 1.002).abs() < 0.05, "{rate}");
+    // Two conversions.
+    assert!((delay.seconds().0 - 2.0 / rate).abs() < 1e-6);
     assert!(
         identity.contains("emulated") && identity.contains("gain 128"),
         "{identity}"

@@ -53,6 +53,8 @@ pub fn open(
         },
         noise_expected: settings.noise_expected(step),
         rate,
+        // Nothing is published of what its filters take.
+        delay: Nanos::ZERO,
         newtons_per_volt: Some(1.0),
     };
     Ok(OpenedCell {
