@@ -7,6 +7,7 @@ mod axis;
 mod connect;
 mod error;
 mod motion;
+mod pace;
 pub mod protocol;
 mod session;
 mod settings;

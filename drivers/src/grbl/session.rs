@@ -7,6 +7,7 @@
 
 use super::error::{Alarm, Refusal};
 use super::motion::Motion;
+use super::pace::Pace;
 use super::protocol::{self, Incoming, JOG_CANCEL, Parser, QUERY, RESET, State, Status};
 use super::settings::{Facts, GrblSettings, HomeSwitch};
 use crate::parts::Track;
@@ -74,6 +75,7 @@ pub struct Session {
     orders: VecDeque<(u64, RigCommand)>,
     answers: Answers,
     motion: Option<Motion>,
+    pace: Pace,
     /// Where it rests, in steps of the board.
     steps: i64,
     /// What the board's steps, in the direction of the rig, are more than the host's pulses.
@@ -116,6 +118,7 @@ impl Session {
             orders: VecDeque::new(),
             answers: Answers::default(),
             motion: None,
+            pace: Pace::default(),
             zero: 0,
             is_motor_on: false,
             asked: None,
@@ -342,6 +345,7 @@ impl Session {
             self.track().rest(now, here as i64);
             return self.acknowledge(now, number, RigCommand::MoveTo(wanted));
         }
+        self.pace.begin();
         self.motion = Some(Motion::new(
             number,
             wanted,
@@ -583,7 +587,14 @@ impl Session {
         let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
         if here < early.min(late) - slack || here > early.max(late) + slack {
             self.fault(now, format!("the axis is at {here:.0} where {late:.0} was expected, in its own pulses, and is stopped; check the cable and home it"));
-            self.cancel(now);
+            return self.cancel(now);
+        }
+        let mm_per_step = self.settings.mm_per_pulse;
+        if let (Some(phase), Some(started)) = (motion.phase(steps, mm_per_step), motion.started) {
+            let sampled = asked + Nanos(self.facts.round_trip.0 / 2);
+            let ahead = phase.0 - sampled.since(started).0 as f64 * 1e-9;
+            let step = mm_per_step / motion.wanted.speed.0;
+            self.pace.told(asked, now, ahead, step);
         }
     }
 
@@ -686,7 +697,8 @@ impl Session {
             .as_mut()
             .filter(|motion| motion.cancelled.is_none())?;
         let end = motion.next_chunk(now, self.settings.mm_per_pulse)?;
-        let line = protocol::jog(axis, end as f64 / steps_per_mm, motion.feed);
+        let feed = motion.feed * self.pace.feed();
+        let line = protocol::jog(axis, end as f64 / steps_per_mm, feed);
         self.open = Some(now);
         Some(line.into_bytes())
     }

@@ -1,6 +1,7 @@
 //! Motion: the slide is where the track says it is, at every moment.
 
-use crate::bench::{Host, slide, to};
+use crate::bench::{Host, slide, to, wired};
+use palpate_drivers::emulate::grbl;
 use palpate_drivers::grbl::GrblSettings;
 use palpate_model::rig::{AxisStatus, RigCommand};
 
@@ -28,6 +29,35 @@ fn a_motion_of_many_jogs_is_the_profile_that_was_asked_for() {
             (host.pulses(), host.truth()),
             (target as f64, target as f64)
         );
+        assert_eq!(host.faults, []);
+    }
+}
+
+#[test]
+fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
+    for resonator in [0.995, 1.005] {
+        let mut host = Host::on(
+            wired(grbl::GrblSettings {
+                resonator,
+                ..grbl::GrblSettings::default()
+            }),
+            &slide(),
+        );
+        for (target, worst_s) in [(30_000, 0.03), (0, 0.015)] {
+            host.tell(to(target, 0.75));
+            let mut worst = 0.0_f64;
+            while host.has(AxisStatus::MOVING) {
+                host.pass(0.05);
+                worst = worst.max((host.truth() - host.pulses()).abs());
+            }
+            // Unmended it would be half a second at the end of these 100 s, and the jogs sent ahead last 0.3.
+            let slack = 2.0 + worst_s * 0.75 / 0.0025;
+            assert!(
+                worst <= slack,
+                "{resonator}, to {target}: {worst} of {slack}"
+            );
+            assert_eq!(host.truth(), target as f64);
+        }
         assert_eq!(host.faults, []);
     }
 }

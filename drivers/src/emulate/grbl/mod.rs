@@ -53,6 +53,8 @@ pub struct GrblSettings {
     pub mm_per_step: f64,
     /// The memory was never written: the first start says `error:7` and fills it.
     pub is_unused: bool,
+    /// Rate of its clock. Resonators of Arduinos are right to half a percent.
+    pub resonator: f64,
 }
 
 impl Default for GrblSettings {
@@ -62,6 +64,7 @@ impl Default for GrblSettings {
             home: HomeWiring::Limit,
             mm_per_step: 0.0025,
             is_unused: false,
+            resonator: 1.0,
         }
     }
 }
@@ -125,6 +128,8 @@ pub struct Grbl {
     overrides: [u16; 3],
     reports: report::Counters,
     is_wrong: bool,
+    /// Time of its own clock that has not been stepped yet, in steps.
+    credit: f64,
 }
 
 impl Grbl {
@@ -164,6 +169,7 @@ impl Grbl {
             overrides: [100; 3],
             reports: report::Counters::default(),
             is_wrong: false,
+            credit: 0.0,
             settings,
         };
         grbl.power_up();
@@ -502,7 +508,11 @@ impl EmulatedAxis for Grbl {
             self.boots_at = None;
             self.power_up();
         }
-        self.step();
+        self.credit += self.settings.resonator;
+        while self.credit >= 1.0 - 1e-9 {
+            self.credit -= 1.0;
+            self.step();
+        }
         self.finish_reset();
         self.read_lines();
         self.tell_status();
