@@ -83,6 +83,7 @@ fn manifest(number: u32) -> Manifest {
             adc: None,
             noise_expected: Volts(1e-3),
             pulse_lag: Seconds(0.0),
+            cell_delay: Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
         }),

@@ -75,6 +75,7 @@ fn manifest() -> Manifest {
             adc: None,
             noise_expected: Volts(1e-3),
             pulse_lag: palpate_model::units::Seconds(0.0),
+            cell_delay: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
         }),

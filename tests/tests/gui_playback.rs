@@ -45,7 +45,11 @@ fn wait(window: &mut Window, what: &str, is_so: impl Fn(&RunView) -> bool) {
         if is_so(&run) {
             return;
         }
-        still = if before == Some(run.now) { still + 1 } else { 0 };
+        still = if before == Some(run.now) {
+            still + 1
+        } else {
+            0
+        };
         before = Some(run.now);
         std::thread::sleep(Duration::from_millis(5));
     }

@@ -357,5 +357,6 @@ fn describe(
         ),
         unseen_max: settings.unseen,
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
+        cell_delay: Seconds(0.0),
     }
 }

@@ -53,6 +53,7 @@ pub fn open(
         ticks_per_sample: 1.0,
         unseen_max: settings.unseen,
         pulse_lag: LAG,
+        cell_delay: Seconds(0.0),
     };
     Ok((description, Axis { line, track, raw }))
 }

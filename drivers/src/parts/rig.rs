@@ -85,6 +85,7 @@ impl PartsRig {
         description.tick_nanos = TICK.0;
         description.adc = Some(cell.adc);
         description.noise_expected = cell.noise_expected;
+        description.cell_delay = cell.delay.seconds();
         let period = 1.0 / cell.rate;
         description.ticks_per_sample = (period * 1e9 / TICK.0 as f64).max(1.0);
         // The first sample of a motion is up to a period behind its beginning.

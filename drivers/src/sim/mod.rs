@@ -273,6 +273,7 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         adc: load_cell::adc(settings.profile),
         noise_expected: load_cell::noise_expected(settings),
         pulse_lag: palpate_model::units::Seconds(0.0),
+        cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
     }

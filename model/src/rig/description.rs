@@ -45,6 +45,9 @@ pub struct RigDescription {
     /// a command to the sample behind it. Zero on a simulated rig.
     #[serde(default, skip_serializing_if = "is_zero")]
     pub pulse_lag: Seconds,
+    /// How long before it was sent a value of the load cell was felt, by a filter of its own. Zero where it has none.
+    #[serde(default, skip_serializing_if = "is_zero")]
+    pub cell_delay: Seconds,
     /// On average a sample comes in so many ticks of the controller. One on a rig that reports every tick; more on one that
     /// is asked for its samples over a link, or whose load cell is slower than its clock.
     #[serde(default = "one", skip_serializing_if = "is_one")]

@@ -94,6 +94,7 @@ mod tests {
             }),
             noise_expected: Volts(0.001),
             pulse_lag: crate::units::Seconds(0.0),
+            cell_delay: crate::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
         }

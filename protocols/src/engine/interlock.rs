@@ -194,11 +194,10 @@ pub(super) fn judge(
 ) -> Option<Trip> {
     let limits = state.config.limits;
     let age = age_trip(state, now);
-    // A sample that took long to come is as old as it is.
-    let taken = reading
-        .age
-        .map_or(now, |age| Nanos(now.0.saturating_sub(age.by.0)));
-    state.watch.last_at = Some(taken);
+    // A sample that took long to come is as old as it is, but a filter looks back however soon it comes.
+    let late = reading.age.map_or(Nanos::ZERO, |age| age.by);
+    let late = late.since(Nanos((state.config.rig.cell_delay.0 * 1e9) as u64));
+    state.watch.last_at = Some(Nanos(now.0.saturating_sub(late.0)));
     if !reading.volts.is_finite() {
         return trip(
             Interlock::Signal,

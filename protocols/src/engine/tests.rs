@@ -41,6 +41,7 @@ fn rig() -> RigDescription {
         adc: None,
         noise_expected: Volts(0.001),
         pulse_lag: palpate_model::units::Seconds(0.0),
+        cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
     }

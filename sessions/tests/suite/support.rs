@@ -79,6 +79,7 @@ pub fn manifest() -> Manifest {
             }),
             noise_expected: Volts(0.1 + 0.2),
             pulse_lag: palpate_model::units::Seconds(0.0),
+            cell_delay: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
         }),

@@ -250,6 +250,7 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
         }),
         noise_expected: settings.gauge.noise_expected(step),
         pulse_lag: LAG,
+        cell_delay: palpate_model::units::Seconds(0.0),
         ticks_per_sample: ticks.max(1.0) * BETWEEN,
         unseen_max: settings.unseen,
     }
