@@ -2,7 +2,7 @@
 //! the rig file. Nothing is written that it keeps, and nothing moves.
 
 use super::motion::worst_case_mm;
-use super::protocol::{self, Incoming, JOG_CANCEL, Parser, State, Status};
+use super::protocol::{self, CYCLE_START, Incoming, JOG_CANCEL, Parser, State, Status};
 use super::settings::{Facts, GrblSettings, HomeSwitch};
 use crate::wire::{HostClock, Link, LinkStats, WireError};
 use palpate_model::Nanos;
@@ -367,16 +367,15 @@ fn identify(
 ) -> Result<String, GrblOpenError> {
     // `error:7` of a memory that was never written is no answer to anything; neither is half a line's.
     console.write(b"\n")?;
-    let until = console.now() + ANSWER_MAX;
-    while let Some(incoming) = console.next(until)? {
-        if incoming == Incoming::Ok {
-            break;
-        }
-    }
+    let is_answered = has_ok(console)?;
     // In motion it tells nothing about itself; held, asleep or behind an open door it takes no line at all.
     let status = to_rest(console)?;
     if !matches!(status.state, State::Idle | State::Alarm) {
         return Err(GrblOpenError::State(format!("{:?}", status.state)));
+    }
+    if !is_answered {
+        console.write(&[CYCLE_START])?;
+        has_ok(console)?;
     }
     let mut version = None;
     let mut text = String::new();
@@ -403,6 +402,16 @@ fn identify(
         _ if text.is_empty() => Ok(version),
         _ => Ok(format!("{version} '{text}'")),
     }
+}
+
+fn has_ok(console: &mut Console<'_>) -> Result<bool, GrblOpenError> {
+    let until = console.now() + ANSWER_MAX;
+    while let Some(incoming) = console.next(until)? {
+        if incoming == Incoming::Ok {
+            return Ok(true);
+        }
+    }
+    Ok(false)
 }
 
 /// Ends a jog that is under way.

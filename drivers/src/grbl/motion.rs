@@ -97,15 +97,17 @@ impl Motion {
         Self::profile(way, &self.wanted)
     }
 
-    /// How long after its start it is at these steps, where it goes at its full speed.
+    /// How long before its time it is at these steps, where it goes at its full speed.
     #[must_use]
-    pub fn phase(&self, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
+    pub fn ahead(&self, at: Nanos, steps: i64, mm_per_pulse: f64) -> Option<Seconds> {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
         // A step is told of as soon as it is begun, and lasts until the next.
         let way = ((steps - self.from) as f64 * self.side() + 0.5) * mm_per_pulse;
         let ramp = speed / acceleration;
         let phase = ramp + (way - 0.5 * speed * ramp) / speed;
-        (phase > ramp && phase < self.profile.duration().0 - ramp).then_some(Seconds(phase))
+        let since = at.since(self.started?).0 as f64 * 1e-9;
+        let is_cruising = phase > ramp && phase < self.profile.duration().0 - ramp;
+        is_cruising.then_some(Seconds(phase - since))
     }
 
     /// From start to rest.

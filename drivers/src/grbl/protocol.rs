@@ -14,6 +14,10 @@ pub const QUERY: u8 = b'?';
 pub const RESET: u8 = 0x18;
 /// Jog cancel.
 pub const JOG_CANCEL: u8 = 0x85;
+/// Cycle start. A cancel that is heard in a jog and looked at when that has ended leaves Grbl suspended, though it says
+/// `Idle`, and it takes no line until this comes (protocol.c, `protocol_exec_rt_system`; observed with 1.1h). It does
+/// nothing to a board at rest.
+pub const CYCLE_START: u8 = b'~';
 
 /// Machine states.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -8,7 +8,9 @@
 use super::error::{Alarm, Refusal};
 use super::motion::Motion;
 use super::pace::Pace;
-use super::protocol::{self, Incoming, JOG_CANCEL, Parser, QUERY, RESET, State, Status};
+use super::protocol::{
+    self, CYCLE_START, Incoming, JOG_CANCEL, Parser, QUERY, RESET, State, Status,
+};
 use super::settings::{Facts, GrblSettings, HomeSwitch};
 use crate::parts::Track;
 use crate::rig::RigEventBody;
@@ -552,7 +554,7 @@ impl Session {
             return;
         }
         match (motion.cancelled, motion.started) {
-            (Some(cancelled), _) if asked >= cancelled => {}
+            (Some(cancelled), _) if asked >= cancelled => self.urgent.push_back(vec![CYCLE_START]),
             (None, Some(started)) if asked > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
                     self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or mend the link");
@@ -589,12 +591,10 @@ impl Session {
             self.fault(now, format!("the axis is at {here:.0} where {late:.0} was expected, in its own pulses, and is stopped; check the cable and home it"));
             return self.cancel(now);
         }
-        let mm_per_step = self.settings.mm_per_pulse;
-        if let (Some(phase), Some(started)) = (motion.phase(steps, mm_per_step), motion.started) {
-            let sampled = asked + Nanos(self.facts.round_trip.0 / 2);
-            let ahead = phase.0 - sampled.since(started).0 as f64 * 1e-9;
-            let step = mm_per_step / motion.wanted.speed.0;
-            self.pace.told(asked, now, ahead, step);
+        let sampled = asked + Nanos(self.facts.round_trip.0 / 2);
+        if let Some(ahead) = motion.ahead(sampled, steps, self.settings.mm_per_pulse) {
+            let step = self.settings.mm_per_pulse / motion.wanted.speed.0;
+            self.pace.told(asked, now, ahead.0, step);
         }
     }
 

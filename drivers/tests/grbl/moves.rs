@@ -1,8 +1,10 @@
 //! Motion: the slide is where the track says it is, at every moment.
 
-use crate::bench::{Host, slide, to, wired};
+use crate::bench::{Host, slide, to, try_connect, wired};
 use palpate_drivers::emulate::grbl;
 use palpate_drivers::grbl::GrblSettings;
+use palpate_drivers::wire::Link;
+use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, RigCommand};
 
 #[test]
@@ -60,6 +62,30 @@ fn a_board_whose_clock_is_off_is_kept_to_the_pace_of_the_host() {
         }
         assert_eq!(host.faults, []);
     }
+}
+
+#[test]
+fn a_board_that_a_cancel_left_suspended_goes_on() {
+    let settings = grbl::GrblSettings {
+        is_suspending: true,
+        ..grbl::GrblSettings::default()
+    };
+    let mut host = Host::on(wired(settings), &slide());
+    host.tell(to(8_000, 5.0));
+    host.pass(1.0);
+    host.tell(RigCommand::Stop);
+    host.settle();
+    host.tell(to(400, 5.0));
+    host.settle();
+    assert_eq!((host.truth(), &host.faults[..]), (400.0, &[][..]));
+
+    // Left so by whoever drove it before.
+    host.tell(to(8_000, 5.0));
+    host.pass(1.0);
+    host.wire.write(&[0x85]).expect("a wire");
+    host.wire.lock().pass(Nanos::from_millis(500));
+    let again = try_connect(&host.wire, &slide()).expect("it connects");
+    assert!(again.identity.contains("1.1h"), "{}", again.identity);
 }
 
 #[test]

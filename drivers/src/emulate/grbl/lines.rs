@@ -28,6 +28,7 @@ impl Grbl {
                 || self.homing.is_some()
                 || self.is_probing
                 || self.is_cancelling
+                || self.is_suspended
                 || matches!(self.state, State::Hold | State::Door | State::Sleep);
             if is_blocked {
                 return;

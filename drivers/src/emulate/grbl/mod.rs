@@ -55,6 +55,8 @@ pub struct GrblSettings {
     pub is_unused: bool,
     /// Rate of its clock. Resonators of Arduinos are right to half a percent.
     pub resonator: f64,
+    /// Every jog cancel is looked at when the jog has just ended: it takes no line until a cycle start.
+    pub is_suspending: bool,
 }
 
 impl Default for GrblSettings {
@@ -65,6 +67,7 @@ impl Default for GrblSettings {
             mm_per_step: 0.0025,
             is_unused: false,
             resonator: 1.0,
+            is_suspending: false,
         }
     }
 }
@@ -130,6 +133,7 @@ pub struct Grbl {
     is_wrong: bool,
     /// Time of its own clock that has not been stepped yet, in steps.
     credit: f64,
+    is_suspended: bool,
 }
 
 impl Grbl {
@@ -170,6 +174,7 @@ impl Grbl {
             reports: report::Counters::default(),
             is_wrong: false,
             credit: 0.0,
+            is_suspended: false,
             settings,
         };
         grbl.power_up();
@@ -323,6 +328,7 @@ impl Grbl {
             self.alarm(3, false);
         }
         self.is_resetting = true;
+        self.is_suspended = false;
         self.finish_reset();
     }
 
@@ -372,6 +378,7 @@ impl Grbl {
                 self.state = State::Idle;
                 self.start();
             }
+            b'~' if self.state == State::Idle => self.is_suspended = false,
             0x90..=0x9d => self.override_by(byte),
             0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
                 self.modes.has_coolant = !self.modes.has_coolant;
@@ -438,6 +445,7 @@ impl Grbl {
             match self.state {
                 State::Jog | State::Run if self.is_cancelling || self.is_probing => {
                     self.state = State::Idle;
+                    self.is_suspended = self.is_cancelling && self.settings.is_suspending;
                     self.finish_early();
                 }
                 // A jog does not go on behind a door.
