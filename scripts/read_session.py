@@ -70,7 +70,9 @@ def samples(raw, derived):
     absent = [None] * len(numbers(raw[2]))
     doubles = lambda data: struct.unpack(f"<{len(data) // 8}d", data)
     known = lambda data, bit: [x if bits & bit else None for x, bits in zip(doubles(data), numbers(derived[4]))]
-    return {"tick": summed(raw[2]), "host_ns": summed(raw[3]), "counts": signed(raw[4]) if 4 in raw else absent,
+    # Of a rig on wires: how long before it arrived a sample was taken, and how well that is known.
+    ages = {name: numbers(raw[tag]) for name, tag in (("age_ns", 8), ("age_within_ns", 9)) if tag in raw}
+    return {**ages, "tick": summed(raw[2]), "host_ns": summed(raw[3]), "counts": signed(raw[4]) if 4 in raw else absent,
             "signal_V": doubles(raw[5]) if 5 in raw else absent,
             "pulses": summed(raw[6], -2**63) if 6 in raw else absent, "status": numbers(raw[7]),
             "force_N": known(derived[2], 1), "depth_mm": known(derived[3], 2),
