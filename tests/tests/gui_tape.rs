@@ -62,8 +62,9 @@ fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
     let middle = whole.len() / 2;
     let at = whole[0].split(',').position(|name| name == column).unwrap();
     let mut cells: Vec<String> = whole[middle].split(',').map(String::from).collect();
-    let last = cells[at].pop().unwrap();
-    cells[at].push(if last == '1' { '2' } else { '1' });
+    // Of seventeen digits the last may be one that no number needs.
+    let value: f64 = cells[at].parse().unwrap();
+    cells[at] = (value * (1.0 + 1e-14) + f64::MIN_POSITIVE).to_string();
     let tick = cells[0].clone();
     let mut changed = whole.clone();
     changed[middle] = cells.join(",");
