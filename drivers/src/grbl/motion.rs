@@ -11,8 +11,8 @@ const AHEAD: Seconds = Seconds(0.3);
 const CHUNK: Seconds = Seconds(0.08);
 /// Chunks that are in the planner at once at most; it takes 15 (planner.h).
 const CHUNKS_MAX: f64 = 8.0;
-/// The start of a motion is known to so much.
-const START: Seconds = Seconds(0.02);
+/// Where it is, is known to so much: the start to 20 ms, and a clock that is off by half a percent is followed to 30.
+const KNOWN: Seconds = Seconds(0.05);
 
 /// A motion under way.
 #[derive(Clone, Debug)]
@@ -168,12 +168,12 @@ fn ahead_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
 }
 
 /// How far the axis goes at most, in mm, when the link is lost at full speed: all that was sent, half a chunk that went
-/// with the last one, and what the start is uncertain by.
+/// with the last one, and what its place is uncertain by.
 #[must_use]
 pub fn worst_case_mm(speed: MmPerS, acceleration: MmPerS2) -> f64 {
     let ahead = ahead_mm(speed, acceleration);
     let half_chunk = 0.5 * (speed.0 * CHUNK.0).max(ahead / CHUNKS_MAX);
-    ahead + half_chunk + speed.0 * START.0
+    ahead + half_chunk + speed.0 * KNOWN.0
 }
 
 #[cfg(test)]

@@ -64,7 +64,7 @@ const APART_SIGMAS: f64 = 3.0;
 pub struct TouchEstimate {
     /// The contact position. Half of the distance between the touches is part of its standard error if it is
     /// more than noise, and
-    /// what another body would say, as far as it describes the tissue as well.
+    /// half of what another body says otherwise, as far as it describes the tissue as well.
     pub contact: ContactEstimate,
     /// How much deeper the second touch met the tissue than the first, in mm, if there were two and this is
     /// more than noise.

@@ -7,7 +7,7 @@ use crate::plans::{HoldUntil, LoadTo, Plan, Step};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
-    Ack, AdcDescription, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
+    Ack, AdcDescription, Age, AxisStatus, Fault, Limits, Phase, Reading, RigCommand, RigDescription,
 };
 use palpate_model::units::{Depth, MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use std::sync::Arc;
@@ -334,6 +334,35 @@ fn silence_trips_by_the_speed() {
         Limits::sample_age_max(MmPerS(20.0), Position(0.1), Seconds(0.0125)),
         Seconds(0.0325)
     );
+}
+
+#[test]
+fn the_filter_of_a_cell_is_no_lateness() {
+    let filter = Nanos::from_millis(200);
+    for (cell_delay, is_tripped) in [(filter, false), (Nanos::ZERO, true)] {
+        let rig = RigDescription {
+            cell_delay: cell_delay.seconds(),
+            ..rig()
+        };
+        let mut bench = Bench::holding_on(rig, 10.0, None);
+        bench.tick += 1;
+        bench.now = bench.now + Nanos::from_millis(1);
+        bench.give(Input::Reading(Reading {
+            tick: bench.tick,
+            counts: None,
+            volts: Volts(volts(0.0)),
+            pulses: bench.pulses,
+            status: bench.status,
+            age: Some(Age {
+                by: filter,
+                within: Nanos::ZERO,
+            }),
+        }));
+        // A quarter of a second is what a silence may last at rest.
+        bench.now = bench.now + Nanos::from_millis(100);
+        let trip = tripped(&bench.give(Input::Tick));
+        assert_eq!(trip == Some(Interlock::SampleAge), is_tripped, "{trip:?}");
+    }
 }
 
 #[test]
