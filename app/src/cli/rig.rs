@@ -200,8 +200,9 @@ fn open_wired(args: &RigArgs) -> Result<OpenRig, Failure> {
             (source.calibration, doubts)
         }
         (None, Some(newtons), Some(full_scale)) => {
-            // Its own calibration holds over its own range.
-            limits.volts_max = Volts(full_scale);
+            // Its own calibration holds over its own range, and the end of that stands for all that is beyond.
+            let step = description.adc.map_or(0.0, |adc| adc.volts_per_count);
+            limits.volts_max = Volts(full_scale - step);
             let own = Calibration::linear(
                 &description.name,
                 Volts(0.0),

@@ -299,9 +299,11 @@ pub fn connect(
     stats.in_flight = 1;
     let worst_case_mm = worst_case_mm(settings.speed_max, settings.acceleration);
     Ok(Connected {
+        // Rounded up: it is a bound.
         identity: format!(
-            "Grbl {version}, axis {}; at most {worst_case_mm:.1} mm after the link is lost",
-            settings.axis
+            "Grbl {version}, axis {}; at most {:.1} mm after the link is lost at full speed",
+            settings.axis,
+            (worst_case_mm * 10.0).ceil() / 10.0
         ),
         facts: Facts {
             steps_per_mm,
@@ -359,14 +361,15 @@ fn wake(console: &mut Console<'_>) -> Result<Option<String>, GrblOpenError> {
     Err(GrblOpenError::Silent)
 }
 
-/// Half a line of whoever was here before is ended; then version and text of the board.
+/// Half a line of whoever was here before is spoilt and ended; then version and text of the board.
 fn identify(
     console: &mut Console<'_>,
     settings: &GrblSettings,
     said: Option<&str>,
 ) -> Result<String, GrblOpenError> {
-    // `error:7` of a memory that was never written is no answer to anything; neither is half a line's.
-    console.write(b"\n")?;
+    // `error:7` of a memory that was never written is no answer to anything; neither is half a line's. A dollar alone asks
+    // for help; at the end of half a motion it makes an error of it, where an end of line would begin it.
+    console.write(b"$\n")?;
     let is_answered = has_ok(console)?;
     // In motion it tells nothing about itself; held, asleep or behind an open door it takes no line at all.
     let status = to_rest(console)?;

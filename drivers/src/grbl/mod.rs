@@ -8,9 +8,11 @@ mod connect;
 mod error;
 mod motion;
 mod pace;
+mod pins;
 pub mod protocol;
 mod session;
 mod settings;
+mod times;
 
 pub use axis::open;
 pub use connect::{Connected, GrblOpenError, MM_PER_STEP_MIN, connect};

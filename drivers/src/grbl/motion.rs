@@ -37,6 +37,8 @@ pub struct Motion {
     pub repeated: Nanos,
     /// Its end was told to the track.
     pub is_braking: bool,
+    /// Whether the board has taken its newest jog is not known, so a report of rest may come before it.
+    pub is_doubtful: bool,
     /// Steps to which jogs were sent.
     sent: i64,
 }
@@ -63,6 +65,7 @@ impl Motion {
             cancelled: None,
             repeated: Nanos::ZERO,
             is_braking: false,
+            is_doubtful: false,
             sent: from,
         }
     }
@@ -124,7 +127,7 @@ impl Motion {
         let (speed, acceleration) = (self.wanted.speed.0, self.wanted.acceleration.0);
         let window = ahead_mm(self.wanted.speed, self.wanted.acceleration);
         let least = (speed * CHUNK.0).max(window / CHUNKS_MAX);
-        let chunk = ((least / mm_per_pulse).ceil() as i64).max(1);
+        let usual = ((least / mm_per_pulse).ceil() as i64).max(1);
         let done = match self.started {
             Some(started) => {
                 let since = Seconds(now.since(started).0 as f64 * 1e-9);
@@ -138,11 +141,10 @@ impl Motion {
         // The first one may be as long as all that may be ahead: from rest it takes longer anyway.
         let is_first = self.sent == self.from;
         let chunk = if is_first {
-            (window / mm_per_pulse) as i64
+            usual.max((window / mm_per_pulse) as i64)
         } else {
-            chunk
-        }
-        .max(chunk);
+            usual
+        };
         let is_due = is_first
             || sent - done + chunk as f64 * mm_per_pulse
                 <= window.max(2.0 * chunk as f64 * mm_per_pulse);
@@ -152,7 +154,7 @@ impl Motion {
         }
         let left = (self.to - self.sent).abs();
         // A last piece that is less than half a chunk goes with the one before it.
-        let next = if left <= chunk + chunk / 2 {
+        let next = if left <= chunk + usual / 2 {
             left
         } else {
             chunk
@@ -182,12 +184,18 @@ mod tests {
 
     #[test]
     fn chunks_keep_braking_ahead_and_never_more_than_stated() {
-        for (speed, way) in [
+        let long = [
             (0.02, 1_000),
             (0.75, 20_000),
             (9.0, 40_000),
             (20.0, -40_000),
-        ] {
+        ];
+        // And ways of one to two windows, of which the first jog may be all.
+        let short = [0.02, 0.75, 9.0, 20.0].into_iter().flat_map(|speed| {
+            let window = ahead_mm(MmPerS(speed), MmPerS2(60.0)) / 0.0025;
+            (10..20).map(move |tenths| (speed, (window * f64::from(tenths) / 10.0) as i64))
+        });
+        for (speed, way) in long.into_iter().chain(short) {
             let wanted = MoveTo {
                 target_pulses: way,
                 speed: MmPerS(speed),
@@ -196,6 +204,7 @@ mod tests {
             let mut motion = Motion::new(1, wanted, 0, way, speed * 60.0, 0.0025);
             let worst = worst_case_mm(wanted.speed, wanted.acceleration);
             let mut sent = motion.next_chunk(Nanos::ZERO, 0.0025).unwrap();
+            assert!(sent.abs() as f64 * 0.0025 <= worst, "{speed}: {sent} first");
             assert_eq!(motion.next_chunk(Nanos::ZERO, 0.0025), None);
             motion.started = Some(Nanos::ZERO);
             for ms in 0..motion.duration().0 / 1_000_000 {

@@ -8,10 +8,15 @@
 use super::error::{Alarm, Refusal};
 use super::motion::Motion;
 use super::pace::Pace;
+use super::pins::Ends;
 use super::protocol::{
     self, CYCLE_START, Incoming, JOG_CANCEL, Parser, QUERY, RESET, State, Status,
 };
-use super::settings::{Facts, GrblSettings, HomeSwitch};
+use super::settings::{Facts, GrblSettings};
+use super::times::{
+    ATTENDED_MAX, CANCEL_AGAIN, OK_MAX, PAUSE, POLL, POLL_CLOSELY, REPORT_MAX, RESET_AGAIN,
+    RESET_MAX, SEGMENTS, SILENCE_MAX, STOP_MAX,
+};
 use crate::parts::Track;
 use crate::rig::RigEventBody;
 use crate::wire::{Answers, Dialogue, LinkStats};
@@ -20,32 +25,6 @@ use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand};
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 
-/// Status is asked for so often at rest: "10 Hz is the maximum" (doc/markdown/interface.md advises 5 Hz).
-const POLL: Nanos = Nanos::from_millis(100);
-/// While a switch or the end of a motion is waited for. It costs the board 2 % of its time, and a switch is noticed so
-/// late: 7 um at 0.3 mm/s.
-const POLL_CLOSELY: Nanos = Nanos::from_millis(25);
-/// A query that was not answered by then was lost, or overlooked as the documents allow.
-const REPORT_MAX: Nanos = Nanos::from_millis(150);
-/// Without a status for so long the board counts as gone.
-const SILENCE_MAX: Nanos = Nanos::from_millis(1_500);
-/// This thread looks every half a millisecond. When it did not for so long, it was not the board that was silent.
-const PAUSE: Nanos = Nanos::from_millis(20);
-/// A jog is acknowledged when it is planned, within milliseconds.
-const OK_MAX: Nanos = Nanos::from_millis(400);
-/// A jog that was still in the input buffer begins after a cancel, so that is written again and again until all rests.
-const CANCEL_AGAIN: Nanos = Nanos::from_millis(40);
-/// Without anybody asking for reports the axis is stopped: a computer that hangs counts as dead.
-const ATTENDED_MAX: Nanos = Nanos::from_millis(500);
-/// A reset is written again after so long without a welcome: a board takes some milliseconds to say it, and half a second
-/// more where the axis was in motion (report.c, `report_alarm_message`).
-const RESET_AGAIN: Nanos = Nanos::from_millis(100);
-/// Without a welcome for so long after the first reset, nobody knows what the axis does.
-const RESET_MAX: Nanos = Nanos::from_millis(2_000);
-/// A stop is answered by then though the axis is still braking, because it takes longer: the engine waits for a second.
-const STOP_MAX: Nanos = Nanos::from_millis(700);
-/// Segments that are made ahead go on after a cancel: 4 to 5 of 10 ms (stepper.h, config.h).
-const SEGMENTS: Nanos = Nanos::from_millis(45);
 /// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
 const FEED_MIN: f64 = 1.0;
 /// Commands that wait; as many as may wait on the way here.
@@ -78,6 +57,7 @@ pub struct Session {
     answers: Answers,
     motion: Option<Motion>,
     pace: Pace,
+    ends: Ends,
     /// Where it rests, in steps of the board.
     steps: i64,
     /// What the board's steps, in the direction of the rig, are more than the host's pulses.
@@ -121,6 +101,7 @@ impl Session {
             answers: Answers::default(),
             motion: None,
             pace: Pace::default(),
+            ends: Ends::default(),
             zero: 0,
             is_motor_on: false,
             asked: None,
@@ -182,6 +163,20 @@ impl Session {
         }
     }
 
+    /// No motion that waits is begun any more.
+    fn drop_motions(&mut self, now: Nanos, why: &str) {
+        for (number, order) in std::mem::take(&mut self.orders) {
+            if matches!(order, RigCommand::MoveTo(_) | RigCommand::Oscillate(_)) {
+                self.refuse(now, number, why);
+            } else {
+                self.orders.push_back((number, order));
+            }
+        }
+        if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+            self.refuse(now, number, why);
+        }
+    }
+
     /// Brakes whatever moves.
     fn cancel(&mut self, now: Nanos) {
         self.urgent.push_back(vec![JOG_CANCEL]);
@@ -196,6 +191,15 @@ impl Session {
         // Its answer shows what has become of it.
         self.asked = None;
         self.polled = None;
+    }
+
+    /// Ends the motion under way, which may be one that nobody was told of yet.
+    fn end(&mut self, now: Nanos, why: &str) {
+        match self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+            Some(number) => self.refuse(now, number, why),
+            None => self.fault(now, why),
+        }
+        self.cancel(now);
     }
 
     /// Something is wrong that the operator has to look at.
@@ -258,19 +262,7 @@ impl Session {
 
     fn stop(&mut self, now: Nanos, command: RigCommand) {
         let number = self.answers.owe();
-        let ended: Vec<u64> = self
-            .orders
-            .iter()
-            .filter(|(_, order)| matches!(order, RigCommand::MoveTo(_) | RigCommand::Oscillate(_)))
-            .map(|(number, _)| *number)
-            .collect();
-        self.orders.retain(|(number, _)| !ended.contains(number));
-        for ended in ended {
-            self.refuse(now, ended, OVERTAKEN);
-        }
-        if let Some(owed) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
-            self.refuse(now, owed, OVERTAKEN);
-        }
+        self.drop_motions(now, OVERTAKEN);
         if let Some(halt) = &mut self.halt {
             halt.owed.push((number, command));
             return;
@@ -348,14 +340,10 @@ impl Session {
             return self.acknowledge(now, number, RigCommand::MoveTo(wanted));
         }
         self.pace.begin();
-        self.motion = Some(Motion::new(
-            number,
-            wanted,
-            self.steps,
-            to,
-            feed,
-            self.settings.mm_per_pulse,
-        ));
+        let mm_per_pulse = self.settings.mm_per_pulse;
+        let motion = Motion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
+        self.ends.leave(self.is_outwards(&motion));
+        self.motion = Some(motion);
     }
 
     fn on_ok(&mut self, now: Nanos) {
@@ -447,8 +435,8 @@ impl Session {
             return;
         }
         let asked = asked.unwrap_or(now);
-        // A stop is done when nothing moves.
-        let is_at_rest = !status.state.is_moving();
+        // A stop is done when nothing moves, and no jog is on its way that would.
+        let is_at_rest = !status.state.is_moving() && self.open.is_none();
         let braking = self.motion.as_ref().map_or(Nanos::ZERO, |motion| {
             Nanos((motion.wanted.speed.0 / motion.wanted.acceleration.0 * 1e9) as u64)
         });
@@ -465,7 +453,7 @@ impl Session {
         let Some(steps) = self.steps_of(status) else {
             return self.lock_with(now, "it reports no machine position; set $10=1");
         };
-        self.on_pins(now, status);
+        self.on_pins(now, status, steps);
         match status.state {
             State::Idle => self.on_idle(now, asked, steps),
             State::Jog => self.on_jog(now, asked, steps),
@@ -490,50 +478,36 @@ impl Session {
         }
     }
 
-    /// What the pins mean, and a stop at a limit that Grbl does not stop at.
-    fn on_pins(&mut self, now: Nanos, status: &Status) {
-        let is_limit = status.has_pin(self.settings.axis);
-        let is_probe = status.has_pin('P');
-        let is_outwards = self
-            .motion
-            .as_ref()
-            .is_some_and(|motion| motion.side() * self.settings.sign() as f64 > 0.0);
+    /// What the pins mean, and a stop at those at which Grbl does not stop.
+    fn on_pins(&mut self, now: Nanos, status: &Status, steps: i64) {
         let is_known = self.track().at(now).status;
-        let pins = match self.settings.home {
-            HomeSwitch::Probe => [
-                (is_probe, AxisStatus::HOME),
-                (is_limit && is_probe, AxisStatus::REVERSE_LIMIT),
-                (is_limit && !is_probe, AxisStatus::FORWARD_LIMIT),
-            ],
-            HomeSwitch::Limit => {
-                // Which end it is follows from the direction in which the axis came there.
-                let is_far = is_limit
-                    && !is_known.has(AxisStatus::HOME)
-                    && (is_outwards || is_known.has(AxisStatus::FORWARD_LIMIT));
-                [
-                    (is_limit && !is_far, AxisStatus::HOME),
-                    (is_far, AxisStatus::FORWARD_LIMIT),
-                    (false, AxisStatus::REVERSE_LIMIT),
-                ]
-            }
-        };
-        let mut inputs = AxisStatus(0);
-        for (_, bit) in pins.iter().filter(|(is_closed, _)| *is_closed) {
-            inputs = inputs | *bit;
-        }
-        if inputs.has(AxisStatus::FORWARD_LIMIT)
-            && is_outwards
-            && self
-                .motion
-                .as_ref()
-                .is_some_and(|motion| motion.cancelled.is_none())
+        let pulses = self.pulses(steps);
+        let mut inputs = self.ends.inputs(&self.settings, status, is_known, pulses);
+        let going = self.motion.as_ref().filter(|it| it.cancelled.is_none());
+        if going.is_some() && status.has_pin('H') {
+            // Grbl ends the jogs that it has and begins the next (doc/markdown/jogging.md).
+            self.end(
+                now,
+                "the hold button of the board is pressed, so the axis is stopped",
+            );
+        } else if going.is_some_and(|motion| self.is_outwards(motion))
+            && inputs.has(AxisStatus::FORWARD_LIMIT)
         {
+            // Of one under way the samples tell it.
+            if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+                self.refuse(now, number, "the far limit switch is closed");
+            }
             self.cancel(now);
         }
         if self.is_motor_on {
             inputs = inputs | AxisStatus::MOTOR_ON;
         }
         self.track().inputs(now, inputs);
+    }
+
+    /// Into the tissue.
+    fn is_outwards(&self, motion: &Motion) -> bool {
+        motion.side() * self.settings.sign() as f64 > 0.0
     }
 
     fn on_idle(&mut self, now: Nanos, asked: Nanos, steps: i64) {
@@ -554,7 +528,17 @@ impl Session {
             return;
         }
         match (motion.cancelled, motion.started) {
-            (Some(cancelled), _) if asked >= cancelled => self.urgent.push_back(vec![CYCLE_START]),
+            (Some(cancelled), _) if asked >= cancelled => {
+                self.urgent.push_back(vec![CYCLE_START]);
+                if motion.is_doubtful
+                    && let Some(motion) = &mut self.motion
+                {
+                    // A jog that was not read yet begins now; it is cancelled until a report after this shows rest.
+                    motion.is_doubtful = false;
+                    motion.cancelled = Some(now);
+                    return;
+                }
+            }
             (None, Some(started)) if asked > started + Nanos::from_millis(20) => {
                 if !motion.is_all_sent() {
                     self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or mend the link");
@@ -602,7 +586,7 @@ impl Session {
         let Some(motion) = &self.motion else {
             return POLL;
         };
-        let is_inwards = motion.side() * self.settings.sign() as f64 <= 0.0;
+        let is_inwards = !self.is_outwards(motion);
         let is_ending = motion.is_all_sent()
             && motion
                 .started
@@ -636,6 +620,9 @@ impl Session {
         if self.open.is_some_and(|at| now.since(at) > OK_MAX) {
             self.open = None;
             self.stats.resynchronised += 1;
+            if let Some(motion) = &mut self.motion {
+                motion.is_doubtful = true;
+            }
             if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
                 self.refuse(
                     now,
@@ -662,24 +649,28 @@ impl Session {
             self.urgent.push_front(vec![RESET]);
         }
         let is_wanted = std::mem::take(&mut self.track().is_stop_wanted);
-        let Some(motion) = &self.motion else {
+        let is_unattended = now.since(self.attended) > ATTENDED_MAX;
+        if is_wanted {
+            self.drop_motions(now, "the load cell has failed, so it was not begun");
+        } else if is_unattended {
+            let why = "nobody took samples for half a second, so it was not begun";
+            self.drop_motions(now, why);
+        }
+        let Some(motion) = &mut self.motion else {
             return;
         };
         match motion.cancelled {
             Some(_) if now.since(motion.repeated) >= CANCEL_AGAIN => {
+                motion.repeated = now;
                 self.urgent.push_back(vec![JOG_CANCEL]);
-                if let Some(motion) = &mut self.motion {
-                    motion.repeated = now;
-                }
             }
             Some(_) => {}
             None if is_wanted => self.cancel(now),
-            None if now.since(self.attended) > ATTENDED_MAX => {
-                self.fault(
+            None if is_unattended => {
+                self.end(
                     now,
                     "nobody took samples for half a second, so the axis is stopped",
                 );
-                self.cancel(now);
             }
             None => {}
         }

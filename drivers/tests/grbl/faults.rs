@@ -13,9 +13,17 @@ use palpate_model::units::{MmPerS, MmPerS2};
 
 #[test]
 fn a_cut_cable_stops_the_axis_within_the_stated_way() {
-    for (speed, after) in [(20.0, 0.3), (20.0, 1.0), (0.75, 1.0), (9.0, 0.05)] {
+    // The last one is so short that its first jog might be all of it.
+    let cases = [
+        (20.0, 0.3, 40_000),
+        (20.0, 1.0, 40_000),
+        (0.75, 1.0, 40_000),
+        (9.0, 0.05, 40_000),
+        (20.0, 0.0, 5_560),
+    ];
+    for (speed, after, target) in cases {
         let mut host = Host::new(&slide());
-        host.tell(to(40_000, speed));
+        host.tell(to(target, speed));
         host.pass(after);
         let mut wire = host.wire.lock();
         let before = wire.board.place_mm();
@@ -188,6 +196,74 @@ fn a_host_that_hangs_stops_the_axis() {
         "{:?}",
         host.faults
     );
+}
+
+#[test]
+fn what_waits_is_not_begun_when_nobody_attends_or_the_cell_has_failed() {
+    for is_cell in [false, true] {
+        let mut host = Host::new(&slide());
+        if is_cell {
+            host.track
+                .lock()
+                .expect("nobody panics with it")
+                .is_stop_wanted = true;
+        } else {
+            host.is_attended = false;
+            host.pass(0.6);
+        }
+        let begun = host.acks.len();
+        for target in [400, 800, 1_200] {
+            host.ask(to(target, 5.0));
+        }
+        host.pass(1.0);
+        assert_eq!((host.truth(), host.acks.len()), (0.0, begun));
+        assert_eq!(host.faults.len(), 3, "{:?}", host.faults);
+    }
+}
+
+#[test]
+fn the_hold_button_ends_a_motion_and_none_begins_while_it_is_pressed() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 0.75));
+    host.pass(2.0);
+    let before = host.truth();
+    host.wire.lock().board.press_hold(true);
+    host.pass(1.0);
+    // Noticed with the next report, 0.1 s later.
+    let way = (host.truth() - before) * 0.0025;
+    assert!(way < 0.2, "{way}");
+    assert!(
+        host.faults[0].to_string().contains("hold"),
+        "{:?}",
+        host.faults
+    );
+    let there = host.truth();
+    host.ask(to(0, 0.75));
+    host.pass(2.0);
+    assert!((host.truth() - there).abs() * 0.0025 < 0.2);
+    assert_eq!(host.pulses(), host.truth());
+    host.wire.lock().board.press_hold(false);
+    host.tell(to(0, 5.0));
+    host.settle();
+    assert_eq!((host.truth(), host.pulses()), (0.0, 0.0));
+}
+
+#[test]
+fn a_jog_in_doubt_is_cancelled_until_a_second_report_of_rest() {
+    let mut host = Host::new(&slide());
+    host.tell(to(40_000, 5.0));
+    host.pass(0.5);
+    host.wire.lock().spoil = Box::new(|byte| match byte {
+        b'k' => Vec::new(),
+        other => vec![other],
+    });
+    host.until("told", |host| !host.faults.is_empty());
+    host.pass(1.0);
+    let sent = host.wire.lock().sent.clone();
+    let resumed: Vec<usize> = (0..sent.len()).filter(|at| sent[*at] == b'~').collect();
+    assert_eq!(resumed.len(), 2, "{resumed:?}");
+    assert!(sent[resumed[0]..resumed[1]].contains(&b'?'));
+    assert_eq!(host.pulses(), host.truth());
 }
 
 #[test]

@@ -173,6 +173,23 @@ fn a_jog_of_somebody_else_is_ended() {
 }
 
 #[test]
+fn half_a_line_of_somebody_else_moves_nothing() {
+    for half in ["G90G0X50", "$J=G91X50F600", "(a remark G0X50", "$H"] {
+        let wire = wired(grbl::GrblSettings::default());
+        {
+            let mut wire = wire.lock();
+            let now = wire.now;
+            wire.board.receive(now, half.as_bytes());
+            wire.pass(Nanos::from_millis(100));
+        }
+        let connected = try_connect(&wire, &slide());
+        assert!(connected.is_ok(), "{half}: {connected:?}");
+        wire.lock().pass(Nanos::from_millis(1_000));
+        assert_eq!(wire.lock().board.place_mm(), 0.0, "{half}");
+    }
+}
+
+#[test]
 fn another_board_is_noticed() {
     let mut own = grbl::GrblSettings::default();
     own.eeprom.build_info = "LEFT".into();

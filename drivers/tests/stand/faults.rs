@@ -143,6 +143,37 @@ fn an_overload_reads_the_end_of_the_range() {
 }
 
 #[test]
+fn an_overload_in_mid_move_stops_it_and_is_told_once() {
+    let mut host = Host::new();
+    host.tell(to(6_000, 2.0));
+    host.pass(1.0);
+    let now = host.now();
+    let before = host.travel();
+    host.wire
+        .lock()
+        .emulator
+        .suffer(now, DeviceFault::Saturated, true);
+    host.pass(1.0);
+    assert!(!host.wire.lock().emulator.is_moving());
+    assert!((host.travel() - before).abs() < 0.5, "{}", host.travel());
+    let told = |host: &Host| {
+        let is_it = |fault: &&Fault| fault.to_string().contains("beyond the gauge's range");
+        host.faults.iter().filter(is_it).count()
+    };
+    assert_eq!(told(&host), 1, "{:?}", host.faults);
+    // Within the range and beyond it again.
+    for is_on in [false, true] {
+        let now = host.now();
+        host.wire
+            .lock()
+            .emulator
+            .suffer(now, DeviceFault::Saturated, is_on);
+        host.pass(0.2);
+    }
+    assert_eq!(told(&host), 2, "{:?}", host.faults);
+}
+
+#[test]
 fn a_cut_wire_leaves_it_at_its_target() {
     let mut host = Host::new();
     host.tell(to(600, 2.0));

@@ -134,6 +134,7 @@ pub struct Grbl {
     /// Time of its own clock that has not been stepped yet, in steps.
     credit: f64,
     is_suspended: bool,
+    is_hold_pressed: bool,
 }
 
 impl Grbl {
@@ -175,6 +176,7 @@ impl Grbl {
             is_wrong: false,
             credit: 0.0,
             is_suspended: false,
+            is_hold_pressed: false,
             settings,
         };
         grbl.power_up();
@@ -285,6 +287,14 @@ impl Grbl {
             HomeWiring::Limit => is_home || is_reverse || is_forward,
             HomeWiring::Probe => is_reverse || is_forward,
         }
+    }
+
+    /// The button at the hold pin, which does as `!` when it goes down.
+    pub fn press_hold(&mut self, is_pressed: bool) {
+        if is_pressed && !std::mem::replace(&mut self.is_hold_pressed, is_pressed) {
+            self.real_time(b'!');
+        }
+        self.is_hold_pressed = is_pressed;
     }
 
     fn is_probe(&self) -> bool {

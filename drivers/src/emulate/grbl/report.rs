@@ -77,13 +77,16 @@ impl Grbl {
             self.modes.spindle_speed
         };
         let _ = write!(text, "|FS:{:.0},{spindle:.0}", self.speed * 60.0 * inch);
-        if self.is_probe() || self.is_limit() {
+        if self.is_probe() || self.is_limit() || self.is_hold_pressed {
             text.push_str("|Pn:");
             if self.is_probe() {
                 text.push('P');
             }
             if self.is_limit() {
                 text.push('X');
+            }
+            if self.is_hold_pressed {
+                text.push('H');
             }
         }
         let is_busy = self.is_moving();

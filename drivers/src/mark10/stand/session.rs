@@ -120,6 +120,8 @@ pub struct StandSession {
     /// Of the newest sample's time.
     uncertainty: Nanos,
     counts: i32,
+    /// The newest reading was beyond the gauge's range.
+    is_beyond: bool,
     attended: Option<Nanos>,
     events: VecDeque<(Nanos, RigEventBody)>,
     stats: LinkStats,
@@ -159,6 +161,7 @@ impl StandSession {
             tick: None,
             uncertainty: Nanos::ZERO,
             counts: 0,
+            is_beyond: false,
             attended: None,
             events: VecDeque::new(),
             stats: LinkStats {
@@ -331,6 +334,7 @@ impl StandSession {
             }
         };
         self.counts = counts;
+        self.look_for_overload(now);
         let tick = at.since(self.opened).0 / TICK.0;
         if self.tick.is_some_and(|before| tick <= before) {
             return;
@@ -368,6 +372,19 @@ impl StandSession {
         };
         self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
         self.report(now, RigEventBody::Reading(reading));
+    }
+
+    /// A reading at the end of the range stands for all that is beyond it, and no limit of force may see it.
+    fn look_for_overload(&mut self, now: Nanos) {
+        let is_beyond = self.counts.saturating_abs() >= self.scale.counts_max;
+        if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
+            self.stop_due |= self.is_going();
+            self.refuse(
+                now,
+                "the force is beyond the gauge's range; take the load off before it is damaged",
+            );
+        }
+        self.is_beyond = is_beyond;
     }
 
     /// Where the axis is told to be at a sample, and whether it moves.
