@@ -96,8 +96,9 @@ pub fn connect(
         settings.travel.0 + 2.0 * super::order::LIMIT_MARGIN_MM
     };
     let watch = if has_watchdog { "with" } else { "without" };
-    let safety =
-        format!("{watch} a watchdog: at most {worst_case_mm:.1} mm after the link is lost");
+    // Rounded up: it is a bound.
+    let most = (worst_case_mm * 10.0).ceil() / 10.0;
+    let safety = format!("{watch} a watchdog: at most {most:.1} mm after the link is lost");
     let ms = |span: Nanos| span.0 as f64 * 1e-6;
     let link = format!(
         "an answer takes {:.1} to {:.1} ms; {how}",

@@ -4,8 +4,8 @@ use super::protocol::Status;
 use super::settings::{GrblSettings, HomeSwitch};
 use palpate_model::rig::AxisStatus;
 
-/// Where both ends share a pin: what closes so near to where one of them did is that one again. Looking for home the engine
-/// leaves a switch by 8 mm.
+/// Where both ends share a pin: so near to one of them it is that one that closes. Looking for home the engine leaves a
+/// switch by 8 mm.
 const NEAR_MM: f64 = 10.0;
 
 /// What is known of the ends of an axis.
@@ -37,14 +37,19 @@ impl Ends {
         let (is_home, is_forward, is_reverse) = match settings.home {
             HomeSwitch::Probe => (is_probe, is_limit && !is_probe, is_limit && is_probe),
             HomeSwitch::Limit => {
-                let is_far = is_limit && self.is_far(settings, known, pulses);
-                if is_limit {
-                    let end = if is_far {
-                        &mut self.far
-                    } else {
-                        &mut self.home
-                    };
-                    *end = Some(pulses);
+                let near = NEAR_MM.min(0.5 * settings.travel.0) / settings.mm_per_pulse;
+                let is_near =
+                    |end: Option<i64>| end.is_some_and(|end| ((pulses - end) as f64).abs() < near);
+                // A switch that bounces, or that a motion has just not reached, is not at the other end.
+                let is_far = is_limit
+                    && !known.has(AxisStatus::HOME)
+                    && (self.is_outwards
+                        || known.has(AxisStatus::FORWARD_LIMIT)
+                        || is_near(self.far));
+                if is_limit && !is_far {
+                    self.home = Some(pulses);
+                } else if is_far && !is_near(self.home) {
+                    self.far = Some(pulses);
                 }
                 (is_limit && !is_far, is_far, false)
             }
@@ -57,22 +62,6 @@ impl Ends {
         bits.iter()
             .filter(|(is_closed, _)| *is_closed)
             .fold(AxisStatus(0), |all, (_, bit)| all | *bit)
-    }
-
-    /// Whether a pin that both ends share was closed by the far one.
-    fn is_far(&self, settings: &GrblSettings, known: AxisStatus, pulses: i64) -> bool {
-        if known.has(AxisStatus::HOME) || known.has(AxisStatus::FORWARD_LIMIT) {
-            return known.has(AxisStatus::FORWARD_LIMIT);
-        }
-        // A switch that bounces, or that a motion has just not reached, is not at the other end.
-        let near = NEAR_MM.min(0.5 * settings.travel.0) / settings.mm_per_pulse;
-        if self
-            .home
-            .is_some_and(|home| ((pulses - home) as f64) < near)
-        {
-            return false;
-        }
-        self.is_outwards || self.far.is_some_and(|far| (pulses - far) as f64 > -near)
     }
 }
 
@@ -131,10 +120,12 @@ mod tests {
         // The other end, and back over its edge.
         let way = [(5.0, false), (0.0, true), (0.1, false), (0.0, true)];
         assert_eq!(seen(&mut ends, &mut known, &way), [none, home, none, home]);
-        // Left again, over an edge that bounces.
+        // Left again, over an edge that bounces: a stop at worst, and home is where it was.
         ends.leave(true);
-        let way = [(0.1, false), (0.2, true), (0.5, false), (12.0, true)];
-        assert_eq!(seen(&mut ends, &mut known, &way), [none, home, none, far]);
+        let way = [(0.1, false), (0.2, true), (0.5, false)];
+        assert_eq!(seen(&mut ends, &mut known, &way), [none, far, none]);
+        ends.leave(false);
+        assert_eq!(seen(&mut ends, &mut known, &[(0.0, true)]), [home]);
     }
 
     #[test]

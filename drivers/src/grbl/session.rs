@@ -484,20 +484,27 @@ impl Session {
         let pulses = self.pulses(steps);
         let mut inputs = self.ends.inputs(&self.settings, status, is_known, pulses);
         let going = self.motion.as_ref().filter(|it| it.cancelled.is_none());
-        if going.is_some() && status.has_pin('H') {
+        let is_far = inputs.has(AxisStatus::FORWARD_LIMIT);
+        let is_closing = is_far && !is_known.has(AxisStatus::FORWARD_LIMIT);
+        match going.map(|motion| self.is_outwards(motion)) {
             // Grbl ends the jogs that it has and begins the next (doc/markdown/jogging.md).
-            self.end(
+            Some(_) if status.has_pin('H') => self.end(
                 now,
                 "the hold button of the board is pressed, so the axis is stopped",
-            );
-        } else if going.is_some_and(|motion| self.is_outwards(motion))
-            && inputs.has(AxisStatus::FORWARD_LIMIT)
-        {
-            // Of one under way the samples tell it.
-            if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
-                self.refuse(now, number, "the far limit switch is closed");
+            ),
+            Some(true) if is_far => {
+                // Of one under way the samples tell it.
+                if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+                    self.refuse(now, number, "the far limit switch is closed");
+                }
+                self.cancel(now);
             }
-            self.cancel(now);
+            // Whichever end it is.
+            Some(false) if is_closing => self.end(
+                now,
+                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; look at it",
+            ),
+            _ => {}
         }
         if self.is_motor_on {
             inputs = inputs | AxisStatus::MOTOR_ON;

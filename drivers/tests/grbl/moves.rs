@@ -230,6 +230,18 @@ fn home_is_seen_and_the_far_limit_stops() {
     let end = host.wire.lock().plant.axis().0;
     assert!((152.0..160.0).contains(&end), "{end}");
     assert!(host.has(AxisStatus::FORWARD_LIMIT) && !host.has(AxisStatus::HOME));
+    // Off it, and then it closes once more: in doubt which end that is, the axis stops.
+    let back = host.pulses() as i64 - 4_000;
+    host.tell(to(back, 1.0));
+    host.until("off the limit", |host| !host.has(AxisStatus::FORWARD_LIMIT));
+    assert_eq!(host.faults, []);
+    host.wire.lock().plant.shift(1.0);
+    host.until("a fault", |host| !host.faults.is_empty());
+    host.pass(0.5);
+    assert!(host.has(AxisStatus::FORWARD_LIMIT) && !host.has(AxisStatus::HOME));
+    let said = host.faults[0].to_string();
+    assert!(said.contains("a limit switch has closed"), "{said}");
+    assert!(host.truth() > back as f64 + 400.0);
 }
 
 #[test]
