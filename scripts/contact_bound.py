@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""Cramer-Rao bound of a contact position from one slow pass, in 50 digits: numbers of tests/tests/contact.rs.
+"""Cramer-Rao bound of a contact position from one slow pass, in 50 digits: numbers of tests/tests/suite/contact.rs.
 
 The body's force on the way in at constant speed is a_1 d psi_1 + a_2 d^2 psi_2 + a_3 d^3 psi_3 of r = d / (v tau),
 with psi_k(r) = exp(-r) integral of exp(s) (s/r)^k over 0..r; unknown are contact, level, offset and drift.

@@ -117,7 +117,7 @@ def program(given):
     """The program given, or the development build, made."""
     if given is not None:
         return str(pathlib.Path(given).resolve())
-    subprocess.run(["cargo", "build", "--quiet", "-p", "palpate-app"], cwd=ROOT, check=True)
+    subprocess.run(["cargo", "build", "--quiet", "-p", "palpate"], cwd=ROOT, check=True)
     metadata = subprocess.run(
         ["cargo", "metadata", "--no-deps", "--format-version", "1"], cwd=ROOT, check=True, capture_output=True
     )

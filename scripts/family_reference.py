@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
-"""Forces of every model family in 25 digits, for model/tests/data/family_reference.txt.
+"""Forces of every model family in 25 digits, for model/rheology/tests/data/family_reference.txt.
 
-Usage: scripts/family_reference.py > model/tests/data/family_reference.txt   (needs mpmath)
+Usage: scripts/family_reference.py > model/rheology/tests/data/family_reference.txt   (needs mpmath)
 
 Every number is an integral over the depth history evaluated by quadrature: of the equation's
 exponential kernel, of the relaxation function with its exponential integrals, or of the

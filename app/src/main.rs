@@ -1,7 +1,30 @@
-//! The `palpate` program: the window or one headless command.
+//! The `palpate` program: the window, where it is built with one, or one headless command.
 
 use std::process::ExitCode;
 
 fn main() -> ExitCode {
-    palpate_app::cli::main()
+    #[cfg(feature = "window")]
+    return palpate_cli::main(Some(&window::Desktop));
+    #[cfg(not(feature = "window"))]
+    palpate_cli::main(None)
+}
+
+#[cfg(feature = "window")]
+mod window {
+    use palpate_analysis::opening::{PlaybackRequest, Windows, WorkbenchRequest};
+    use palpate_window::playback::run_playback;
+    use palpate_window::window::{WindowOptions, run_window};
+
+    /// Windows on this computer's screen.
+    pub struct Desktop;
+
+    impl Windows for Desktop {
+        fn workbench(&self, request: WorkbenchRequest) -> Result<(), String> {
+            run_window(WindowOptions::remembered(request))
+        }
+
+        fn playback(&self, request: PlaybackRequest) -> Result<(), String> {
+            run_playback(request)
+        }
+    }
 }

@@ -3,7 +3,7 @@
 use crate::record::{self, Records};
 use crate::result::{BODY, Fit, median, seconds};
 use palpate_model::Depth;
-use palpate_model::fit::{FitOptions, FitReport, FitSample, Fitted, LiveFit, fit};
+use palpate_rheology::fit::{FitOptions, FitReport, FitSample, Fitted, LiveFit, fit};
 use serde::Serialize;
 use std::hint::black_box;
 
@@ -33,7 +33,7 @@ pub fn cold_fit(samples: &[FitSample], repeats: usize) -> Result<Fit, String> {
 /// Five 95 % profile intervals after a fit, f0 and f_offset fixed at 0, as `conf_interval` of lmfit
 /// is asked for them: median seconds without the fit, as lmfit's are, and low and high of each.
 pub fn profile_intervals(samples: &[FitSample]) -> Result<(f64, [[f64; 2]; 5]), String> {
-    let text = |err: palpate_model::fit::FitError| err.to_string();
+    let text = |err: palpate_rheology::fit::FitError| err.to_string();
     let mut options = FitOptions::default();
     options.fix("f0", 0.0).map_err(text)?;
     options.fix("f_offset", 0.0).map_err(text)?;

@@ -1,16 +1,14 @@
 //! The records every participant fits.
 
-#[path = "../../model/tests/support/mod.rs"]
-mod support;
-
-use palpate_model::fit::FitSample;
+use palpate_rheology::fit::FitSample;
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_test_support::record::{noisy, ramp_hold, respond};
 use std::io::Write;
 use std::path::Path;
 
 /// Seed of the noise.
 const SEED: u64 = 1;
-/// Standard deviation of the noise in N, as `support::respond` states it for each sample.
+/// Standard deviation of the noise in N, as `respond` states it for each sample.
 pub const NOISE_N: f64 = 0.02;
 /// Length of the thesis protocol in s: 0.75 mm/s to 30 mm, then a hold of 50 s.
 pub const LENGTH_S: f64 = 90.0;
@@ -27,7 +25,7 @@ impl Records {
     /// `intervals + 1` samples.
     pub fn new(intervals: u32) -> Self {
         let noiseless = noiseless(intervals);
-        let noisy = support::noisy(&noiseless, SEED);
+        let noisy = noisy(&noiseless, SEED);
         Self { noiseless, noisy }
     }
 
@@ -50,6 +48,6 @@ impl Records {
 /// The noiseless record alone.
 pub fn noiseless(intervals: u32) -> Vec<FitSample> {
     let dt = LENGTH_S / f64::from(intervals);
-    let path = support::ramp_hold(0.75, LENGTH_S - 40.0, dt);
-    support::respond(&ModifiedKelvin::THESIS, &path)
+    let path = ramp_hold(0.75, LENGTH_S - 40.0, dt);
+    respond(&ModifiedKelvin::THESIS, &path)
 }

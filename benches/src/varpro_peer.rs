@@ -3,7 +3,7 @@
 
 use crate::result::{Fit, median, seconds};
 use nalgebra::{DMatrix, DVector};
-use palpate_model::fit::FitSample;
+use palpate_rheology::fit::FitSample;
 use palpate_model::viscoelastic::{psi, psi_derivative};
 use std::convert::Infallible;
 use varpro::prelude::SeparableNonlinearModel;

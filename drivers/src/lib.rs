@@ -3,15 +3,13 @@
 //! This crate turns commands into bytes and bytes into readings. It never decides: what to do
 //! with a reading is the engine's business, and nothing here starts a move by itself.
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
-//! no hardware. [`doubles`] is for tests only, [`emulate`] answers like a device on a wire.
+//! no hardware. [`doubles`] is for tests only.
 
 pub mod cell;
 pub mod detect;
 pub mod doubles;
-pub mod emulate;
 pub mod galil;
 pub mod grbl;
-pub mod haptic;
 pub mod hx711;
 pub mod mark10;
 pub mod open;

@@ -3,7 +3,9 @@
 use crate::rig_file::{DeviceError, RigFileError};
 use crate::wire::LinkStats;
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{
+    Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
+};
 use thiserror::Error;
 
 /// Something a rig reported, with the time it reached the host.
@@ -108,6 +110,12 @@ pub trait Rig: Send {
     /// The bytes exchanged with devices since this was last asked, in order, at the caller's time. A rig without
     /// wires has none. Must not wait.
     fn take_raw(&mut self) -> Vec<RawBytes> {
+        Vec::new()
+    }
+
+    /// What its sensors beside load cell and axis say that is new since this was last asked, in order. Every one is told
+    /// again from time to time. A rig without any has nothing to say. Must not wait.
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
         Vec::new()
     }
 

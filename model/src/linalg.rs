@@ -3,7 +3,8 @@
 
 /// Upper triangle of `[A | y]`, `N` columns with the response as the last.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Triangle<const N: usize> {
+pub struct Triangle<const N: usize> {
+    /// Rows of the triangle; zero below the diagonal.
     pub r: [[f64; N]; N],
 }
 
@@ -28,6 +29,12 @@ impl<const N: usize> Triangle<N> {
                 (*top, *bottom) = (cos * *top + sin * *bottom, cos * *bottom - sin * *top);
             }
         }
+    }
+
+    /// Squared length of one column.
+    #[must_use]
+    pub fn length_squared(&self, column: usize) -> f64 {
+        self.r.iter().map(|row| row[column].powi(2)).sum()
     }
 
     /// Sum of squared residuals.

@@ -6,7 +6,7 @@
 type Unit = (&'static str, f64, f64);
 
 /// Every unit by quantity; the first is the base unit, in which numbers are kept.
-const UNITS: [&[Unit]; 8] = [
+const UNITS: [&[Unit]; 9] = [
     &[
         ("mm/s", 1.0, 1.0),
         ("mm/min", 1.0, 60.0),
@@ -35,6 +35,7 @@ const UNITS: [&[Unit]; 8] = [
         ("mN/min", 1.0, 6e4),
     ],
     &[("V", 1.0, 1.0), ("mV", 1.0, 1e3)],
+    &[("°C", 1.0, 1.0), ("degC", 1.0, 1.0)],
 ];
 
 fn row_of(unit: &str) -> Option<&'static [Unit]> {

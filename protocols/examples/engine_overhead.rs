@@ -10,7 +10,7 @@ use palpate_model::rig::{Ack, AxisStatus, Limits, Reading, RigCommand, RigDescri
 use palpate_model::units::{MmPerS, MmPerS2, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::{Config, Effect, Input, Operator, State, step};
 use palpate_protocols::file::built_in;
-use palpate_protocols::plans::{HoldRate, Plan, Step};
+use palpate_protocols::plans::{Hold, HoldRate, Plan, Rest, SelfTest, Step, Tare};
 use palpate_protocols::preview::preview;
 use palpate_protocols::runner::Stopwatch;
 use std::collections::BTreeMap;
@@ -36,31 +36,32 @@ fn rig() -> RigDescription {
         cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
+        sensors: Default::default(),
     }
 }
 
 fn plan(hours: u64) -> Plan {
     let mut steps = vec![
-        Step::SelfTest {
+        Step::SelfTest(SelfTest {
             duration: Seconds(0.5),
-        },
-        Step::Tare {
+        }),
+        Step::Tare(Tare {
             duration: Seconds(1.0),
-        },
+        }),
     ];
     for _ in 0..hours * 20 {
         // Three minutes: a hold that looks at its slope, and a rest.
-        steps.push(Step::Hold {
+        steps.push(Step::Hold(Hold {
             duration: Seconds(90.0),
             until: None,
             rate: Some(HoldRate {
                 below_n_per_s: 1e-12,
                 over: Seconds(10.0),
             }),
-        });
-        steps.push(Step::Rest {
+        }));
+        steps.push(Step::Rest(Rest {
             duration: Seconds(90.0),
-        });
+        }));
     }
     Plan::of("overhead", 1, steps)
 }

@@ -5,21 +5,15 @@
 //! same engine. Nothing here draws, and nothing in [`engine`] or [`plans`] does any I/O.
 //! Start reading at [`engine::step`].
 
-pub mod analysed;
-pub mod analysis;
 pub mod base;
-pub mod compliance;
-pub mod cycles;
-pub mod daily;
-pub mod edited;
 pub mod engine;
 pub mod fidelity;
 pub mod file;
 pub mod haptics;
-pub mod origin;
 pub mod plans;
 pub mod preview;
 pub mod programme;
 pub mod replay;
 pub mod runner;
+mod steps;
 pub mod weighed;

@@ -4,12 +4,12 @@
 //! version, of what (SHA-256 of every file that went in), how, and what came out. Nothing is ever written
 //! over and no name is used twice. To undo one is to add a record that withdraws it.
 
-use crate::chain::{self, ChainError};
+use crate::chain::{self, ChainError, Head};
 use crate::edits::EDITS_FILE;
 use crate::folder::{LOCK_FILE, segment_number};
 use crate::lock::{HolderLock, LockError};
 use crate::log::ReadError;
-use crate::log::reader::find_files;
+use crate::log::files::find_files;
 use crate::text::{sha256, sha256_of_file};
 use chrono::{DateTime, Utc};
 use serde::{Deserialize, Serialize};
@@ -167,15 +167,27 @@ pub struct Analyses {
     pub all: Vec<Analysis>,
     /// SHA-256 of the file; empty where there is none.
     pub sha256: String,
+    /// How far it goes.
+    pub head: Head,
 }
 
 impl Analyses {
     /// Reads those of a session, given its folder or a log file in it.
     pub fn read(session: &Path, session_id: &str) -> Result<Self, AnalysisError> {
+        Self::read_since(session, session_id, Head::default())
+    }
+
+    /// As [`read`](Self::read), and refuses a file that does not hold what it held once.
+    pub(crate) fn read_since(
+        session: &Path,
+        session_id: &str,
+        since: Head,
+    ) -> Result<Self, AnalysisError> {
         let Some(path) = file_beside(session) else {
             return Ok(Self::default());
         };
-        let chain = chain::read(&path, session_id)?;
+        let chain = chain::read_since(&path, session_id, since)?;
+        let head = chain.head();
         let all: Vec<Analysis> =
             chain
                 .records()
@@ -189,7 +201,7 @@ impl Analyses {
         } else {
             sha256_of_file(&path).map_err(|source| AnalysisError::Input { path, source })?
         };
-        Ok(Self { all, sha256 })
+        Ok(Self { all, sha256, head })
     }
 
     /// The file as an input; none where there is no analysis.
@@ -311,7 +323,7 @@ pub fn add_analysis(
             path: folder.into(),
         });
     }
-    let _lock = HolderLock::acquire(&folder.join(LOCK_FILE))?;
+    let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
     let there = Analyses::read(folder, session_id)?;
     if analysis.what == Analysed::Withdrawal {
         there.get(name)?;

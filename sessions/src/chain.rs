@@ -1,12 +1,18 @@
 //! Files that only grow, one JSON object a line. Every line carries a checksum over itself and the line
-//! before, so that a line that was changed, moved or taken out of the middle is noticed; not one taken off
-//! the end.
+//! before, so that a line that was changed, moved or taken out of the middle is noticed. One taken off the end
+//! is noticed by the [`Head`], which stands in a file beside it, and in the catalog.
 //!
 //! A line is `{"body": ..., "checksum": CRC-32}`. The checksum is over the checksum of the line before (of
 //! the first, the CRC-32 of the name the file belongs to) as four bytes, lowest first, and the compact JSON
 //! of the body with its keys in alphabetical order.
+//!
+//! The file of the head is named like that of the lines with `.head` behind. It is written after the line is on the
+//! disk, so a crash leaves it a line behind, never ahead. A file of lines without one comes from a palpate that wrote none:
+//! then nothing can be confirmed.
 
+use crate::atomic;
 use crate::folder::{create_folder, sync_folder_of};
+use crate::lock::{Busy, NotLocked, lock_soon};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -37,6 +43,37 @@ pub enum ChainError {
         /// Which line, from 1.
         line: usize,
     },
+    /// Fewer lines than were written, or others.
+    #[error("{} is not all that was written: {}; restore the file from a backup, or move it and its head away and rebuild the catalog to go back to what was recorded", path.display(), missing(*found, *written))]
+    Shortened {
+        /// The file.
+        path: PathBuf,
+        /// Lines in it.
+        found: u64,
+        /// Lines that were written.
+        written: u64,
+    },
+    /// The file that tells how many lines there are cannot be understood.
+    #[error("{} is not as it was written ({reason}); restore it from a backup, or move it away: nobody can tell then whether lines are missing at the end", path.display())]
+    BadHead {
+        /// The file of the head.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Another program has locked the file and does not let go.
+    #[error(transparent)]
+    Busy(#[from] Busy),
+}
+
+fn missing(found: u64, written: u64) -> String {
+    match written.checked_sub(found) {
+        None | Some(0) => "its lines are others than its head tells".to_owned(),
+        Some(1) => format!("its last line is missing, {found} of {written} are there"),
+        Some(count) => {
+            format!("its last {count} lines are missing, {found} of {written} are there")
+        }
+    }
 }
 
 #[derive(Serialize, Deserialize)]
@@ -45,12 +82,78 @@ struct Line {
     checksum: u32,
 }
 
+/// How far a file of lines goes: who knows it notices that lines were taken off the end.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Head {
+    /// Lines there are.
+    pub lines: u64,
+    /// Checksum of the last of them; 0 where there is none.
+    pub checksum: u32,
+}
+
+/// Version of the file of a head.
+const HEAD_VERSION: u32 = 1;
+/// A longer file is something else.
+const HEAD_BYTES_MAX: u64 = 4096;
+
+#[derive(Serialize, Deserialize)]
+struct HeadFile {
+    head_version: u32,
+    #[serde(flatten)]
+    head: Head,
+}
+
+impl Head {
+    /// The file of the head of a file of lines.
+    pub(crate) fn file_of(lines: &Path) -> PathBuf {
+        named(lines, ".head")
+    }
+
+    /// The head that was written; of no lines where there is no file of it.
+    fn read(lines: &Path) -> Result<Self, ChainError> {
+        let path = Self::file_of(lines);
+        let mut text = String::new();
+        let read =
+            File::open(&path).and_then(|file| file.take(HEAD_BYTES_MAX).read_to_string(&mut text));
+        match read {
+            Ok(_) => {}
+            Err(err) if err.kind() == io::ErrorKind::NotFound => return Ok(Self::default()),
+            Err(source) => {
+                return Err(ChainError::Io {
+                    what: "read",
+                    path,
+                    source,
+                });
+            }
+        }
+        let bad = |reason: String| ChainError::BadHead {
+            path: path.clone(),
+            reason,
+        };
+        let file: HeadFile = serde_json::from_str(&text).map_err(|err| bad(err.to_string()))?;
+        match file.head_version {
+            HEAD_VERSION => Ok(file.head),
+            version => Err(bad(format!("it is of version {version}; update palpate"))),
+        }
+    }
+
+    fn write(self, lines: &Path) -> io::Result<()> {
+        let file = HeadFile {
+            head_version: HEAD_VERSION,
+            head: self,
+        };
+        let mut text = serde_json::to_vec(&file)?;
+        text.push(b'\n');
+        atomic::replace(&Self::file_of(lines), &text)
+    }
+}
+
 /// What stands in a file of lines.
 #[derive(Debug)]
 pub(crate) struct Chain {
     pub bodies: Vec<Value>,
-    /// Checksum of the last line.
-    last: u32,
+    /// Checksum before the first line, and of each.
+    checksums: Vec<u32>,
     /// Bytes up to the end of the last whole line.
     whole: usize,
     /// Whether something follows that was never finished, as a crash leaves it.
@@ -58,6 +161,34 @@ pub(crate) struct Chain {
 }
 
 impl Chain {
+    fn last(&self) -> u32 {
+        self.checksums.last().copied().unwrap_or_default()
+    }
+
+    /// How far it goes.
+    pub fn head(&self) -> Head {
+        match self.bodies.len() {
+            0 => Head::default(),
+            lines => Head {
+                lines: lines as u64,
+                checksum: self.last(),
+            },
+        }
+    }
+
+    /// Refuses a chain of which lines are gone that were there.
+    fn check(&self, path: &Path, head: Head) -> Result<(), ChainError> {
+        let place = usize::try_from(head.lines).unwrap_or(usize::MAX);
+        match self.checksums.get(place) {
+            Some(checksum) if place == 0 || *checksum == head.checksum => Ok(()),
+            _ => Err(ChainError::Shortened {
+                path: path.into(),
+                found: self.bodies.len() as u64,
+                written: head.lines,
+            }),
+        }
+    }
+
     /// The bodies as what they are, or the first line, from 1, that is not and why.
     pub fn records<T: DeserializeOwned>(&self) -> Result<Vec<T>, (usize, String)> {
         let bodies = self.bodies.iter().enumerate();
@@ -76,7 +207,14 @@ fn checksum(before: u32, body: &Value) -> u32 {
 
 /// Reads the lines that belong to `name`; a file that is not there has none.
 pub(crate) fn read(path: &Path, name: &str) -> Result<Chain, ChainError> {
-    match std::fs::read(path) {
+    read_since(path, name, Head::default())
+}
+
+/// As [`read`], and refuses a file that does not hold what it held once.
+pub(crate) fn read_since(path: &Path, name: &str, since: Head) -> Result<Chain, ChainError> {
+    // Read before the lines: a line that is added meanwhile is in the lines, not in the head.
+    let head = Head::read(path)?;
+    let chain = match std::fs::read(path) {
         Ok(bytes) => parse(path, name, &bytes),
         Err(err) if err.kind() == io::ErrorKind::NotFound => parse(path, name, &[]),
         Err(source) => Err(ChainError::Io {
@@ -84,7 +222,10 @@ pub(crate) fn read(path: &Path, name: &str) -> Result<Chain, ChainError> {
             path: path.into(),
             source,
         }),
-    }
+    }?;
+    chain.check(path, head)?;
+    chain.check(path, since)?;
+    Ok(chain)
 }
 
 fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
@@ -94,7 +235,7 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
         .map_or(0, |at| at + 1);
     let mut chain = Chain {
         bodies: Vec::new(),
-        last: crc32fast::hash(name.as_bytes()),
+        checksums: vec![crc32fast::hash(name.as_bytes())],
         whole,
         is_torn: whole < bytes.len(),
     };
@@ -103,14 +244,14 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
         .enumerate()
     {
         let line = serde_json::from_slice::<Line>(line).ok();
-        let line = line.filter(|line| line.checksum == checksum(chain.last, &line.body));
+        let line = line.filter(|line| line.checksum == checksum(chain.last(), &line.body));
         let Some(Line { body, checksum }) = line else {
             return Err(ChainError::Changed {
                 path: path.into(),
                 line: index + 1,
             });
         };
-        chain.last = checksum;
+        chain.checksums.push(checksum);
         chain.bodies.push(body);
     }
     Ok(chain)
@@ -135,19 +276,28 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
         .open(path)
         .map_err(failed)?;
     // Two programs that add at the same time: the second continues the line of the first.
-    file.lock().map_err(failed)?;
+    lock_soon(&file, path).map_err(|err| match err {
+        NotLocked::Busy(busy) => busy.into(),
+        NotLocked::Io(source) => failed(source),
+    })?;
     let mut bytes = Vec::new();
     file.read_to_end(&mut bytes).map_err(failed)?;
     let chain = parse(path, name, &bytes)?;
+    chain.check(path, Head::read(path)?)?;
     if chain.is_torn {
         keep_torn(path, &bytes[chain.whole..]).map_err(failed)?;
         file.set_len(chain.whole as u64).map_err(failed)?;
     }
     let line = Line {
-        checksum: checksum(chain.last, &body),
+        checksum: checksum(chain.last(), &body),
         body,
     };
     write_line(&mut file, &line).map_err(failed)?;
+    let head = Head {
+        lines: chain.bodies.len() as u64 + 1,
+        checksum: line.checksum,
+    };
+    head.write(path).map_err(failed)?;
     if chain.bodies.is_empty() {
         sync_folder_of(path).map_err(failed)?;
     }
@@ -156,12 +306,21 @@ pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainEr
 
 /// Adds what was never finished to the file beside, a line for each time.
 fn keep_torn(path: &Path, torn: &[u8]) -> io::Result<()> {
-    let mut name = path.as_os_str().to_owned();
-    name.push(".torn");
-    let mut file = OpenOptions::new().append(true).create(true).open(name)?;
+    let mut options = OpenOptions::new();
+    let mut file = options
+        .append(true)
+        .create(true)
+        .open(named(path, ".torn"))?;
     file.write_all(torn)?;
     file.write_all(b"\n")?;
     file.sync_all()
+}
+
+/// A path with something behind its name.
+fn named(path: &Path, ending: &str) -> PathBuf {
+    let mut name = path.as_os_str().to_owned();
+    name.push(ending);
+    name.into()
 }
 
 fn write_line(file: &mut File, line: &Line) -> io::Result<()> {
@@ -228,6 +387,66 @@ mod tests {
     }
 
     #[test]
+    fn lines_taken_off_the_end_are_noticed_wherever_the_head_is_known() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines.jsonl");
+        three(&path);
+        let (head_file, text) = (Head::file_of(&path), fs::read_to_string(&path).unwrap());
+        let head = fs::read(&head_file).unwrap();
+        let known = read(&path, "session").unwrap().head();
+        assert_eq!(known.lines, 3);
+        for kept in 0..3 {
+            let lines: Vec<&str> = text.split_inclusive('\n').take(kept).collect();
+            fs::write(&path, lines.concat()).unwrap();
+            let told = |read: Result<Chain, ChainError>| match read {
+                Err(ChainError::Shortened { found, written, .. }) => Some((found, written)),
+                _ => None,
+            };
+            assert_eq!(told(read(&path, "session")), Some((kept as u64, 3)));
+            // Nothing is added that would hide it.
+            assert!(append(&path, "session", json!({})).is_err());
+            // Without the file only who remembers notices.
+            fs::remove_file(&head_file).unwrap();
+            assert_eq!(read(&path, "session").unwrap().bodies.len(), kept);
+            assert_eq!(
+                told(read_since(&path, "session", known)),
+                Some((kept as u64, 3))
+            );
+            fs::write(&head_file, &head).unwrap();
+        }
+        fs::remove_file(&path).unwrap();
+        assert!(read(&path, "session").is_err());
+        // As many lines, of which the last is another.
+        let two: Vec<&str> = text.split_inclusive('\n').take(2).collect();
+        fs::write(&path, two.concat()).unwrap();
+        fs::remove_file(&head_file).unwrap();
+        append(&path, "session", json!({"word": "four"})).unwrap();
+        assert_eq!(read(&path, "session").unwrap().head().lines, 3);
+        assert!(read_since(&path, "session", known).is_err());
+        for bad in ["", "{}", "{\"head_version\":2,\"lines\":1,\"checksum\":1}"] {
+            fs::write(&head_file, bad).unwrap();
+            let refused = read(&path, "session");
+            assert!(matches!(refused, Err(ChainError::BadHead { .. })), "{bad}");
+        }
+    }
+
+    #[test]
+    fn a_head_that_a_crash_left_behind_its_lines_is_no_fault() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("lines.jsonl");
+        let heads: Vec<Vec<u8>> = (0..3)
+            .map(|number| {
+                append(&path, "session", json!(number)).unwrap();
+                fs::read(Head::file_of(&path)).unwrap()
+            })
+            .collect();
+        for head in heads {
+            fs::write(Head::file_of(&path), head).unwrap();
+            assert_eq!(read(&path, "session").unwrap().bodies.len(), 3);
+        }
+    }
+
+    #[test]
     fn every_bit_of_a_line_counts() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("lines.jsonl");
@@ -252,6 +471,8 @@ mod tests {
         three(&path);
         let bytes = fs::read(&path).unwrap();
         fs::write(&path, &bytes[..bytes.len() - 9]).unwrap();
+        // A crash comes before the head.
+        fs::remove_file(Head::file_of(&path)).unwrap();
         let torn = read(&path, "session").unwrap();
         assert!(torn.is_torn && torn.bodies.len() == 2);
         append(&path, "session", json!({"word": "four"})).unwrap();

@@ -163,7 +163,8 @@ mod tests {
         );
         assert_eq!(read_checks(at, "never").unwrap(), []);
         // A name never leads out of the folder.
-        assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 3);
+        // Each with its head.
+        assert_eq!(std::fs::read_dir(at.join("checks")).unwrap().count(), 6);
         let file = file_of(at, "sim:bench 2");
         let text = std::fs::read_to_string(&file).unwrap();
         std::fs::write(

@@ -3,7 +3,7 @@
 //! several corrections of one contact, the last counts.
 
 use crate::analyses::Input;
-use crate::chain::{self, ChainError};
+use crate::chain::{self, ChainError, Head};
 use crate::folder::{LOCK_FILE, segment_number};
 use crate::lock::{HolderLock, LockError};
 use chrono::{DateTime, Utc};
@@ -197,22 +197,35 @@ pub struct Edits {
     pub all: Vec<Edit>,
     /// Whether the last one was begun and never finished, as a crash leaves it.
     pub is_torn: bool,
+    /// How far their file goes.
+    pub head: Head,
 }
 
 impl Edits {
     /// Reads the edits of a session, given its folder or a log file in it. A log file under another name
     /// than a session's has none.
     pub fn read(session: &Path, session_id: &str) -> Result<Self, EditError> {
+        Self::read_since(session, session_id, Head::default())
+    }
+
+    /// As [`read`](Self::read), and refuses a file that does not hold what it held once.
+    pub(crate) fn read_since(
+        session: &Path,
+        session_id: &str,
+        since: Head,
+    ) -> Result<Self, EditError> {
         let Some(path) = edits_file(session) else {
             return Ok(Self::default());
         };
-        let chain = chain::read(&path, session_id)?;
+        let chain = chain::read_since(&path, session_id, since)?;
+        let head = chain.head();
         let all = chain
             .records()
             .map_err(|(line, detail)| EditError::Unknown { path, line, detail })?;
         Ok(Self {
             all,
             is_torn: chain.is_torn,
+            head,
         })
     }
 

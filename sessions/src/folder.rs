@@ -1,6 +1,6 @@
 //! Where sessions live: the library, the folder of one session, and room on its disk.
 
-pub use crate::lock::{HolderLock, LockError};
+pub use crate::lock::{Busy, HolderLock, LockError};
 use chrono::{DateTime, Utc};
 use std::fs;
 use std::io;

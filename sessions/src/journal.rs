@@ -1,7 +1,7 @@
 //! A journal: one line of JSON an entry, each on disk before the next thing happens, so that a series that broke off
 //! can be continued at the right place.
 
-use crate::chain::{self, ChainError};
+use crate::chain::{self, ChainError, Head};
 use crate::folder::create_folder;
 use chrono::{DateTime, SecondsFormat, Utc};
 use serde::Serialize;
@@ -42,6 +42,22 @@ pub enum JournalError {
         /// Its file.
         path: PathBuf,
     },
+    /// Entries are missing at its end that were written.
+    #[error(
+        "the journal holds {found} of the {written} entries that were written, or others; restore it from a backup, or take {} away to go on from those that are there: {}",
+        Head::file_of(path).display(), path.display()
+    )]
+    Shortened {
+        /// Entries in it.
+        found: u64,
+        /// Entries that were written.
+        written: u64,
+        /// Its file.
+        path: PathBuf,
+    },
+    /// Another program has locked it, or its head cannot be understood.
+    #[error(transparent)]
+    Chain(ChainError),
 }
 
 /// A time as a journal writes it: RFC 3339 in UTC, to the millisecond.
@@ -146,6 +162,16 @@ fn told(err: ChainError) -> JournalError {
             path,
             source,
         },
+        ChainError::Shortened {
+            path,
+            found,
+            written,
+        } => JournalError::Shortened {
+            found,
+            written,
+            path,
+        },
+        other => JournalError::Chain(other),
     }
 }
 
@@ -167,6 +193,8 @@ mod tests {
         for whole in [fs::read(&path).unwrap(), b"1\n22\n333\n".to_vec()] {
             for cut in 0..=whole.len() {
                 fs::write(&path, &whole[..cut]).unwrap();
+                // A crash comes before the head.
+                let _ = fs::remove_file(folder.path().join("journal.jsonl.head"));
                 let (mut journal, old) = Journal::open::<u32>(folder.path()).unwrap();
                 let ended = whole[..cut].iter().filter(|byte| **byte == b'\n').count();
                 assert_eq!(old, [1, 22, 333][..ended], "{cut}");
@@ -176,6 +204,29 @@ mod tests {
                 assert_eq!(again.last(), Some(&4444));
             }
         }
+    }
+
+    #[test]
+    fn an_entry_that_was_taken_off_the_end_is_noticed() {
+        let folder = tempfile::tempdir().unwrap();
+        let (mut journal, _) = Journal::open::<u32>(folder.path()).unwrap();
+        for entry in [1, 22, 333] {
+            journal.push(&entry).unwrap();
+        }
+        let path = folder.path().join(JOURNAL_FILE);
+        let text = fs::read_to_string(&path).unwrap();
+        let two: Vec<&str> = text.split_inclusive('\n').take(2).collect();
+        fs::write(&path, two.concat()).unwrap();
+        let refused = Journal::open::<u32>(folder.path());
+        assert!(matches!(
+            refused,
+            Err(JournalError::Shortened {
+                found: 2,
+                written: 3,
+                ..
+            })
+        ));
+        assert!(journal.push(&4).is_err());
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Session logs on disk: write, read, export, import.
+//! Session logs on disk: write, read, recover, find.
 //!
 //! A session is a folder with one log in the MCAP container (<https://mcap.dev/spec>), a long one
 //! in segments. What was
@@ -12,6 +12,7 @@
 
 pub mod about;
 pub mod analyses;
+pub mod atomic;
 pub mod calibrations;
 pub mod catalog;
 mod chain;
@@ -19,13 +20,10 @@ pub mod checks;
 pub mod compliances;
 pub mod contacts;
 pub mod edits;
-pub mod export;
 pub mod folder;
 pub mod health;
-pub mod import;
 pub mod imported;
 pub mod journal;
-pub mod lake;
 mod lock;
 pub mod log;
 pub mod manifest;
@@ -33,7 +31,7 @@ mod packed;
 pub mod raw;
 pub mod record;
 pub mod recover;
-mod schema;
+pub mod schema;
 pub mod shelf;
 pub mod text;
 pub mod ticks;
@@ -43,20 +41,18 @@ pub use about::{About, AboutError, Labels};
 pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
 pub use calibrations::{Kept, Shelf, read_calibration};
 pub use catalog::{Catalog, CatalogError};
-pub use chain::ChainError;
+pub use chain::{ChainError, Head};
 pub use edits::{Change, Decision, EDITS_FILE, Edit, EditError, Edits, Review, Verdict, add_edit};
-pub use export::{ExportError, Format, Selection};
 pub use folder::{
     FolderError, HolderLock, LOCK_FILE, LOG_FILE, LockError, SPARE_FILE, SessionFolder,
     check_free_space, library_folder, new_programme_folder, new_session_folder, segment_file,
     spare_folder,
 };
 pub use health::{Health, HealthSummary, MachineState};
-pub use import::{ColumnNames, Table, TableError, parse_table, read_table};
 pub use imported::{Imported, ORIGINAL_FOLDER, Reading};
 pub use log::{
-    BATCHES_PER_SEGMENT, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice, Outline,
-    Pace, Part, Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
+    Alteration, BATCHES_PER_SEGMENT, Beside, FileSink, FolderSegments, LogError, LogWriter, Notice,
+    Outline, Pace, Part, Parts, ReadError, SegmentSource, Session, SessionWriter, Sink, Summary,
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use raw::{RawBlock, RawPiece};

@@ -1,7 +1,9 @@
-//! One holder at a time, across processes: a lock file that names who holds it.
+//! One holder at a time, across processes: a lock file that names who holds it, and locks that are waited for, but not
+//! for ever.
 
 use std::fs::{File, OpenOptions, TryLockError};
-use std::io::{Read, Seek, SeekFrom, Write};
+use std::io::{self, Read, Seek, SeekFrom, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 use thiserror::Error;
@@ -28,9 +30,87 @@ pub enum LockError {
     },
 }
 
-/// Tries to take a lock that is soon free, and the time between them: 2 s in all.
-const TRIES: u32 = 80;
+/// Longest wait for a lock that palpate itself holds for a moment only.
+const PATIENCE: Duration = Duration::from_secs(3);
 const BETWEEN_TRIES: Duration = Duration::from_millis(25);
+
+/// Does what may find a lock taken until it does not, or for [`PATIENCE`].
+fn soon<T>(mut tried: impl FnMut() -> Option<T>) -> Option<T> {
+    let tries = PATIENCE.as_millis() / BETWEEN_TRIES.as_millis();
+    for _ in 0..tries {
+        if let Some(done) = tried() {
+            return Some(done);
+        }
+        std::thread::sleep(BETWEEN_TRIES);
+    }
+    tried()
+}
+
+/// Another program holds a lock for longer than palpate ever does.
+#[derive(Debug, PartialEq, Eq, Error)]
+#[error("{} is locked by {} and was not free within {} s; wait for that program to end, or close it", path.display(), named(*holder), PATIENCE.as_secs())]
+pub struct Busy {
+    /// The file.
+    pub path: PathBuf,
+    /// Process number of who holds it, where the system tells.
+    pub holder: Option<u32>,
+}
+
+impl Busy {
+    pub(crate) fn of(path: &Path) -> Self {
+        Self {
+            path: path.into(),
+            holder: holder_of(path),
+        }
+    }
+}
+
+pub(crate) fn named(holder: Option<u32>) -> String {
+    holder.map_or("another program".into(), |number| {
+        format!("process {number}")
+    })
+}
+
+/// Why a file was not locked.
+#[derive(Debug)]
+pub(crate) enum NotLocked {
+    /// Somebody else holds it.
+    Busy(Busy),
+    /// What the system said.
+    Io(io::Error),
+}
+
+/// Locks an open file, and waits a little for whoever has locked it.
+pub(crate) fn lock_soon(file: &File, path: &Path) -> Result<(), NotLocked> {
+    let locked = soon(|| match file.try_lock() {
+        Err(TryLockError::WouldBlock) => None,
+        Err(TryLockError::Error(source)) => Some(Err(NotLocked::Io(source))),
+        Ok(()) => Some(Ok(())),
+    });
+    locked.unwrap_or_else(|| Err(NotLocked::Busy(Busy::of(path))))
+}
+
+/// Who holds a lock on a file, whichever of the two kinds there are (proc(5), `/proc/locks`).
+pub(crate) fn holder_of(path: &Path) -> Option<u32> {
+    let facts = std::fs::metadata(path).ok()?;
+    let (major, minor) = (
+        rustix::fs::major(facts.dev()),
+        rustix::fs::minor(facts.dev()),
+    );
+    let file = format!("{major:02x}:{minor:02x}:{}", facts.ino());
+    let locks = std::fs::read_to_string("/proc/locks").ok()?;
+    let of_line = |line: &str| {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        match words.as_slice() {
+            // `1: FLOCK ADVISORY WRITE 4711 fd:01:1234 0 EOF`; one that waits has an arrow before its kind.
+            [_, kind, _, _, process, place, ..] if *kind != "->" && *place == file => {
+                process.parse().ok()
+            }
+            _ => None,
+        }
+    };
+    locks.lines().find_map(of_line)
+}
 
 /// Holds a lock file until dropped. The system releases it when the process dies.
 #[derive(Debug)]
@@ -88,15 +168,13 @@ impl HolderLock {
     }
 
     /// As [`acquire`](Self::acquire), for work that is done in a moment: whoever else does such work is waited for,
-    /// 2 s at most.
+    /// a few seconds at most.
     pub fn acquire_soon(path: &Path) -> Result<Self, LockError> {
-        for _ in 0..TRIES {
-            match Self::acquire(path) {
-                Err(LockError::Held { .. }) => std::thread::sleep(BETWEEN_TRIES),
-                done => return done,
-            }
-        }
-        Self::acquire(path)
+        let taken = soon(|| match Self::acquire(path) {
+            Err(LockError::Held { .. }) => None,
+            done => Some(done),
+        });
+        taken.unwrap_or_else(|| Self::acquire(path))
     }
 
     /// The lock file.

@@ -168,16 +168,16 @@ impl Channel {
 }
 
 /// Topic of an export of one message per sample.
-pub(crate) const SAMPLE_TOPIC: &str = "/sample";
+pub const SAMPLE_TOPIC: &str = "/sample";
 
 /// Descriptor of its messages, where what is unknown is told apart from 0.
-pub(crate) fn sample_schema() -> Vec<u8> {
+pub fn sample_schema() -> Vec<u8> {
     let always = ["t_s", "phase", "cycle", "sample"];
     descriptor_set_with("Sample", SAMPLE_FIELDS, |name| !always.contains(&name))
 }
 
 /// Units of its fields.
-pub(crate) fn sample_metadata() -> BTreeMap<String, String> {
+pub fn sample_metadata() -> BTreeMap<String, String> {
     let units = [
         ("t_s", "s since the first sample"),
         ("depth_mm", "mm"),

@@ -4,12 +4,13 @@
 //! A file is `{"checksum": CRC-32 of the compact JSON of the document with its keys in alphabetical order,
 //! KIND: the document}` and is called by its id, `20260305-bench-cell-9f31c2aa`: day, name, checksum.
 
+use crate::atomic;
 use chrono::{DateTime, FixedOffset, Utc};
 use serde::Serialize;
 use serde::de::{DeserializeOwned, Error as _};
 use serde_json::{Map, Value};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -299,14 +300,7 @@ pub fn save<D: Document>(library: &Path, document: &D) -> Result<Kept<D>, Librar
     let text = serde_json::to_vec_pretty(&file)
         .map_err(as_io)
         .map_err(failed(&path))?;
-    let hidden = folder.join(format!(".{id}.{}.tmp", std::process::id()));
-    let written = fs::File::create(&hidden)
-        .and_then(|mut file| file.write_all(&text).and_then(|()| file.sync_all()))
-        // A link is refused where a file is; a rename would write over it.
-        .and_then(|()| fs::hard_link(&hidden, &path));
-    // Whether it is left or not, the result is told by what came before.
-    let _ = fs::remove_file(&hidden);
-    match written {
+    match atomic::create(&path, &text) {
         Err(err) if err.kind() == io::ErrorKind::AlreadyExists => {
             Err(LibraryError::AlreadyThere { kind: D::KIND, id })
         }

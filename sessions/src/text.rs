@@ -1,8 +1,9 @@
 //! Small text files beside a session.
 
+use crate::atomic;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
-use std::io::{self, Read, Write};
+use std::io::{self, Read};
 use std::path::Path;
 
 /// The text of a file, or one sentence that names it.
@@ -12,16 +13,7 @@ pub fn read(path: &Path) -> Result<String, String> {
 
 /// Writes a text over what may be there; the file is the old or the new one, never half of it.
 pub fn write(path: &Path, text: &str) -> Result<(), String> {
-    let mut name = std::ffi::OsString::from(".");
-    name.push(path.file_name().unwrap_or_default());
-    name.push(".tmp");
-    let hidden = path.with_file_name(name);
-    File::create(&hidden)
-        .and_then(|mut file| {
-            file.write_all(text.as_bytes())
-                .and_then(|()| file.sync_all())
-        })
-        .and_then(|()| fs::rename(&hidden, path))
+    atomic::replace(path, text.as_bytes())
         .map_err(|err| format!("cannot write {} ({err})", path.display()))
 }
 

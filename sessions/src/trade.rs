@@ -2,10 +2,11 @@
 //!
 //! A file is `{"checksum": CRC-32 of the compact JSON of the curves, "curves": ...}`.
 
-use palpate_model::trade::{CurveError, Machine, TRADE_FORMAT, TradeCurves};
+use crate::atomic;
+use palpate_rheology::trade::{CurveError, Machine, TRADE_FORMAT, TradeCurves};
 use serde::{Deserialize, Serialize};
 use std::fs;
-use std::io::{self, Write};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -117,17 +118,8 @@ pub fn write_trade(library: &Path, curves: &TradeCurves) -> Result<PathBuf, Trad
         checksum: checksum(curves).map_err(failed)?,
         curves: curves.clone(),
     };
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    let hidden = path.with_file_name(format!(".{name}.{}.tmp", std::process::id()));
     let text = serde_json::to_vec_pretty(&stored).map_err(|err| failed(err.into()))?;
-    let result = fs::File::create(&hidden)
-        .and_then(|mut file| file.write_all(&text).and_then(|()| file.sync_all()))
-        .and_then(|()| fs::rename(&hidden, &path));
-    if result.is_err() {
-        // What is left of it helps nobody; the error already says what happened.
-        let _ = fs::remove_file(&hidden);
-    }
-    result.map_err(failed)?;
+    atomic::replace(&path, &text).map_err(failed)?;
     Ok(path)
 }
 

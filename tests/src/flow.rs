@@ -1,6 +1,6 @@
 //! The window driven by accessible name: no display, no graphics card, no pixels.
 //!
-//! Every wait is bounded by a count of frames, so a flow that hangs fails instead.
+//! Every wait has an end that no busy computer reaches, so a flow that hangs fails instead.
 #![expect(
     clippy::unwrap_used,
     clippy::missing_panics_doc,
@@ -9,15 +9,17 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_app::app::WorkbenchApp;
-use palpate_app::report::text::{self, ParameterText};
-use palpate_app::window::WindowOptions;
-use palpate_app::workers::fit::{Refit, fit_source};
+use palpate_analysis::fit::fit_source;
+use palpate_analysis::report::text::{self, ParameterText};
+use palpate_analysis::source::Wanted;
 use palpate_drivers::sim::SimSettings;
-use palpate_model::fit::{FitOptions, FitReport};
 use palpate_model::rig::Phase;
-use palpate_protocols::analysis::Wanted;
 use palpate_protocols::runner::{LogLine, RunView, TimeScale};
+use palpate_rheology::fit::{FitOptions, FitReport};
+use palpate_test_support::wait::Deadline;
+use palpate_window::app::WorkbenchApp;
+use palpate_window::window::WindowOptions;
+use palpate_window::workers::fit::Refit;
 use std::path::PathBuf;
 use std::time::Duration;
 use tempfile::TempDir;
@@ -27,9 +29,6 @@ pub type Window = Harness<'static, WorkbenchApp>;
 
 /// Sleep between two frames of a wait.
 pub const FRAME: Duration = Duration::from_millis(5);
-
-/// Most frames of a wait: over a minute, ten times what the slowest flow took on two slow cores.
-const FRAMES_MAX: usize = 12_000;
 
 /// A window on a simulated rig, driven by accessible name.
 pub struct Flow {
@@ -73,14 +72,15 @@ impl Flow {
 
     /// Draws frames until `is_done`.
     pub fn wait(&mut self, what: &str, is_done: impl Fn(&Window) -> bool) {
-        for _ in 0..FRAMES_MAX {
+        let end = Deadline::new();
+        loop {
             self.window.step();
             if is_done(&self.window) {
                 return;
             }
+            assert!(!end.is_over(), "{what} did not come; {}", self.story());
             std::thread::sleep(FRAME);
         }
-        panic!("{what} did not come; {}", self.story());
     }
 
     /// What happened so far, for a failure's message.

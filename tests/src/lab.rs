@@ -173,6 +173,9 @@ impl<R: Rig> Lab<R> {
                 RigEventBody::Fault(fault) => Input::Fault(fault),
             };
             self.give(input);
+            for value in self.rig.take_sensors() {
+                self.give(Input::Sensor { value });
+            }
         } else {
             self.now = self.next_tick;
             self.next_tick = self.next_tick + TICK;

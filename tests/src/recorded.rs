@@ -8,14 +8,14 @@ use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Leader, Request, RunRequest, Runner, StartError, TimeScale,
 };
 use palpate_sessions::Session;
+use palpate_test_support::wait::PATIENCE;
 use std::path::Path;
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::time::Duration;
 
 /// Runs as fast as the computer can until the run has ended, however it ended.
 ///
 /// # Panics
-/// If the run is not started or says nothing for a minute.
+/// If the run is not started or says nothing for minutes.
 #[must_use]
 pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) -> Session {
     of_plan(rig, calibration, params.plan())
@@ -24,7 +24,7 @@ pub fn session(rig: Box<dyn Rig>, calibration: Calibration, params: RampHold) ->
 /// The same for any plan.
 ///
 /// # Panics
-/// If the run is not started or says nothing for a minute.
+/// If the run is not started or says nothing for minutes.
 #[must_use]
 pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Session {
     of_any_plan(rig, calibration, plan).expect("a start")
@@ -36,7 +36,7 @@ pub fn of_plan(rig: Box<dyn Rig>, calibration: Calibration, plan: Plan) -> Sessi
 /// Why it is refused.
 ///
 /// # Panics
-/// If the run says nothing for a minute.
+/// If the run says nothing for minutes.
 pub fn of_any_plan(
     rig: Box<dyn Rig>,
     calibration: Calibration,
@@ -52,7 +52,7 @@ pub fn of_any_plan(
 /// Waits until a run that has started is over and its session closed.
 ///
 /// # Panics
-/// If the run says nothing for a minute.
+/// If the run says nothing for minutes.
 pub fn to_its_end((runner, woken): (Runner, Receiver<()>)) {
     let has_ended = || {
         let snapshot = runner.snapshot();
@@ -60,9 +60,7 @@ pub fn to_its_end((runner, woken): (Runner, Receiver<()>)) {
         run.is_some_and(|run| run.outcome.is_some())
     };
     while !has_ended() {
-        woken
-            .recv_timeout(Duration::from_secs(60))
-            .expect("the run does not end");
+        woken.recv_timeout(PATIENCE).expect("the run does not end");
     }
 }
 
@@ -84,7 +82,7 @@ pub fn start(
 /// A plan with a step that follows, at full pace or in real time, as a session read back from disk.
 ///
 /// # Panics
-/// If the run is not started or says nothing for a minute.
+/// If the run is not started or says nothing for minutes.
 #[must_use]
 pub fn of_led_plan(
     rig: Box<dyn Rig>,

@@ -3,11 +3,11 @@
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::fit::FitSample;
 use palpate_model::rig::{Limits, Phase};
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{Config, Effect, Input, Operator, Record, State, step};
 use palpate_protocols::plans::RampHold;
+use palpate_rheology::fit::FitSample;
 use std::sync::Arc;
 
 /// A run that has ended, or holds after a stop.

@@ -3,12 +3,12 @@
 //! A recalibration makes every force anew from the raw signal and the tares that were found; a mask names
 //! stretches whose forces do not count. The log itself stays as it is.
 
-use crate::analysis::{SourceError, calibration_of, decisions, decisions_among};
 use crate::edited::{self, Edited};
-use crate::engine::{ENGINE_VERSION, Effect, Record};
-use crate::runner::wall_now;
+use crate::source::{SourceError, calibration_of, decisions, decisions_among};
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::units::{Seconds, Volts};
+use palpate_protocols::engine::{ENGINE_VERSION, Effect, Record};
+use palpate_protocols::runner::wall_now;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };
@@ -138,7 +138,7 @@ fn bad_calibration(err: impl std::fmt::Display) -> SourceError {
 }
 
 /// Controller time from one sample to a later one.
-pub(crate) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds {
+pub(super) fn time_between(session: &Session, first: &Row, row: &Row) -> Seconds {
     let ticks = row.tick.saturating_sub(first.tick);
     session
         .manifest
@@ -321,7 +321,7 @@ mod tests {
     use super::*;
 
     fn recorded(name: &str) -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         Session::open(&sessions.join(name)).unwrap()
     }
 
@@ -355,7 +355,7 @@ mod tests {
         let path = folder.path().join("session");
         std::fs::create_dir(&path).unwrap();
         let recorded =
-            Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab");
+            Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab");
         for item in std::fs::read_dir(recorded).unwrap() {
             let item = item.unwrap();
             std::fs::copy(item.path(), path.join(item.file_name())).unwrap();

@@ -2,20 +2,21 @@
 //! sessions. The axis goes as far as the probe sinks in and the rig gives way, so the probe's own depth is
 //! `depth - compliance * force`. Raw depths stay as they are; what is corrected stands beside them.
 
-use crate::analysis::{
+use crate::source::{
     FitSource, SourceError, curve_of, decisions, is_saturated, noise_of, trusted_samples,
 };
-use crate::engine::{Effect, Record, SEATED_SHARE};
-use palpate_model::fit::FitSample;
 use palpate_model::rig::{
     Compliance, ComplianceError, CorrectedDepth, Phase, RigCompliance, StiffSample,
 };
 use palpate_model::units::{Depth, Newtons, Position};
+use palpate_protocols::engine::{Effect, Record};
+use palpate_protocols::plans::FindBase;
+use palpate_rheology::fit::FitSample;
 use palpate_sessions::compliances::{Kept, Shelf};
-use palpate_sessions::export::Beside;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::Row;
 use palpate_sessions::shelf::LibraryError;
+use palpate_tables::export::Beside;
 use serde::Serialize;
 use std::path::Path;
 use thiserror::Error;
@@ -65,7 +66,7 @@ pub fn measured(
     if presses.is_empty() {
         return Err(MeasureError::NoPress);
     }
-    let seating = seating.unwrap_or(Newtons(SEATED_SHARE * highest));
+    let seating = seating.unwrap_or(Newtons(FindBase::SEATED_SHARE * highest));
     let manifest = &session.manifest;
     Ok(RigCompliance {
         rig: manifest

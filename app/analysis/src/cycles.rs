@@ -1,17 +1,17 @@
 //! From what is on disk to what an analysis of cycles takes: sessions and foreign tables alike.
 
-use crate::analysis::{
+use crate::edited;
+use crate::source::{
     SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
 };
-use crate::edited;
-use crate::engine::{Effect, Record};
 use palpate_model::calibration::Calibration;
-use palpate_model::cycles::{CycleSample, by_depth};
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
-use palpate_sessions::import::{ColumnNames, Table, read_table};
+use palpate_protocols::engine::{Effect, Record};
+use palpate_rheology::cycles::{CycleSample, by_depth};
 use palpate_sessions::log::Session;
 use palpate_sessions::record::Row;
+use palpate_tables::import::{ColumnNames, Table, read_table};
 use std::path::Path;
 
 /// A record in cycles, and what a reader should know about it.
@@ -197,7 +197,7 @@ mod tests {
     use palpate_sessions::record::{Entry, EntryKind};
 
     fn recorded() -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         Session::open(&sessions.join("ramp-hold-lab")).unwrap()
     }
 
@@ -240,7 +240,7 @@ mod tests {
         let source = of_session(&session).unwrap();
         let rig = session.manifest.rig.as_ref().unwrap();
         assert_eq!(source.pulse, Some(Depth(rig.mm_per_pulse)));
-        let plan: crate::plans::Plan =
+        let plan: palpate_protocols::plans::Plan =
             serde_json::from_value(session.manifest.plan.clone()).unwrap();
         // The sample that led to a step is the first of it.
         assert!(source.samples.len() > 10_000);

@@ -1,12 +1,12 @@
 //! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
 //! tissue unless somebody takes the responsibility.
 
-use crate::analysis::{SourceError, calibration_of, decisions};
-use crate::engine::{Effect, EndingKind, Record};
-use crate::plans::{Plan, Step};
-use crate::weighed::{Readings, Weighed};
+use crate::source::{SourceError, calibration_of, decisions};
 use palpate_model::calibration::{Calibration, KnownWeight};
 use palpate_model::units::Volts;
+use palpate_protocols::engine::{Effect, EndingKind, Record};
+use palpate_protocols::plans::{Plan, Step};
+use palpate_protocols::weighed::{Readings, Weighed};
 use palpate_sessions::checks::{CheckFileError, CheckPart, DailyCheck, last_of_day, read_checks};
 use palpate_sessions::log::Session;
 use std::path::Path;
@@ -157,8 +157,7 @@ pub enum Gate {
 #[must_use]
 pub fn is_gated(plan: &Plan) -> bool {
     let may_jog = HOMING_CHECKS.contains(&plan.name.as_str());
-    let is_touching =
-        |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog { .. }));
+    let is_touching = |step: &Step| step.may_touch() && !(may_jog && matches!(step, Step::Jog(_)));
     plan.steps.iter().any(|planned| is_touching(&planned.step))
 }
 
@@ -212,7 +211,7 @@ fn failed(check: &DailyCheck) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::plans::RampHold;
+    use palpate_protocols::plans::RampHold;
     use palpate_sessions::checks::add_check;
 
     fn weighed(mass_g: f64, volts: f64) -> Record {
@@ -280,7 +279,9 @@ mod tests {
 
     #[test]
     fn the_usual_weight_is_one_that_the_thesis_s_cell_knows_without_a_doubt() {
-        let protocol = crate::file::built_in(DAILY_CHECK).unwrap().unwrap();
+        let protocol = palpate_protocols::file::built_in(DAILY_CHECK)
+            .unwrap()
+            .unwrap();
         let plan = protocol.plan(&std::collections::BTreeMap::new()).unwrap();
         let masses = plan.steps.iter().filter_map(|one| match &one.step {
             Step::Weigh(weigh) if weigh.mass_g > 0.0 => Some(weigh.mass_g),
@@ -313,7 +314,7 @@ mod tests {
     fn a_failed_check_closes_the_gate_until_one_passes() {
         let library = tempfile::tempdir().unwrap();
         let at = Some(library.path());
-        let now = crate::runner::wall_now();
+        let now = palpate_protocols::runner::wall_now();
         let plan = RampHold::default().plan();
         let gate = |is_virtual| Gate::of(&plan, at, "bench", is_virtual, now).unwrap();
         assert!(matches!(gate(true), Gate::Note(_)));
@@ -343,7 +344,7 @@ mod tests {
         );
         // Of the built-in protocols, those that cannot touch stay open.
         let built_in = |name: &str, values: &[(&str, &str)]| {
-            let protocol = crate::file::built_in(name).unwrap().unwrap();
+            let protocol = palpate_protocols::file::built_in(name).unwrap().unwrap();
             let own = |(name, value): &(&str, &str)| (name.to_string(), value.to_string());
             protocol.plan(&values.iter().map(own).collect()).unwrap()
         };
@@ -351,7 +352,9 @@ mod tests {
             let gate = Gate::of(plan, at, "bench", false, now).unwrap();
             gate == Gate::Open
         };
-        let names = crate::file::BUILT_IN.iter().map(|(name, _)| *name);
+        let names = palpate_protocols::file::BUILT_IN
+            .iter()
+            .map(|(name, _)| *name);
         let open: Vec<&str> = names.filter(|name| is_open(&built_in(name, &[]))).collect();
         assert_eq!(open, ["daily-check", "load-cell-calibration", "check-home"]);
         assert!(is_open(&built_in("free-jog", &[("distance", "-5 mm")])));

@@ -3,7 +3,7 @@
 //! A corrected contact moves every depth that was counted from it by the difference, and stands in the
 //! decision that found it. The log itself stays as it is.
 
-use crate::analysis::SourceError;
+use crate::source::SourceError;
 use palpate_model::units::Depth;
 pub use palpate_sessions::contacts::{FoundContact, contacts};
 use palpate_sessions::contacts::{contact_position, is_record};
@@ -208,7 +208,7 @@ mod tests {
 
     #[test]
     fn of_several_contacts_only_the_corrected_one_moves_its_depths() {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         let mut session = Session::open(&sessions.join("ramp-hold-lab")).unwrap();
         let first = contacts(&session.entries);
         assert_eq!(first.len(), 1);
@@ -236,7 +236,7 @@ mod tests {
         let before = session.clone();
         let edits = Edits {
             all: vec![edit(2, 40.0), edit(2, first[0].position.0 + 0.5)],
-            is_torn: false,
+            ..Edits::default()
         };
         correct(&mut session, &edits);
         for (index, (old, new)) in before.rows.iter().zip(&session.rows).enumerate() {
@@ -262,7 +262,7 @@ mod tests {
             &mut same,
             &Edits {
                 all: vec![edit(3, 1.0)],
-                is_torn: false,
+                ..Edits::default()
             },
         );
         assert!(same == before);

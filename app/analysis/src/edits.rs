@@ -1,7 +1,7 @@
 //! What people say of sessions afterwards, as the command line and the window both write it: every time a record beside
 //! the log, never over anything.
 
-use super::task::Progress;
+use crate::progress::Progress;
 use chrono::{DateTime, Utc};
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};

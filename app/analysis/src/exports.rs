@@ -1,12 +1,14 @@
 //! Sessions as tables and into lakes, as the command line and the window both write them.
 
-use super::task::Progress;
-use palpate_protocols::analysis::SourceError;
-use palpate_protocols::edited;
-use palpate_sessions::export::{Beside, ExportError, Feed, Format, Selection, Table};
-use palpate_sessions::lake::{self, Added, Told};
+use crate::edited;
+use crate::progress::Progress;
+use crate::source::SourceError;
+use palpate_sessions::atomic;
 use palpate_sessions::log::Summary;
 use palpate_sessions::manifest::Manifest;
+use palpate_sessions::recover::is_in_use;
+use palpate_tables::export::{Beside, ExportError, Feed, Format, Selection, Table};
+use palpate_tables::lake::{self, Added, Told};
 use std::collections::BTreeSet;
 use std::fmt;
 use std::path::{Path, PathBuf};
@@ -18,6 +20,8 @@ pub enum ExportFailure {
     Source(SourceError),
     /// It cannot be written.
     Export(ExportError),
+    /// It is being recorded, and what is in a lake never changes.
+    BeingRecorded(PathBuf),
 }
 
 impl fmt::Display for ExportFailure {
@@ -25,6 +29,11 @@ impl fmt::Display for ExportFailure {
         match self {
             Self::Source(err) => err.fmt(f),
             Self::Export(err) => err.fmt(f),
+            Self::BeingRecorded(session) => write!(
+                f,
+                "{} is being recorded, and files of a lake never change; add it when the run has ended",
+                session.display()
+            ),
         }
     }
 }
@@ -62,6 +71,15 @@ pub struct Written {
 }
 
 impl Target {
+    /// Takes away what killed exports left where this one goes.
+    pub fn sweep(&self) {
+        let folder = match self {
+            Self::Table(_, folder) => Some(folder.as_path()),
+            Self::Messages(path) => path.parent(),
+        };
+        folder.map(|folder| atomic::sweep(folder, 1));
+    }
+
     /// Writes a table whose rows `feed` hands out.
     pub fn write(&self, session: &Path, table: &Table, feed: Feed) -> Result<Written, ExportError> {
         let (path, rows) = match self {
@@ -122,9 +140,19 @@ fn stem(session: &Path, manifest: &Manifest) -> String {
     )
 }
 
+/// Takes away what killed exports left in a lake.
+pub fn sweep_lake(lake: &Path) {
+    atomic::sweep(lake, usize::MAX);
+}
+
 /// Adds a session to a lake.
 pub fn into_lake(lake: &Path, session: &Path) -> Result<Added, ExportFailure> {
+    // Looked at before it is read: a run that ends in between would be there without its end.
+    let is_in_use = is_in_use(session);
     let passing = edited::outline(session)?;
+    if is_in_use && passing.outline.end.is_none() {
+        return Err(ExportFailure::BeingRecorded(session.into()));
+    }
     let verdict = passing.edits.verdict();
     let told = Told {
         verdict: verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str())),
@@ -202,6 +230,10 @@ pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &Progress)
             folder.display()
         );
         return Exported { sentence, remarks };
+    }
+    match to {
+        Destination::Lake(lake) => sweep_lake(lake),
+        Destination::Tables(format, folder) => Target::Table(*format, folder.clone()).sweep(),
     }
     let (mut written, mut were_there) = (0, 0);
     for (done, session) in sessions.iter().enumerate() {

@@ -1,7 +1,7 @@
 //! Every case at the extremes, as the command line and the window both run them.
 
-use palpate_model::extremes::{Extent, Row, parts};
-use palpate_model::families::UnknownFamily;
+use palpate_rheology::extremes::{Extent, Row, parts};
+use palpate_rheology::families::UnknownFamily;
 use std::ops::ControlFlow;
 
 /// Runs everything, or what concerns one family. `progress` hears how many thousandths are done and what is

@@ -3,8 +3,8 @@
 use super::haptics::Followed;
 use crate::report::haptics::follow_table;
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::import::{Kept, Told, keep, parse_foreign};
 use palpate_sessions::{Labels, new_session_id};
+use palpate_tables::import::{Kept, Told, keep, parse_foreign};
 use std::path::Path;
 
 /// Name of the table that is kept beside the log.

@@ -4,21 +4,19 @@
 use super::fit::fit_source;
 use super::margin::{MarginPoint, margin_curve};
 use super::recorded::RecordedTicks;
-use crate::report::thin::thin;
-use palpate_model::fit::{FitOptions, FitReport, FitSample, fit};
-use palpate_model::haptics::check::{
-    CheckSample, CheckSettings, calibration_points, check as run_check,
-};
-use palpate_model::haptics::margin::Verdict;
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::simulation::SimulationSettings;
-use palpate_model::haptics::{BiasCalibration, Buzz, DriveKind, Flags, Period, TorqueSettings};
+use crate::source::Wanted;
+use palpate_figures::thin::thin;
+use palpate_haptics::check::{CheckSample, CheckSettings, calibration_points, check as run_check};
+use palpate_haptics::margin::Verdict;
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::simulation::SimulationSettings;
+use palpate_haptics::{BiasCalibration, Buzz, DriveKind, Flags, Period, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::analysis::Wanted;
 use palpate_protocols::haptics::taped::{TapeRecorder, Taped};
 use palpate_protocols::haptics::timing::Kept;
 use palpate_protocols::haptics::{Beat, Simulated, Ticking};
+use palpate_rheology::fit::{FitOptions, FitReport, FitSample, fit};
 use serde::Serialize;
 use std::path::Path;
 use std::sync::Arc;

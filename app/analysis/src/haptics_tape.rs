@@ -3,7 +3,7 @@
 use super::haptics::Setting;
 use super::recorded::{Again, Ended, Replayed, computed_again};
 use palpate_drivers::rig_file::fields::{Fields, in_words};
-use palpate_model::haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
+use palpate_haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::haptics::scene_file::{body_text, read_body};

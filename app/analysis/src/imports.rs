@@ -1,13 +1,13 @@
 //! Files of other programs made into sessions, as the command line and the window both do it.
 
-use super::task::Progress;
+use crate::progress::Progress;
 use crate::report::imported;
 use palpate_protocols::runner::wall_now;
-use palpate_sessions::import::{
-    Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
-};
 use palpate_sessions::{FolderError, Imported, Labels, library_folder};
 use palpate_sessions::{new_session_folder, new_session_id};
+use palpate_tables::import::{
+    Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,
+};
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt;

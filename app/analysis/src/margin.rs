@@ -1,6 +1,6 @@
 //! The damping that a body needs over the depths of a stroke, in its parts.
 
-use palpate_model::haptics::margin::{Device, Linear, Watch};
+use palpate_haptics::margin::{Device, Linear, Watch};
 use palpate_model::units::{Depth, MmPerS};
 
 /// Depths looked at: as many as a plot is wide.
@@ -51,8 +51,8 @@ pub fn margin_curve(watch: &Watch, deepest: Depth, speed: MmPerS) -> Vec<MarginP
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::workers::haptics::Setting;
-    use palpate_model::haptics::Period;
+    use crate::haptics::Setting;
+    use palpate_haptics::Period;
     use palpate_model::viscoelastic::ModifiedKelvin;
 
     fn curve(rate: f64, delay: usize) -> (Vec<MarginPoint>, f64) {

@@ -2,7 +2,7 @@
 
 use crate::compliance::Correction;
 use palpate_model::calibration::{Calibration, CalibrationError, ForceUncertainty};
-use palpate_model::fit::{FitSample, Traced};
+use palpate_rheology::fit::{FitSample, Traced};
 
 /// Calibration and compliance of one source, both by name and with their uncertainty.
 #[derive(Clone, Debug, Default, PartialEq)]

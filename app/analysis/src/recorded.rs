@@ -79,9 +79,10 @@ impl Replayed {
     /// In words.
     #[must_use]
     pub fn words(&self) -> String {
-        let how = match self.is_identical {
-            true => "every number bit for bit as recorded",
-            false => "not as recorded",
+        let how = match (self.is_identical, self.is_whole) {
+            (true, true) => "every number bit for bit as recorded",
+            (true, false) => "every number that is left bit for bit as recorded",
+            (false, _) => "not as recorded",
         };
         let mut lines = vec![format!(
             "{}: {} ticks computed again, {how}",
@@ -96,10 +97,16 @@ impl Replayed {
         lines.join("\n")
     }
 
-    /// Why it is not as recorded, if so.
+    /// Why it is not as recorded, or not all of it, if so.
     #[must_use]
     pub fn failure(&self) -> Option<String> {
-        let first = self.first.as_ref()?;
+        let Some(first) = &self.first else {
+            let cut_off = format!(
+                "the recording has no end: it was cut off after tick {}, and what came then is not known",
+                self.ticks
+            );
+            return (!self.is_whole).then_some(cut_off);
+        };
         let why = match self.lost {
             0 => "the program, its settings or the recording changed".to_owned(),
             lost => format!("{lost} ticks were lost when it was recorded"),

@@ -2,7 +2,7 @@
 
 use super::haptics::{Paced, body_of};
 use super::recorded::{Again, Ended, RecordedTicks, Replayed, computed_again};
-use palpate_model::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
+use palpate_haptics::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
 use palpate_protocols::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };

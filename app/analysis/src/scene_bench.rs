@@ -1,14 +1,14 @@
 //! What exactness costs in a scene on this computer, and the cheapest way that a scene's tolerances allow.
 
 use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Needs, NoPlan, Recovery, SceneCurves, ScenePlan, Side,
     StepPoint, Surface, plan, slower,
 };
-use palpate_model::tolerance::Tolerance;
-use palpate_model::trade::{Machine, pareto};
 use palpate_protocols::haptics::scene_file::SceneFile;
 use palpate_protocols::runner::Stopwatch;
+use palpate_rheology::tolerance::Tolerance;
+use palpate_rheology::trade::{Machine, pareto};
 use serde::Serialize;
 
 /// The family that a scene plays: the modified Kelvin body of third order.

@@ -1,8 +1,8 @@
 //! From sources on disk to a comparison of models, as the command line and the window both make it.
 
-use palpate_model::fit::FitSample;
-use palpate_model::select::{SelectError, SelectOptions, Selection, select};
-use palpate_protocols::analysis::{self, SourceError, Stretch};
+use crate::source::{self, SourceError, Stretch};
+use palpate_rheology::fit::FitSample;
+use palpate_rheology::select::{SelectError, SelectOptions, Selection, select};
 use std::fmt;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,7 @@ pub fn select_sources(
 }
 
 fn read(path: &Path, stretch: Stretch) -> Result<SelectSource, SelectFailure> {
-    let source = analysis::read_stretch(path, None, stretch)
+    let source = source::read_stretch(path, None, stretch)
         .map_err(|reason| SelectFailure::Source(path.to_path_buf(), Box::new(reason)))?;
     let name = path.file_stem().map_or_else(
         || path.display().to_string(),

@@ -1,20 +1,20 @@
 //! From what is on disk to what a fit takes: sessions and foreign tables alike.
 
 use palpate_model::calibration::{Calibration, Curve};
-use palpate_model::fit::FitSample;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons, Seconds, Volts};
+use palpate_rheology::fit::FitSample;
 use palpate_sessions::analyses::AnalysisError;
 use palpate_sessions::edits::EditError;
-use palpate_sessions::import::{ColumnNames, Table, TableError, read_table};
 use palpate_sessions::log::{ReadError, Session};
 use palpate_sessions::record::{Entry, EntryKind, Row};
+use palpate_tables::import::{ColumnNames, Table, TableError, read_table};
 use std::path::Path;
 use thiserror::Error;
 
 use crate::analysed::{self, Opened};
 use crate::compliance::CorrectionError;
-use crate::engine::{Effect, Record};
+use palpate_protocols::engine::{Effect, Record};
 
 /// Samples for a fit, and what a reader should know about them.
 #[derive(Clone, Debug)]
@@ -299,7 +299,7 @@ fn source_of_imported(session: Session, stretch: Stretch) -> FitSource {
 }
 
 /// The samples of an imported session, its time from the first one.
-pub(crate) fn table_of_imported(session: &Session) -> Table {
+pub(super) fn table_of_imported(session: &Session) -> Table {
     let mut table = Table::default();
     for row in &session.rows {
         let is_taken = matches!(
@@ -327,7 +327,7 @@ pub fn calibration_of(session: &Session) -> Result<Calibration, SourceError> {
 }
 
 /// The curve of that calibration.
-pub(crate) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
+pub(super) fn curve_of(session: &Session) -> Result<Curve, SourceError> {
     let curve = calibration_of(session)?.curve();
     curve.map_err(|err| SourceError::Calibration {
         detail: err.to_string(),
@@ -388,14 +388,14 @@ fn is_fitted(row: &Row, stretch: Stretch) -> bool {
 }
 
 /// At the end of its range a converter says no more than that the signal is there or beyond.
-pub(crate) fn is_saturated(session: &Session, row: &Row) -> bool {
+pub(super) fn is_saturated(session: &Session, row: &Row) -> bool {
     let ends = session.manifest.rig.as_ref().and_then(|rig| rig.adc);
     let ends = ends.map(|adc| [adc.counts_min, adc.counts_max]);
     matches!((ends, row.counts), (Some(ends), Some(counts)) if ends.contains(&counts))
 }
 
 /// How many samples came before an interlock tripped; all of them if none did.
-pub(crate) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
+pub(super) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
     let tripped = decisions
         .iter()
         .find(|(_, effect)| matches!(effect, Effect::Record(Record::InterlockTripped { .. })));
@@ -403,12 +403,12 @@ pub(crate) fn trusted_samples(decisions: &[(u64, Effect)]) -> usize {
 }
 
 /// What the engine decided, each after so many samples.
-pub(crate) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
+pub(super) fn decisions(session: &Session) -> Result<Vec<(u64, Effect)>, SourceError> {
     decisions_among(&session.entries)
 }
 
 /// The decisions among a session's entries, each after so many samples.
-pub(crate) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, SourceError> {
+pub(super) fn decisions_among(entries: &[Entry]) -> Result<Vec<(u64, Effect)>, SourceError> {
     entries
         .iter()
         .filter(|entry| entry.kind == EntryKind::Decision)
@@ -455,7 +455,7 @@ fn start_of(session: &Session) -> Seconds {
 }
 
 /// The signal's noise as the tare found it.
-pub(crate) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
+pub(super) fn noise_of(decisions: &[(u64, Effect)]) -> Option<Volts> {
     decisions.iter().find_map(|(_, effect)| match effect {
         Effect::Record(Record::Tared { noise, .. }) => Some(*noise),
         _ => None,
@@ -478,10 +478,10 @@ fn samples_of_table(table: &Table, stretch: Stretch) -> Vec<FitSample> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::fit::{FitOptions, fit};
+    use palpate_rheology::fit::{FitOptions, fit};
 
     fn recorded(name: &str) -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         Session::open(&sessions.join(name)).unwrap()
     }
 
@@ -552,7 +552,7 @@ mod tests {
             .position(|row| is_fitted(row, Stretch::RampHold))
             .unwrap();
         let tripped = Effect::Record(Record::InterlockTripped {
-            interlock: crate::engine::Interlock::Signal,
+            interlock: palpate_protocols::engine::Interlock::Signal,
             reason: "on purpose".into(),
         });
         session.entries.push(Entry {

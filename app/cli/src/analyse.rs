@@ -2,14 +2,14 @@
 
 use super::output::Output;
 use super::{Failure, last_fit, new_file, source_failure};
-use crate::report::cycles::{CycleReport, Question, object, picture, whole};
 use clap::Args;
-use palpate_model::cycles::SteadyRule;
-use palpate_model::fit::{FitOptions, fit};
+use palpate_analysis::report::cycles::{CycleReport, Question, object, picture, whole};
+use palpate_analysis::{cycles, source};
 use palpate_model::units::Depth;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::{analysis, cycles};
-use palpate_sessions::import::ColumnNames;
+use palpate_rheology::cycles::SteadyRule;
+use palpate_rheology::fit::{FitOptions, fit};
+use palpate_tables::import::ColumnNames;
 use std::path::{Path, PathBuf};
 
 /// Arguments of `palpate analyse`.
@@ -102,8 +102,10 @@ fn fitted(path: &Path, columns: Option<&ColumnNames>) -> Result<ModifiedKelvin, 
     if path.extension().is_some_and(|ending| ending == "json") {
         return last_fit::read(path)?.body().map_err(Failure::usage);
     }
-    let source = analysis::read_named(path, columns).map_err(source_failure)?;
+    let source = source::read_named(path, columns).map_err(source_failure)?;
     let report = fit(&source.samples, &FitOptions::default())
         .map_err(|err| Failure::failed(format!("{} cannot be fitted: {err}", path.display())))?;
-    Ok(report.body())
+    report
+        .kelvin()
+        .ok_or_else(|| Failure::failed("the fit is of another body"))
 }

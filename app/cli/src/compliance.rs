@@ -3,10 +3,10 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
+use palpate_analysis::compliance::{Corrections, MeasureError, measured};
+use palpate_analysis::edited;
 use palpate_model::rig::RigCompliance;
 use palpate_model::units::Newtons;
-use palpate_protocols::compliance::{Corrections, MeasureError, measured};
-use palpate_protocols::edited;
 use palpate_sessions::compliances::{Kept, Shelf};
 use palpate_sessions::library_folder;
 use palpate_sessions::shelf::{LibraryError, save, supersede};

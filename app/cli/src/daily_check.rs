@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::Output;
 use super::rig::RigArgs;
 use clap::Args;
-use palpate_protocols::daily::{DAILY_CHECK, judge};
+use palpate_analysis::daily::{DAILY_CHECK, judge};
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::Plan;

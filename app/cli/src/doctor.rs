@@ -4,6 +4,7 @@ use super::Failure;
 use super::output::Output;
 use clap::Args;
 use palpate_protocols::runner::wall_now;
+use palpate_sessions::atomic::leftovers;
 use palpate_sessions::library_folder;
 use palpate_sessions::recover::{
     Health, Missing, Patient, RecoverError, examine, examine_library, recover, recover_library,
@@ -39,6 +40,8 @@ struct Visit {
     sessions: Vec<Patient>,
     /// How many cannot be used as they are.
     unwell: usize,
+    /// Files that a killed program was writing and nobody finishes.
+    leftovers: Vec<PathBuf>,
 }
 
 #[derive(Serialize)]
@@ -69,21 +72,39 @@ struct Recoveries {
 }
 
 pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
-    let paths = if args.sessions.is_empty() {
-        all_sessions(&library_folder().map_err(Failure::usage)?)?
+    let (paths, places) = if args.sessions.is_empty() {
+        let library = library_folder().map_err(Failure::usage)?;
+        // Exports go to where the user is, if nothing else is said.
+        let here = PathBuf::from(".");
+        (
+            all_sessions(&library)?,
+            vec![(library, usize::MAX), (here, 1)],
+        )
     } else {
-        args.sessions.clone()
+        let places = args.sessions.iter().map(|path| (path.clone(), usize::MAX));
+        (args.sessions.clone(), places.collect())
     };
     let sessions = each(&paths, output, examine);
+    let left = places
+        .iter()
+        .flat_map(|(place, depth)| leftovers(place, *depth));
+    let leftovers: Vec<PathBuf> = left.collect();
     let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
     let visit = Visit {
         command: "doctor",
         sessions,
         unwell,
+        leftovers,
     };
     output.result(&visit, || {
         let count = visit.sessions.len();
         let mut lines: Vec<String> = visit.sessions.iter().map(patient_text).collect();
+        lines.extend(visit.leftovers.iter().map(|path| {
+            format!(
+                "{}: left by a program that was ended while it wrote; delete it, or the next export there does",
+                path.display()
+            )
+        }));
         lines.push(match unwell {
             0 => format!("{count} looked at, all can be used"),
             _ => format!("{count} looked at, {unwell} cannot be used as they are"),
@@ -238,9 +259,10 @@ fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
 fn one(path: &Path) -> Result<Recovered, Failure> {
     let recovery = recover(path, VERSION, wall_now().into()).map_err(|err| match err {
         RecoverError::Read(err) => super::read_failure(err),
-        RecoverError::Whole { .. } | RecoverError::InUse { .. } | RecoverError::Before { .. } => {
-            Failure::usage(err)
-        }
+        RecoverError::Whole { .. }
+        | RecoverError::InUse { .. }
+        | RecoverError::InProgress { .. }
+        | RecoverError::Before { .. } => Failure::usage(err),
         _ => Failure::failed(err),
     })?;
     Ok(Recovered {

@@ -4,16 +4,16 @@ use super::Failure;
 use super::output::Output;
 use super::rig::BenchArgs;
 use clap::{Args, Subcommand};
-use palpate_drivers::emulate::bench::Bench;
-use palpate_drivers::emulate::cell::EmulatedCell;
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilModel, GalilSettings};
-use palpate_drivers::emulate::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
-use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
-use palpate_drivers::emulate::mark10::{
+use palpate_emulators::bench::Bench;
+use palpate_emulators::cell::EmulatedCell;
+use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
+use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
+use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use palpate_emulators::mark10::{
     EmulatedGauge, EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings,
 };
-use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
-use palpate_drivers::emulate::{Device, ScheduledFault};
+use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::{Device, ScheduledFault};
 use palpate_model::Nanos;
 use serde::Serialize;
 use std::io::BufRead;

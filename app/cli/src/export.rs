@@ -2,13 +2,13 @@
 
 use super::output::Output;
 use super::{Failure, compliance, lake, read_failure, source_failure};
-use crate::workers::exports::{self, ExportFailure, Target};
 use clap::{Args, ValueEnum};
+use palpate_analysis::analysed;
+use palpate_analysis::compliance::columns;
+use palpate_analysis::exports::{self, ExportFailure, Target};
 use palpate_model::rig::Phase;
-use palpate_protocols::analysed;
-use palpate_protocols::compliance::columns;
-use palpate_sessions::export::{Beside, ExportError, Format, Selection, Table, dictionary_path};
 use palpate_sessions::log::Session;
+use palpate_tables::export::{Beside, ExportError, Format, Selection, Table, dictionary_path};
 use std::path::PathBuf;
 
 /// Arguments of `palpate export`.
@@ -143,6 +143,7 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
     };
     let selection = args.selection()?;
     let target = args.target();
+    target.sweep();
     let mut compliance = None;
     let written = if args.analysis.is_some() || args.compliance.is_some() {
         let opened = analysed::open(session, args.analysis.as_deref());
@@ -204,6 +205,7 @@ pub(super) fn export_failure(err: ExportFailure) -> Failure {
     match err {
         ExportFailure::Source(err) => source_failure(err),
         ExportFailure::Export(err) => failure(err),
+        ExportFailure::BeingRecorded(_) => Failure::usage(err),
     }
 }
 

@@ -3,10 +3,10 @@
 use super::Failure;
 use super::new_file;
 use super::output::Output;
-use crate::report::extremes::{PAGE_HEAD, page, text};
-use crate::workers::extremes::survey;
 use clap::Args;
-use palpate_model::extremes::{Extent, Row, Verdict};
+use palpate_analysis::extremes::survey;
+use palpate_analysis::report::extremes::{PAGE_HEAD, page, text};
+use palpate_rheology::extremes::{Extent, Row, Verdict};
 use serde::Serialize;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};

@@ -3,9 +3,9 @@
 use super::Failure;
 use super::catalog::with_updated;
 use super::output::Output;
-use crate::report::catalog as report;
 use chrono::{DateTime, Utc};
 use clap::{Args, ValueEnum};
+use palpate_analysis::report::catalog as report;
 use palpate_sessions::catalog::{
     Condition, Entry, Order, Query, ReviewIs, VerdictIs, beginning, ending,
 };

@@ -6,15 +6,15 @@ use super::output::Output;
 use super::run::number;
 use super::scene::{ReplayArgs, told};
 use super::slave::{self, SlaveArgs};
-use crate::report::haptics::{
+use clap::{Args, Subcommand, ValueEnum};
+use palpate_analysis::follow_session::keep_followed;
+use palpate_analysis::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
+use palpate_analysis::haptics_tape::{recorder, replay};
+use palpate_analysis::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
-use crate::workers::follow_session::keep_followed;
-use crate::workers::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
-use crate::workers::haptics_tape::{recorder, replay};
-use clap::{Args, Subcommand, ValueEnum};
-use palpate_model::haptics::check::CheckSettings;
-use palpate_model::haptics::{DriveKind, Period};
+use palpate_haptics::check::CheckSettings;
+use palpate_haptics::{DriveKind, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;

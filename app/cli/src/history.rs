@@ -3,8 +3,8 @@
 use super::Failure;
 use super::catalog::with_updated;
 use super::output::Output;
-use crate::report::catalog as report;
 use clap::{Args, ValueEnum};
+use palpate_analysis::report::catalog as report;
 use palpate_sessions::catalog::{Event, Subject};
 use palpate_sessions::library_folder;
 use serde::Serialize;
@@ -48,6 +48,8 @@ struct HistoryReport<'a> {
     subject: Subject,
     name: &'a str,
     events: &'a [Event],
+    /// What cannot be read and may be missing.
+    remarks: &'a [String],
 }
 
 pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
@@ -69,6 +71,7 @@ pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
         subject,
         name: &args.name,
         events: &events,
+        remarks: &remarks,
     };
     output.result(&object, || report::history(&events));
     Ok(())

@@ -2,10 +2,10 @@
 
 use super::Failure;
 use super::output::Output;
-use crate::workers::imports::{FileReport, ImportFailure, Request, import, text};
 use clap::Args;
+use palpate_analysis::imports::{FileReport, ImportFailure, Request, import, text};
 use palpate_sessions::Labels;
-use palpate_sessions::import::{
+use palpate_tables::import::{
     ColumnChoice, Decimal, Delimiter, Fault, ForeignError, Format, KeepError, TextEncoding, Told,
     UnitChoice, ZeroChoice,
 };

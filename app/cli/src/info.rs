@@ -2,11 +2,11 @@
 
 use super::Failure;
 use super::output::Output;
-use crate::report::catalog::one_line;
-use crate::report::said;
 use clap::Args;
+use palpate_analysis::analysed;
+use palpate_analysis::report::catalog::one_line;
+use palpate_analysis::report::said;
 use palpate_model::rig::SignalFacts;
-use palpate_protocols::analysed;
 use palpate_protocols::base::FoundBase;
 use palpate_sessions::analyses::{Analysis, inputs_of};
 use palpate_sessions::edits::{Edit, Review, Verdict};

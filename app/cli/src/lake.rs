@@ -4,11 +4,12 @@ use super::Failure;
 use super::export::export_failure;
 use super::fit::sources;
 use super::output::Output;
-use crate::workers::exports::into_lake;
+use palpate_analysis::exports::{into_lake, sweep_lake};
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(), Failure> {
     let found = sources::find_sessions(named, output)?;
+    sweep_lake(lake);
     let bar = output.count_bar(found.len() as u64);
     let (mut was_there, mut failed) = (0, Vec::new());
     for session in &found {

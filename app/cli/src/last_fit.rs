@@ -1,15 +1,26 @@
 //! The last fit, remembered between commands: `palpate plan` assumes its body.
+//!
+//! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
+//! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
 use super::Failure;
 use super::output::Output;
-use palpate_model::fit::{FitReport, Parameter};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::fit::{FitReport, Parameter};
+use palpate_sessions::atomic;
+use palpate_sessions::text::checksum;
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
 
 const FILE: &str = "last-fit.json";
+/// Version of the file.
+const VERSION: u64 = 2;
+
+/// The body that a plan assumes.
+const DEFAULT_FAMILY: &str = "series-3";
 
 #[derive(Serialize)]
 struct Remembered<'a> {
@@ -66,7 +77,8 @@ pub(super) fn doubt(parameters: &[Parameter]) -> Option<&'static str> {
 
 /// Keeps a fit for later commands. That it cannot be kept is worth a note and nothing more.
 pub(super) fn remember(report: &FitReport, source: &Path, output: &Output) {
-    let Some(file) = state_file() else {
+    // A plan assumes the modified Kelvin body of third order.
+    let (Some(file), DEFAULT_FAMILY) = (state_file(), report.body.family.as_str()) else {
         return;
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
@@ -99,22 +111,32 @@ pub(super) fn read(file: &Path) -> Result<KnownFit, Failure> {
         ))
     };
     let text = fs::read_to_string(file).map_err(|err| bad(&err))?;
-    serde_json::from_str(&text).map_err(|err| bad(&err))
+    let mut found: Value = serde_json::from_str(&text).map_err(|err| bad(&err))?;
+    match found["last_fit_version"].as_u64() {
+        None => {}
+        Some(VERSION) => {
+            let fit = found["fit"].take();
+            if found["checksum"] != checksum(&fit.to_string()) {
+                return Err(Failure::failed(format!(
+                    "the remembered fit is not as it was written; fit again, or name another with --like, {}",
+                    file.display()
+                )));
+            }
+            found = fit;
+        }
+        Some(_) => return Err(bad(&"a newer palpate wrote it; update palpate")),
+    }
+    serde_json::from_value(found).map_err(|err| bad(&err))
 }
 
-/// Under another name first, so that the file is whole whenever it is there.
 fn write(file: &Path, remembered: &Remembered<'_>) -> io::Result<()> {
     if let Some(folder) = file.parent() {
         fs::create_dir_all(folder)?;
     }
-    let hidden = file.with_file_name(format!(".{FILE}.{}.tmp", std::process::id()));
-    let result = fs::write(&hidden, serde_json::to_vec(remembered)?)
-        .and_then(|()| fs::rename(&hidden, file));
-    if result.is_err() {
-        // What is left of it helps nobody; the error already says what happened.
-        let _ = fs::remove_file(&hidden);
-    }
-    result
+    let fit = serde_json::to_value(remembered)?;
+    let checksum = checksum(&fit.to_string());
+    let object = json!({ "last_fit_version": VERSION, "checksum": checksum, "fit": fit });
+    atomic::replace(file, object.to_string().as_bytes())
 }
 
 fn state_file() -> Option<PathBuf> {

@@ -1,4 +1,7 @@
 //! The command line: one headless subcommand per file, none with logic of its own.
+//!
+//! Arguments become requests to [`palpate_analysis`] and the runner; results become text or one JSON
+//! object. This crate knows no window: whoever has one hands it to [`main`].
 
 mod analyse;
 mod analysis;
@@ -40,7 +43,8 @@ mod wired;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
-use palpate_protocols::analysis::SourceError;
+use palpate_analysis::opening::Windows;
+use palpate_analysis::source::SourceError;
 use palpate_sessions::Labels;
 use palpate_sessions::log::ReadError;
 use protocol::ProtocolCommand;
@@ -202,17 +206,24 @@ fn outlive_file_limits() {
     let _ = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, Arc::default());
 }
 
-/// Runs what the arguments ask for.
+/// That this program was built without a window.
+const NO_WINDOW: &str =
+    "this palpate was built without its window; see 'palpate --help' for what it does without";
+
+/// Runs what the arguments ask for; `windows` is what opens a window, if this program has one.
 #[must_use]
-pub fn main() -> ExitCode {
+pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
     outlive_file_limits();
     let cli = match parse() {
         Ok(cli) => cli,
         Err(code) => return code,
     };
     let (output, result) = match cli.command {
-        None => (Output::text(), rig::window(&rig::RigArgs::default())),
-        Some(Command::Window(args)) => (Output::text(), rig::window(&args)),
+        None => (
+            Output::text(),
+            rig::window(&rig::RigArgs::default(), windows),
+        ),
+        Some(Command::Window(args)) => (Output::text(), rig::window(&args, windows)),
         Some(Command::Run(args)) => with(args.json, |out| run::run(&args, out)),
         Some(Command::Protocol(command)) => match command {
             ProtocolCommand::List(args) => with(args.json, protocol::list),
@@ -227,7 +238,7 @@ pub fn main() -> ExitCode {
         Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
-        Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, out)),
+        Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, windows, out)),
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))

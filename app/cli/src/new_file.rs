@@ -1,6 +1,7 @@
 //! Files that a command makes beside its answer: never over another, and looked into before hours of work.
 
 use super::Failure;
+use palpate_sessions::atomic;
 use std::path::Path;
 
 /// Refuses a file that exists, or whose folder does not. `what` it is, for the sentence.
@@ -35,7 +36,7 @@ pub(super) fn write(
 
 /// Writes a file that is no text.
 pub(super) fn write_bytes(what: &str, to: &Path, bytes: &[u8]) -> Result<(), Failure> {
-    std::fs::write(to, bytes).map_err(|err| {
+    atomic::create(to, bytes).map_err(|err| {
         Failure::failed(format!(
             "cannot write the {what} {} ({err}); choose a folder that may be written",
             to.display()

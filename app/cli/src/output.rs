@@ -1,7 +1,7 @@
 //! What a command prints: text for people or one JSON object for machines.
 
-use crate::report::catalog::one_line;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use palpate_analysis::report::catalog::one_line;
 use serde::Serialize;
 use std::io::Write;
 

@@ -2,10 +2,10 @@
 
 use super::Failure;
 use super::output::Output;
-use crate::playback::{PlaybackOptions, run_playback};
 use clap::Args;
+use palpate_analysis::opening::{PlaybackRequest, Windows};
+use palpate_analysis::source::calibration_of;
 use palpate_model::units::Newtons;
-use palpate_protocols::analysis::calibration_of;
 use palpate_protocols::replay::{Player, ReplayError, ReplayReport, blessings_of, replay};
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
@@ -46,9 +46,13 @@ struct Replays {
     differing: usize,
 }
 
-pub(super) fn run(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(
+    args: &ReplayArgs,
+    windows: Option<&dyn Windows>,
+    output: &Output,
+) -> Result<(), Failure> {
     if args.window {
-        return show(args, output);
+        return show(args, windows, output);
     }
     let bar = output.bar(args.sessions.len() as u64);
     let mut sessions = Vec::new();
@@ -89,7 +93,8 @@ pub(super) fn run(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
 }
 
 /// One session in a window.
-fn show(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
+fn show(args: &ReplayArgs, windows: Option<&dyn Windows>, output: &Output) -> Result<(), Failure> {
+    let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
     let [path] = args.sessions.as_slice() else {
         return Err(Failure::usage("--window shows one session; name one"));
     };
@@ -99,14 +104,15 @@ fn show(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
     let force_max = session.manifest.limits.map(|limits| limits.force_max);
     let player = Player::new(session, path.clone()).map_err(|err| failure(&err, path))?;
     let name = path.file_name().unwrap_or(path.as_os_str());
-    run_playback(PlaybackOptions {
-        player,
-        calibration,
-        force_max: force_max.unwrap_or(Newtons(0.0)),
-        name: name.to_string_lossy().into_owned(),
-        scale: args.time_scale,
-    })
-    .map_err(Failure::Failed)
+    windows
+        .playback(PlaybackRequest {
+            player,
+            calibration,
+            force_max: force_max.unwrap_or(Newtons(0.0)),
+            name: name.to_string_lossy().into_owned(),
+            scale: args.time_scale,
+        })
+        .map_err(Failure::Failed)
 }
 
 fn failure(err: &ReplayError, path: &Path) -> Failure {

@@ -4,8 +4,8 @@
 use super::Failure;
 use super::output::Output;
 use super::verdict::Why;
-use crate::workers::edits::{SayFailure, Subject, author};
 use clap::Args;
+use palpate_analysis::edits::{SayFailure, Subject, author};
 use palpate_sessions::edits::{Change, Decision, EditError, Edits};
 use serde::Serialize;
 use std::path::PathBuf;

@@ -3,13 +3,12 @@
 use super::Failure;
 use super::calibration::source::Source;
 use super::output::Output;
-use crate::settings::SETTINGS_FILE;
-use crate::window::{WindowOptions, run_window};
 use clap::Args;
+use palpate_analysis::opening::{Windows, WorkbenchRequest};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
-    SimClock, SimCompliance, SimNoise, SimPreconditioning, SimProfile, SimRate, SimSettings,
-    SimSoftening, SimStiffness, SimThickness,
+    SimBath, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile, SimRate,
+    SimSettings, SimSoftening, SimStiffness, SimThickness,
 };
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
@@ -45,6 +44,12 @@ pub struct BenchArgs {
     /// Simulated rig: how far repeated loading moves the tissue's surface, in percent of the greatest depth
     #[arg(long, default_value = "0", value_name = "PERCENT")]
     pub preconditioning: SimPreconditioning,
+    /// Simulated rig: what its bath is heated to from 21 °C, in °C; 0 for none
+    #[arg(long, default_value = "0", value_name = "CELSIUS")]
+    pub bath: SimBath,
+    /// Simulated rig: when its digital input 1 goes high, in s; 0 for none
+    #[arg(long, default_value = "0", value_name = "SECONDS")]
+    pub input: SimInput,
 }
 
 impl Default for BenchArgs {
@@ -58,6 +63,8 @@ impl Default for BenchArgs {
             thickness: SimThickness::default(),
             compliance: SimCompliance::default(),
             preconditioning: SimPreconditioning::default(),
+            bath: SimBath::default(),
+            input: SimInput::default(),
         }
     }
 }
@@ -75,6 +82,8 @@ impl BenchArgs {
             thickness: self.thickness,
             compliance: self.compliance,
             preconditioning: self.preconditioning,
+            bath: self.bath,
+            input: self.input,
             ..SimSettings::default()
         }
     }
@@ -264,7 +273,8 @@ fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
 }
 
 /// Opens the window.
-pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
+pub(super) fn window(args: &RigArgs, windows: Option<&dyn Windows>) -> Result<(), Failure> {
+    let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
     let bench = open(args)?;
     let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
     let OpenRig {
@@ -277,15 +287,13 @@ pub(super) fn window(args: &RigArgs) -> Result<(), Failure> {
     let output = Output::text();
     doubts.iter().for_each(|doubt| output.note(doubt));
     let scale = args.time_scale;
-    run_window(WindowOptions {
-        rig,
-        calibration,
-        limits,
-        to_acknowledge: gate.to_acknowledge(),
-        scale,
-        sessions: None,
-        list_ports: palpate_drivers::serial::list_ports,
-        settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
-    })
-    .map_err(Failure::Failed)
+    windows
+        .workbench(WorkbenchRequest {
+            rig,
+            calibration,
+            limits,
+            to_acknowledge: gate.to_acknowledge(),
+            scale,
+        })
+        .map_err(Failure::Failed)
 }

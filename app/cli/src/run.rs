@@ -6,11 +6,11 @@ use super::output::Output;
 use super::programme;
 use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
-use crate::report::haptics::slave_text;
 use clap::Args;
+use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
+use palpate_analysis::report::haptics::slave_text;
 use palpate_drivers::Rig;
 use palpate_protocols::base::FoundBase;
-use palpate_protocols::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::haptics::slave::{SlaveLeader, Slaved};
 use palpate_protocols::plans::Plan;
@@ -19,7 +19,7 @@ use palpate_protocols::runner::{
     AfterStop, Answers, Labels, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
     TimeScale, wall_now,
 };
-use palpate_sessions::recover::examine;
+use palpate_sessions::recover::{Health, Patient, examine};
 use palpate_sessions::{About, Verdict, library_folder};
 use serde::Serialize;
 use std::collections::BTreeMap;
@@ -157,7 +157,7 @@ struct RunReport {
     verdict_reason: Option<String>,
     late_worst_s: Option<f64>,
     late_given_up_s: Option<f64>,
-    live: Option<palpate_model::fit::LiveEstimate>,
+    live: Option<palpate_model::estimate::LiveEstimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
     slave: Option<Slaved>,
 }
@@ -387,11 +387,9 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
     let Some(outcome) = &view.outcome else {
         return Err(Failure::failed("the run did not end"));
     };
-    // What a failed disk kept is only known from what can be read.
-    let kept = match &view.log_error {
-        Some(_) => examine(&view.folder).samples,
-        None => view.samples,
-    };
+    // What a failed disk, or another program, left is only known from what can be read.
+    let left = view.log_error.as_ref().map(|_| examine(&view.folder));
+    let kept = left.as_ref().map_or(view.samples, |left| left.samples);
     let report = RunReport {
         command: slave.map_or("run", |_| "haptics-slave"),
         plan: view.plan_name.clone(),
@@ -425,11 +423,8 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
         ));
     }
     output.result(&report, || run_text(&report));
-    if let Some(reason) = &view.log_error {
-        return Err(Failure::failed(format!(
-            "the session log could not be closed: {reason}; the last {} of {} samples are lost",
-            report.samples_lost, view.samples
-        )));
+    if let (Some(reason), Some(left)) = (&view.log_error, &left) {
+        return Err(Failure::failed(not_kept(reason, left, &report)));
     }
     let no_verdict = view.verdict_error.as_ref().map(|reason| {
         let folder = view.folder.display();
@@ -445,6 +440,26 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
         outcome.reason,
         view.folder.display()
     )))
+}
+
+/// What is missing of a session whose log was not kept as it was written, and what to do.
+fn not_kept(reason: &str, left: &Patient, report: &RunReport) -> String {
+    let (folder, lost) = (left.path.display(), report.samples_lost);
+    let of = report.samples + lost;
+    let lost = match left.health {
+        Health::Healthy => format!("all {of} samples are there all the same"),
+        Health::Interrupted => format!("the last {lost} of {of} samples are lost"),
+        _ => format!(
+            "{lost} of {of} samples are lost: {}",
+            left.findings.join("; ")
+        ),
+    };
+    let way = match left.health {
+        Health::Healthy => format!("look with 'palpate doctor {folder}' before you use them"),
+        Health::Foreign | Health::Lost => "measure again".to_owned(),
+        _ => format!("'palpate recover {folder}' keeps what is whole"),
+    };
+    format!("the session log was not kept as it was recorded: {reason}; {lost}; {way}")
 }
 
 fn run_text(report: &RunReport) -> String {
@@ -473,7 +488,9 @@ fn run_text(report: &RunReport) -> String {
             "live fit, its statistical part alone ('palpate fit {}' tells what the calibration adds):",
             report.session.display()
         ));
-        lines.extend(crate::report::text::parameter_lines(&live.parameters));
+        lines.extend(palpate_analysis::report::text::parameter_lines(
+            &live.parameters,
+        ));
         let reasons = live
             .verdicts
             .iter()

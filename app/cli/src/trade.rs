@@ -3,10 +3,10 @@
 use super::Failure;
 use super::new_file;
 use super::output::Output;
-use crate::trade::{self, Extent};
 use clap::Args;
-use palpate_model::tolerance::Tolerance;
-use palpate_model::trade::{Recommendation, TradeCurves};
+use palpate_analysis::trade::{self, Extent};
+use palpate_rheology::tolerance::Tolerance;
+use palpate_rheology::trade::{Recommendation, TradeCurves};
 use palpate_sessions::library_folder;
 use palpate_sessions::trade::{
     TradeFileError, quick_trade_file, read_trade, trade_file, trade_files, write_trade,

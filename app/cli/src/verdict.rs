@@ -2,11 +2,11 @@
 
 use super::Failure;
 use super::output::Output;
-use crate::report::catalog::one_line;
-pub(super) use crate::workers::edits::author;
 use clap::Args;
+use palpate_analysis::edited::{self, Edited};
+pub(super) use palpate_analysis::edits::author;
+use palpate_analysis::report::catalog::one_line;
 use palpate_model::units::Position;
-use palpate_protocols::edited::{self, Edited};
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use std::path::{Path, PathBuf};

@@ -1,7 +1,6 @@
 //! The little SVG that pictures need: text, lines, and a panel with axes (SVG 1.1, W3C).
 
-use crate::plots::style::round_up;
-use eframe::egui::Color32;
+use ecolor::Color32;
 use std::fmt::Write;
 
 /// Font size of everything but titles, in px.
@@ -12,8 +11,8 @@ const HEIGHT_OF_MARK: f64 = 45.0;
 const WIDTH_OF_DECADE: f64 = 60.0;
 
 /// Opacity of what lies under curves: a shaded stretch, and a band.
-pub(super) const SHADE_OPACITY: f64 = 0.5;
-pub(super) const BAND_OPACITY: f64 = 0.18;
+pub const SHADE_OPACITY: f64 = 0.5;
+pub const BAND_OPACITY: f64 = 0.18;
 
 /// A picture under construction.
 pub struct Svg {
@@ -23,7 +22,7 @@ pub struct Svg {
 
 /// What a picture is made of, in px from its upper left corner.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) enum Shape {
+pub enum Shape {
     /// A text, turned a quarter to the left if upright.
     Text {
         at: [f64; 2],
@@ -90,11 +89,11 @@ impl Ink {
 #[derive(Clone, Debug, PartialEq)]
 pub struct Drawing {
     /// Width and height in px.
-    pub(super) size: [f64; 2],
-    pub(super) ground: Color32,
+    pub size: [f64; 2],
+    pub ground: Color32,
     /// What a screen reader says.
-    pub(super) title: String,
-    pub(super) shapes: Vec<Shape>,
+    pub title: String,
+    pub shapes: Vec<Shape>,
 }
 
 impl Drawing {
@@ -430,6 +429,16 @@ fn marks([low, high]: [f64; 2], steps_max: f64) -> Vec<(f64, String)> {
         .collect()
 }
 
+/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
+pub fn round_up(least: f64) -> f64 {
+    let power = 10f64.powf(least.log10().floor());
+    // 1e-9 forgives the rounding of the logarithm.
+    let round = [1.0, 2.0, 5.0]
+        .into_iter()
+        .find(|factor| factor * power >= least * (1.0 - 1e-9));
+    round.unwrap_or(10.0) * power
+}
+
 /// Powers of ten within a range of decimal logarithms, every so many of them.
 fn decades([low, high]: [f64; 2], count_max: f64) -> Vec<(f64, String)> {
     if !(low.is_finite() && high.is_finite() && low < high) {
@@ -451,12 +460,12 @@ fn decades([low, high]: [f64; 2], count_max: f64) -> Vec<(f64, String)> {
         .collect()
 }
 
-pub(super) fn hex(color: Color32) -> String {
+pub fn hex(color: Color32) -> String {
     format!("#{:02x}{:02x}{:02x}", color.r(), color.g(), color.b())
 }
 
 /// Text as XML takes it: five characters spelt out, and none that XML 1.0 cannot hold.
-pub(super) fn escape(text: &str) -> String {
+pub fn escape(text: &str) -> String {
     let mut escaped = String::with_capacity(text.len());
     for character in text.chars() {
         match character {

@@ -1,8 +1,8 @@
 //! What every page in HTML is made of: one file, whole in itself, read without scripts and printed as it is.
 //! Every text goes through [`escape`], so that what people wrote is never markup.
 
-use super::svg::{escape, hex};
-use crate::theme::tokens::LIGHT;
+use crate::drawing::{escape, hex};
+use crate::tokens::LIGHT;
 
 /// Print on A4 and Letter: nothing is wider than the paper, and figures and rows stay whole. Dark on white whatever the
 /// browser is set to.
@@ -27,7 +27,7 @@ svg { max-width: 100%; height: auto; }
 
 /// The body of a page under construction.
 #[derive(Debug, Default)]
-pub(super) struct Body(String);
+pub struct Body(String);
 
 impl Body {
     /// A heading of a level from 1 on.
@@ -154,7 +154,7 @@ fn style() -> String {
 }
 
 /// The whole page.
-pub(super) fn document(title: &str, body: Body) -> String {
+pub fn document(title: &str, body: Body) -> String {
     format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
          <meta name=\"viewport\" content=\"width=device-width\">\n<title>{}</title>\n\
@@ -193,8 +193,8 @@ mod tests {
     #[test]
     fn a_page_names_no_place_in_the_network() {
         let mut body = Body::default();
-        let svg = super::super::svg::Svg::new(10.0);
-        let ground = crate::theme::tokens::LIGHT.canvas;
+        let svg = crate::drawing::Svg::new(10.0);
+        let ground = crate::tokens::LIGHT.canvas;
         body.figure(&svg.finish(10.0, ground, "nothing"), "a figure");
         let page = document("a page", body);
         assert!(!page.contains("://"), "{page}");

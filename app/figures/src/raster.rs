@@ -1,7 +1,8 @@
-//! A drawing as pixels, for documents that take no SVG. Letters are the window's own.
+//! A drawing as pixels, for documents that take no SVG. Letters are those of the window.
 
-use super::svg::{Anchor, BAND_OPACITY, Drawing, Ink, SHADE_OPACITY, Shape};
-use eframe::egui::{Color32, FontDefinitions, FontFamily};
+use crate::drawing::{Anchor, BAND_OPACITY, Drawing, Ink, SHADE_OPACITY, Shape};
+use ecolor::Color32;
+use epaint_default_fonts::{HACK_REGULAR, UBUNTU_LIGHT};
 use skrifa::instance::{LocationRef, Size};
 use skrifa::outline::{DrawSettings, OutlinePen};
 use skrifa::{FontRef, MetadataProvider};
@@ -16,15 +17,14 @@ const SCALE: f64 = 2.0;
 const ROUND: f64 = 0.05;
 
 /// The drawing as a PNG file (PNG, ISO/IEC 15948).
-pub(super) fn png(drawing: &Drawing) -> io::Result<Vec<u8>> {
+pub fn png(drawing: &Drawing) -> io::Result<Vec<u8>> {
     let too_large = || io::Error::other("the figure is too large for pixels; draw it as SVG");
     let [width, height] = drawing.size.map(|px| (px * SCALE).ceil());
     if !(width >= 1.0 && height >= 1.0) || width.max(height) > f64::from(u16::MAX) {
         return Err(too_large());
     }
     let (width, height) = (width as u16, height as u16);
-    let fonts = FontDefinitions::default();
-    let letters = Letters::of(&fonts);
+    let letters = Letters::default();
     let mut context = RenderContext::new(width, height);
     let whole = vello_cpu::kurbo::Rect::new(0.0, 0.0, f64::from(width), f64::from(height));
     context.set_paint(ink(drawing.ground, 1.0));
@@ -133,27 +133,28 @@ fn draw(context: &mut RenderContext, letters: &Letters, shape: &Shape) {
     }
 }
 
-/// The fonts of the window, the first that has a letter draws it.
-struct Letters<'a>(Vec<FontRef<'a>>);
+/// Fonts in the order in which they are asked for a letter.
+struct Letters(Vec<FontRef<'static>>);
 
-impl<'a> Letters<'a> {
-    fn of(fonts: &'a FontDefinitions) -> Self {
-        let names = fonts.families.get(&FontFamily::Proportional);
-        let data = names.into_iter().flatten();
-        let data = data.filter_map(|name| fonts.font_data.get(name));
-        let font = data.filter_map(|data| {
-            let bytes: &[u8] = data.font.as_ref().as_ref();
-            FontRef::from_index(bytes, data.index).ok()
-        });
-        Self(font.collect())
+impl Default for Letters {
+    fn default() -> Self {
+        let fonts = [UBUNTU_LIGHT, HACK_REGULAR];
+        Self(
+            fonts
+                .iter()
+                .filter_map(|font| FontRef::new(font).ok())
+                .collect(),
+        )
     }
+}
 
+impl Letters {
     /// The outline of a line of text on the origin.
     fn line(&self, text: &str, ink: Ink) -> BezPath {
         let size = Size::new(ink.size as f32);
         let mut pen = Pen::default();
         for letter in text.chars() {
-            let has_it = |font: &&FontRef<'a>| font.charmap().map(letter).is_some();
+            let has_it = |font: &&FontRef<'static>| font.charmap().map(letter).is_some();
             let Some(font) = self.0.iter().find(has_it).or(self.0.first()) else {
                 continue;
             };
@@ -213,9 +214,9 @@ impl OutlinePen for Pen {
 
 #[cfg(test)]
 mod tests {
-    use super::super::svg::Svg;
     use super::*;
-    use crate::theme::tokens::LIGHT;
+    use crate::drawing::Svg;
+    use crate::tokens::LIGHT;
 
     /// The pixels of a file, row by row, and its width.
     fn read(file: &[u8]) -> (Vec<[u8; 3]>, usize) {

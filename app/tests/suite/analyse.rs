@@ -1,6 +1,6 @@
 //! `palpate analyse` as a user meets it.
 
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
 use std::fmt::Write;

@@ -1,6 +1,6 @@
 //! `palpate calibration` as a user meets it.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use palpate_model::calibration::Calibration;
 use std::fmt::Write;
 use std::fs;

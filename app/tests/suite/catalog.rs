@@ -1,8 +1,8 @@
 //! The library searched, its sessions analysed, reviewed and told of over time, as a user does it.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use palpate_analysis::source::calibration_of;
 use palpate_model::rig::Phase;
-use palpate_protocols::analysis::calibration_of;
 use palpate_sessions::log::Session;
 use serde_json::Value;
 use std::fs;

@@ -1,6 +1,6 @@
 //! `palpate compliance` as a user meets it, and what it does to fits and tables.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use std::fs;
 use std::path::Path;
 

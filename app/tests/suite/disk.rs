@@ -1,6 +1,7 @@
 //! Disks without room, before and during a run.
 
-use super::{json, palpate, short_run, stderr, succeeded};
+use crate::support::{json, palpate, short_run, stderr, succeeded};
+use palpate_test_support::skip::{Need, skip};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output, Stdio};
@@ -23,9 +24,9 @@ fn in_own_namespace(at: &Path, script: &str) -> std::io::Result<Output> {
 }
 
 /// Runs with `variables` on a 24 MB file system of its own, in a mount namespace, that fills up in mid-run: what the
-/// run said, on stdout as JSON and on stderr. The session is copied to `saved`. Why not, where this machine has
-/// no such namespace.
-fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Result<(Value, String), String> {
+/// run said, on stdout as JSON and on stderr. The session is copied to `saved`. Nothing where this
+/// machine has no such namespace.
+fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Option<(Value, String)> {
     std::fs::create_dir(at.join("disk")).expect("a folder");
     let script = r#"
         mount -t tmpfs -o size=24m none disk || exit 77
@@ -42,7 +43,8 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Result<(Value, Str
     match done {
         Ok(output) if output.status.code() == Some(0) => {}
         other if has_no_namespace(&other) => {
-            return Err(format!("skipped: no mount namespace here ({other:?})"));
+            skip(Need::System("mount namespaces"), &format!("{other:?}"));
+            return None;
         }
         other => panic!("{other:?}"),
     }
@@ -53,19 +55,15 @@ fn run_on_a_disk_that_fills_up(at: &Path, variables: &str) -> Result<(Value, Str
     // The report is the first line, the error the second.
     let out = read("out.json");
     let report = serde_json::from_str(out.lines().next().unwrap_or_default());
-    Ok((report.expect("a report"), said))
+    Some((report.expect("a report"), said))
 }
 
 #[test]
 fn a_full_disk_stops_the_run_and_keeps_what_was_saved() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let (report, said) = match run_on_a_disk_that_fills_up(at, "") {
-        Ok(done) => done,
-        Err(reason) => {
-            println!("{reason}");
-            return;
-        }
+    let Some((report, said)) = run_on_a_disk_that_fills_up(at, "") else {
+        return;
     };
     let info = json(&palpate(at, &["info", "saved", "--json"]));
     assert_eq!(info["is_complete"], false);
@@ -86,16 +84,12 @@ fn with_a_spare_folder_a_full_disk_costs_only_the_verdict() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let spare = "export PALPATE_SPARE=$PWD/spare";
-    let (report, said) = match run_on_a_disk_that_fills_up(at, spare) {
-        Ok(done) => done,
-        Err(reason) => {
-            println!("{reason}");
-            return;
-        }
+    let Some((report, said)) = run_on_a_disk_that_fills_up(at, spare) else {
+        return;
     };
     assert_eq!(report["samples_lost"], 0, "{said}");
     assert!(said.contains("lacks nothing"), "{said}");
-    for wrong in ["cannot be written (the disk", "could not be closed"] {
+    for wrong in ["cannot be written (the disk", "was not kept as it was"] {
         assert!(!said.contains(wrong), "{said}");
     }
     assert!(
@@ -125,7 +119,7 @@ fn a_disk_without_room_is_refused_before_the_start() {
             );
         }
         other if has_no_namespace(&other) => {
-            println!("skipped: no mount namespace here ({other:?})");
+            skip(Need::System("mount namespaces"), &format!("{other:?}"));
         }
         other => panic!("it was not refused on a disk of 4 MB: {other:?}"),
     }
@@ -141,7 +135,7 @@ fn a_library_that_may_not_be_written_is_searched() {
     let output = in_own_namespace(at, script);
     match output {
         other if has_no_namespace(&other) => {
-            println!("skipped: no mount namespace here ({other:?})");
+            skip(Need::System("mount namespaces"), &format!("{other:?}"));
         }
         output => {
             let output = output.unwrap();

@@ -1,6 +1,6 @@
 //! `palpate doctor` and `palpate recover`: each kind of file gets the right word, and the original is left alone.
 
-use super::{json, log_file, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, log_file, palpate, short_run, stderr, stdout, succeeded};
 use palpate_sessions::log::Session;
 use std::fs;
 

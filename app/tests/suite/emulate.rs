@@ -1,12 +1,12 @@
 //! `palpate emulate`.
 
-use super::{palpate, stderr};
+use crate::support::{palpate, stderr};
+use palpate_test_support::wait::{PATIENCE, until};
 use serde_json::Value;
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read, Write};
 use std::net::TcpStream;
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
 
 /// Ends with the test, whatever happens.
 pub(super) struct Emulator(pub Child);
@@ -55,8 +55,7 @@ fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
     );
     assert_eq!(ready["is_serial"], false);
     let mut port = TcpStream::connect(ready["at"].as_str().unwrap()).unwrap();
-    port.set_read_timeout(Some(Duration::from_secs(10)))
-        .unwrap();
+    port.set_read_timeout(Some(PATIENCE)).unwrap();
     let mut ask = |text: &str| {
         port.write_all(text.as_bytes()).unwrap();
         let mut answer = String::new();
@@ -80,9 +79,11 @@ fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
     assert_eq!(order("load 840\n"), "note: 840 g are on the load cell\n");
     assert!(order("load much\n").contains("give load and a mass in g"));
     // A sample later the cell feels it.
-    std::thread::sleep(Duration::from_millis(20));
-    let loaded: f64 = ask("MG @AN[1]\r").parse().unwrap();
-    assert!(loaded > free + 0.1, "{free} {loaded}");
+    let is_felt = || {
+        let loaded: f64 = ask("MG @AN[1]\r").parse().ok()?;
+        (loaded > free + 0.1).then_some(())
+    };
+    until(is_felt, || format!("more than {free} V"));
 }
 
 #[test]
@@ -90,8 +91,7 @@ fn a_board_answers_on_a_port_and_its_cell_on_a_line_of_its_own() {
     let (_emulator, ready) = start_device("grbl", &[]);
     assert_eq!(ready["is_serial"], false);
     let mut port = TcpStream::connect(ready["at"].as_str().unwrap()).unwrap();
-    port.set_read_timeout(Some(Duration::from_secs(10)))
-        .unwrap();
+    port.set_read_timeout(Some(PATIENCE)).unwrap();
     port.write_all(b"$N\n").unwrap();
     let mut lines = BufReader::new(port).lines().map(Result::unwrap);
     assert_eq!(lines.find(|line| line == "$N0="), Some("$N0=".to_owned()));

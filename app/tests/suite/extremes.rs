@@ -1,6 +1,6 @@
 //! `palpate extremes`, and the page it wrote for the guide.
 
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use std::path::Path;
 
 #[test]

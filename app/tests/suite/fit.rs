@@ -1,12 +1,12 @@
 //! `palpate fit`: one source, many, pictures, tables of all kinds.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
-use palpate_app::report::text;
-use palpate_app::workers::fit::fit_source;
-use palpate_model::fit::FitOptions;
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use palpate_analysis::fit::fit_source;
+use palpate_analysis::report::text;
+use palpate_analysis::source::Wanted;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
-use palpate_protocols::analysis::Wanted;
+use palpate_rheology::fit::FitOptions;
 use serde_json::Value;
 use std::fmt::Write as _;
 use std::io::{BufRead, BufReader, Read};
@@ -339,9 +339,22 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         .collect();
     assert_eq!(
         names,
-        ["tau_eps", "mu1", "mu2", "mu3", "tau_sig", "s1", "s2", "s3"]
+        [
+            "tau_eps",
+            "mu1",
+            "mu2",
+            "mu3",
+            "tau_sig",
+            "s1",
+            "s2",
+            "s3",
+            "f0",
+            "f_offset",
+            "x_contact"
+        ]
     );
-    let record = &found["records"][0];
+    assert!(found["noise"].is_object() && found["parameters"][0]["ci95"].is_array());
+    let record = &found;
     let number = |name: &str| record[name].as_f64().unwrap();
     assert!(number("r2") > 0.9 && number("rmse_n") < 0.03, "{record}");
     // Energy is lost over the loop, and the fit knows how much to a hundredth.
@@ -363,6 +376,29 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         "{text}"
     );
 
+    // By itself, with some of it shared, kept beside its session, in a lake: like any other fit.
+    let both = ["fit", "loop", "loop.csv", "--family", "kelvin", "--json"];
+    let each = palpate(at, &[&both[..], &["--each"]].concat());
+    succeeded(&each);
+    assert_eq!(stdout(&each).lines().count(), 2);
+    let joint = json(&palpate(at, &[&both[..], &["--share", "tau_eps"]].concat()));
+    assert_eq!(joint["shared"], serde_json::json!(["tau_eps"]));
+    assert_eq!(joint["records"].as_array().unwrap().len(), 2);
+    let kept = "fit loop --family kelvin --profile --save straight --json";
+    let kept = json(&palpate(at, &kept.split_whitespace().collect::<Vec<_>>()));
+    assert_eq!(kept["profile"].as_array().unwrap().len(), 5);
+    let kept = stdout(&palpate(at, &["info", "loop", "--json"]));
+    assert!(kept.contains("straight"), "{kept}");
+    succeeded(&palpate(at, &["export", "loop", "--lake", "lake"]));
+    let lake = json(&palpate(
+        at,
+        &["fit", "lake", "--family", "kelvin", "--json"],
+    ));
+    assert_eq!(
+        (&lake["model"], &lake["made"]),
+        (&"kelvin".into(), &1.into())
+    );
+
     for (args, code, words) in [
         (&["--family", "unloading-3"][..], 1, "record the unloading"),
         (
@@ -372,10 +408,16 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         ),
         (&["--unload"], 2, "--family"),
         (
-            &["--family", "voigt", "--profile"],
+            &["--family", "voigt", "--free", "f0"],
             2,
-            "cannot be used with",
+            "no parameter called 'f0'",
         ),
+        (
+            &["--family", "voigt", "--share", "k"],
+            2,
+            "at least two recordings",
+        ),
+        (&["--each"], 2, "--family"),
         (
             &["--family", "voigt", "--picture", "loop.svg"],
             2,

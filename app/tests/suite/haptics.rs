@@ -1,6 +1,6 @@
 //! `palpate haptics`.
 
-use super::{json, palpate, stderr, stdout};
+use crate::support::{json, palpate, stderr, stdout};
 
 #[test]
 fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
@@ -149,6 +149,15 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
         "{}",
         stderr(&other)
     );
+    // Without its end nobody knows what came after, however alike the rest is.
+    std::fs::write(&settings, text).unwrap();
+    let ticks = at.path().join("run/ticks.csv");
+    let lines = std::fs::read_to_string(&ticks).unwrap();
+    let end = lines.rfind("end,").unwrap();
+    std::fs::write(&ticks, &lines[..end]).unwrap();
+    let cut = palpate(at.path(), &["haptics", "replay", "run"]);
+    assert_eq!(cut.status.code(), Some(1));
+    assert!(stderr(&cut).contains("cut off"), "{}", stderr(&cut));
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! `palpate import`: foreign files become sessions that other commands take.
 
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use std::fs;
 
 /// A ramp and hold of a body that relaxes, 0.1 s a row, in gf and µm with decimal commas.

@@ -1,6 +1,6 @@
 //! Parts of sessions as tables, and many sessions as a lake that is fitted part by part.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,6 +1,6 @@
 //! `palpate plan` as a user meets it.
 
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
 use serde_json::Value;
@@ -98,6 +98,39 @@ fn the_last_fit_is_assumed_and_any_other_can_be() {
             "{noise}"
         );
     }
+}
+
+#[test]
+fn a_remembered_fit_that_was_changed_is_refused_and_one_of_before_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    table(at, &ModifiedKelvin::THESIS);
+    succeeded(&palpate(at, &["fit", "press.csv"]));
+    let file = at.join("library/last-fit.json");
+    let text = std::fs::read_to_string(&file).unwrap();
+    let kept: serde_json::Value = serde_json::from_str(&text).unwrap();
+    let tau = kept["fit"]["parameters"][0]["value"].to_string();
+    assert_eq!(text.matches(&tau).count(), 1, "{tau} in {text}");
+    std::fs::write(&file, text.replacen(&tau, "9.5", 1)).unwrap();
+    let refused = palpate(at, &["plan"]);
+    assert_eq!(refused.status.code(), Some(1));
+    assert!(
+        stderr(&refused).contains("last-fit.json"),
+        "{}",
+        stderr(&refused)
+    );
+    // Version 1 was the fit alone.
+    std::fs::write(&file, kept["fit"].to_string()).unwrap();
+    let plan = palpate(at, &["plan", "--json"]);
+    succeeded(&plan);
+    assert!(
+        json(&plan)["body_source"]
+            .as_str()
+            .unwrap()
+            .starts_with("the last fit, of ")
+    );
+    succeeded(&palpate(at, &["fit", "press.csv"]));
+    assert_eq!(std::fs::read_to_string(&file).unwrap(), text);
 }
 
 #[test]

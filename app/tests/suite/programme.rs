@@ -1,7 +1,7 @@
 //! Programmes and the calibration they measure, as a user meets them.
 
-use super::protocol::with_mine;
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::protocol::with_mine;
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use std::fs;
 
 const TWO: &str = r#"

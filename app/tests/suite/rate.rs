@@ -1,6 +1,6 @@
 //! A rig of 20 000 samples a second, as a user meets it.
 
-use super::{json, palpate, short_run, stderr, succeeded};
+use crate::support::{json, palpate, short_run, stderr, succeeded};
 use std::fs;
 
 #[test]

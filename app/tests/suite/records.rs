@@ -1,6 +1,6 @@
 //! What is told of a session, what is said of it afterwards, and what happened in it.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use palpate_sessions::log::Session;
 use std::fs;
 
@@ -94,7 +94,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     let info = json(&palpate(at, &["info", "run", "--json"]));
     assert_eq!(info["edits"].as_array().unwrap().len(), 1);
     let before = Session::open(&at.join("run")).unwrap();
-    let found = palpate_protocols::edited::contacts(&before.entries)[0]
+    let found = palpate_analysis::edited::contacts(&before.entries)[0]
         .position
         .0;
     let log = fs::read(at.join("run/000.mcap")).unwrap();
@@ -119,7 +119,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
     succeeded(&corrected);
     let change = json(&corrected)["depth_change_mm"].as_f64().unwrap();
     assert!((change - 0.25).abs() < 1e-12);
-    let after = palpate_protocols::edited::open(&at.join("run"))
+    let after = palpate_analysis::edited::open(&at.join("run"))
         .unwrap()
         .session;
     let mut moved = 0;

@@ -1,6 +1,6 @@
 //! Pages and figures: what they hold, that nothing in them is markup that people wrote, and that hashes tell a change.
 
-use super::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;

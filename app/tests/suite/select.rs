@@ -1,8 +1,8 @@
 //! `palpate select` as a user meets it.
 
-use super::{json, palpate, stderr, stdout, succeeded};
-use palpate_model::families::{Model, by_key};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use palpate_model::{Depth, Seconds};
+use palpate_rheology::families::{Model, by_key};
 use serde_json::Value;
 use std::fmt::Write;
 use std::path::Path;

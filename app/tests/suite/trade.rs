@@ -1,6 +1,6 @@
 //! `palpate trade` as a user meets it.
 
-use super::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{json, palpate, stderr, stdout, succeeded};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -12,7 +12,7 @@ fn stored(folder: &Path) -> PathBuf {
 }
 
 /// Changes stored curves with their checksum, so that only their content can be wrong.
-fn resealed(file: &Path, change: impl FnOnce(&mut palpate_model::trade::TradeCurves)) {
+fn resealed(file: &Path, change: impl FnOnce(&mut palpate_rheology::trade::TradeCurves)) {
     let mut curves = palpate_sessions::trade::read_trade(file).expect("curves");
     change(&mut curves);
     let library = file.ancestors().nth(2).expect("a library");

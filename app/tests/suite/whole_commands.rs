@@ -1,77 +1,9 @@
-//! The command line as a user meets it: whole commands, their exit codes and their sentences.
+//! Whole commands, their exit codes and their sentences.
 
-mod analyse;
-mod calibration;
-mod catalog;
-mod compliance;
-mod disk;
-mod doctor;
-mod emulate;
-mod extremes;
-mod fit;
-mod haptics;
-mod import;
-mod lake;
-mod plan;
-mod programme;
-mod protocol;
-mod rate;
-mod records;
-mod report;
-mod scene;
-mod select;
-mod trade;
-mod wired;
-
-use serde_json::Value;
-use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
-
-fn palpate(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(args)
-        .current_dir(folder)
-        .env("PALPATE_HOME", folder.join("library"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("palpate starts")
-}
-
-fn stdout(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stdout).into_owned()
-}
-
-fn json(output: &Output) -> Value {
-    let text = String::from_utf8_lossy(&output.stdout);
-    serde_json::from_str(&text).unwrap_or_else(|err| panic!("{err}: {text}{}", stderr(output)))
-}
-
-fn stderr(output: &Output) -> String {
-    String::from_utf8_lossy(&output.stderr).into_owned()
-}
-
-fn succeeded(output: &Output) {
-    assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
-}
-
-/// A run short enough for a test: about 90 s of session time, most of it finding contact.
-const SHORT: [&str; 8] = [
-    "run",
-    "ramp-hold",
-    "--speed",
-    "3",
-    "--depth",
-    "6",
-    "--hold",
-    "1",
-];
-
-fn short_run(folder: &Path, out: &str, more: &[&str]) -> Output {
-    let mut args = SHORT.to_vec();
-    args.extend(["--time-scale", "max", "--out", out]);
-    args.extend(more);
-    palpate(folder, &args)
-}
+use crate::support::{SHORT, json, log_file, palpate, short_run, stderr, stdout, succeeded};
+use palpate_test_support::wait::until;
+use std::path::Path;
+use std::process::{Command, Stdio};
 
 #[test]
 fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
@@ -393,18 +325,6 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     }
 }
 
-fn log_file(session: &Path) -> PathBuf {
-    std::fs::read_dir(session)
-        .expect("a session folder")
-        .flatten()
-        .map(|entry| entry.path())
-        .find(|path| {
-            path.extension()
-                .is_some_and(|extension| extension == "mcap")
-        })
-        .expect("a log")
-}
-
 #[test]
 fn a_held_session_and_a_held_rig_name_their_holder() {
     let folder = tempfile::tempdir().unwrap();
@@ -418,11 +338,11 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
         .spawn()
         .unwrap();
     let lock = at.join("held/lock");
-    let is_up = (0..500).any(|_| {
-        std::thread::sleep(std::time::Duration::from_millis(20));
-        std::fs::read_to_string(&lock).is_ok_and(|text| !text.is_empty())
-    });
-    assert!(is_up, "the holder does not start");
+    let has_holder = || {
+        let text = std::fs::read_to_string(&lock).ok()?;
+        (!text.is_empty()).then_some(())
+    };
+    until(has_holder, || "a lock of the holder".into());
     let pid = holder.id().to_string();
     for args in [
         vec!["run", "ramp-hold", "--rig", "sim:bench", "--out", "other"],
@@ -475,8 +395,13 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
         assert!(sent.unwrap().success(), "{command}");
     };
     // Twice. Its clock goes on meanwhile, unlike that of a laptop whose lid is closed, which ends the run.
+    let log = at.join("slept/000.mcap");
+    let length = || log.metadata().map_or(0, |found| found.len());
     for _ in 0..2 {
-        std::thread::sleep(std::time::Duration::from_millis(500));
+        // While it records.
+        let before = length();
+        let is_longer = || (length() > before).then_some(());
+        until(is_longer, || format!("more than {before} bytes"));
         signal("STOP");
         std::thread::sleep(std::time::Duration::from_millis(700));
         signal("CONT");
@@ -493,38 +418,45 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     succeeded(&palpate(at, &["replay", "--check", "slept"]));
 }
 
+/// A run that is killed once its log has so many bytes; whether it was, rather than over before.
+fn is_killed(at: &Path, name: &str, bytes: u64) -> bool {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "ramp-hold", "--time-scale", "30", "--out", name])
+        .current_dir(at)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let log = at.join(name).join("000.mcap");
+    let mut is_over = || {
+        let length = log.metadata().map_or(0, |found| found.len());
+        let has_ended = child.try_wait().unwrap().is_some();
+        (length >= bytes || has_ended).then_some(())
+    };
+    until(&mut is_over, || format!("{bytes} bytes in {name}"));
+    child.kill().unwrap();
+    // A run that ended of its own accord has a code.
+    child.wait().unwrap().code().is_none()
+}
+
 #[test]
 fn a_killed_run_leaves_a_session_that_opens() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    for (i, millis) in [30, 60, 90, 130, 180, 250, 400].into_iter().enumerate() {
-        let name = format!("killed{i}");
-        let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
-            .args(["run", "ramp-hold", "--time-scale", "100", "--out", &name])
-            .current_dir(at)
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(millis));
-        child.kill().unwrap();
-        child.wait().unwrap();
-        let Ok(entries) = std::fs::read_dir(at.join(&name)) else {
-            continue;
-        };
-        let has_log = entries.flatten().any(|entry| {
-            entry
-                .path()
-                .extension()
-                .is_some_and(|extension| extension == "mcap")
-                && entry.metadata().is_ok_and(|meta| meta.len() > 0)
-        });
-        if !has_log {
-            continue; // killed before the manifest was durable, so before any motion
-        }
-        let output = palpate(at, &["info", &name, "--json"]);
-        succeeded(&output);
-        assert_eq!(json(&output)["is_complete"], false);
+    let mut samples = Vec::new();
+    for bytes in [1, 20_000, 100_000, 300_000] {
+        // A computer that looks up only when the run is over has killed none.
+        let name = (0..20)
+            .map(|attempt| format!("killed-{bytes}-{attempt}"))
+            .find(|name| is_killed(at, name, bytes));
+        let name = name.expect("one run of twenty is killed before its end");
+        let info = palpate(at, &["info", &name, "--json"]);
+        succeeded(&info);
+        let info = json(&info);
+        assert_eq!(info["is_complete"], false, "{name}");
+        samples.push(info["samples"].as_u64().unwrap());
         succeeded(&palpate(at, &["replay", &name]));
     }
+    // More of the run is in a log that was longer.
+    assert!(samples.is_sorted() && samples[3] > 1_000, "{samples:?}");
 }

@@ -1,27 +1,15 @@
 //! The real window on a virtual display: opens, starts on F5, draws, stops on F12, closes.
 
+use palpate_test_support::skip;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
-fn has(tool: &str) -> bool {
-    Command::new("sh")
-        .args(["-c", &format!("command -v {tool}")])
-        .stdout(Stdio::null())
-        .status()
-        .is_ok_and(|status| status.success())
-}
-
 #[test]
 fn the_window_runs_and_stops_on_a_virtual_display() {
-    let missing: Vec<&str> = ["Xvfb", "xdotool", "import", "convert"]
+    if ["Xvfb", "xdotool", "import", "convert"]
         .into_iter()
-        .filter(|tool| !has(tool))
-        .collect();
-    if !missing.is_empty() {
-        println!(
-            "skipped: {} not installed (scripts/install-test-tools)",
-            missing.join(", ")
-        );
+        .any(skip::lacks_program)
+    {
         return;
     }
     let folder = tempfile::tempdir().unwrap();

@@ -1,7 +1,7 @@
 //! `palpate rig`, and a run on a rig of a file, against an emulated controller on a port of this computer.
 
-use super::emulate::{Emulator, emulate_galil};
-use super::{json, palpate, stderr, stdout};
+use crate::emulate::{Emulator, emulate_galil};
+use crate::support::{json, palpate, stderr, stdout};
 use palpate_sessions::log::Session;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -84,10 +84,10 @@ fn what_is_not_as_the_file_says_is_told() {
 ///
 /// A computer busy with other tests may make a sample late, which stops the run before: then it is made again.
 fn stopped_run(answer: Option<&str>) -> ([f64; 2], String) {
-    (0..5)
+    (0..10)
         .map(|_| stopped_once(answer))
         .find(|(_, said)| said.contains("the force is 55"))
-        .expect("one run of five that keeps up")
+        .expect("one run of ten that keeps up")
 }
 
 fn stopped_once(answer: Option<&str>) -> ([f64; 2], String) {

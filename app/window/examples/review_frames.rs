@@ -1,7 +1,7 @@
 //! How soon a large session is seen, and what a frame costs while it is moved and zoomed, beside what plain egui_plot
 //! needs for the same samples in the same run.
 //!
-//! `cargo run --release -p palpate-app --example review_frames -- [SAMPLES] [SESSIONS] [SAMPLES_EACH]`
+//! `cargo run --release -p palpate-window --example review_frames -- [SAMPLES] [SESSIONS] [SAMPLES_EACH]`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
@@ -10,15 +10,15 @@ use eframe::egui::{
 };
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
-use palpate_app::command::Commands;
-use palpate_app::screens::review::{ReviewScreen, View};
-use palpate_app::shell::frame_meter::thread_cpu_s;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
 use palpate_sessions::{
     About, EndRecord, Manifest, Pace, RECORD_VERSION, Row, SessionFolder, SessionWriter,
     new_session_id,
 };
+use palpate_window::command::Commands;
+use palpate_window::screens::review::{ReviewScreen, View};
+use palpate_window::shell::frame_meter::thread_cpu_s;
 use std::path::{Path, PathBuf};
 use std::time::{Duration, Instant};
 
@@ -86,6 +86,7 @@ fn manifest(number: u32) -> Manifest {
             cell_delay: Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            sensors: Default::default(),
         }),
         limits: Some(Limits::for_travel(travel)),
         calibration: serde_json::Value::Null,
@@ -126,7 +127,7 @@ struct Bench {
 impl Bench {
     fn new() -> Self {
         let ctx = Context::default();
-        palpate_app::theme::apply(&ctx);
+        palpate_window::theme::apply(&ctx);
         Self { ctx, time: 0.0 }
     }
 

@@ -1,5 +1,6 @@
 //! What the window remembers of its user, as one small JSON file in the library: how it looked when it was last closed.
 
+use palpate_sessions::atomic;
 use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -88,9 +89,7 @@ impl Settings {
         if let Some(folder) = path.parent() {
             std::fs::create_dir_all(folder).map_err(|err| unwritable(&err))?;
         }
-        let beside = path.with_extension("json.new");
-        std::fs::write(&beside, text + "\n").map_err(|err| unwritable(&err))?;
-        std::fs::rename(&beside, path).map_err(|err| unwritable(&err))
+        atomic::replace(path, (text + "\n").as_bytes()).map_err(|err| unwritable(&err))
     }
 }
 

@@ -15,6 +15,7 @@ use crate::screens::rig::Facts as RigFacts;
 use crate::screens::rig_panel::rig_ui;
 use crate::screens::run_middle::{Middle, expected_ui, views_ui};
 use crate::screens::weighing::weighing_ui;
+use crate::settings::SETTINGS_FILE;
 use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
@@ -27,12 +28,14 @@ use eframe::egui::{
     CentralPanel, Context, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder,
     ViewportCommand, vec2,
 };
+use palpate_analysis::opening::WorkbenchRequest;
 use palpate_drivers::Rig;
 use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::runner::TimeScale;
+use palpate_sessions::library_folder;
 use std::path::PathBuf;
 
 /// Height of the residuals under the force in points.
@@ -73,6 +76,30 @@ impl WindowOptions {
             list_ports,
             settings: None,
         })
+    }
+}
+
+impl WindowOptions {
+    /// Options for a rig that somebody opened, with what the window remembers in the library.
+    #[must_use]
+    pub fn remembered(request: WorkbenchRequest) -> Self {
+        let WorkbenchRequest {
+            rig,
+            calibration,
+            limits,
+            to_acknowledge,
+            scale,
+        } = request;
+        Self {
+            rig,
+            calibration,
+            limits,
+            to_acknowledge,
+            scale,
+            sessions: None,
+            list_ports,
+            settings: library_folder().ok().map(|at| at.join(SETTINGS_FILE)),
+        }
     }
 }
 

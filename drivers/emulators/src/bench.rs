@@ -2,8 +2,8 @@
 
 use super::cell::{EmulatedCell, Felt};
 use super::{Device, DeviceFault, Plant};
-use crate::emulate::plant::CellFault;
-use crate::sim::SimSettings;
+use crate::plant::CellFault;
+use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::HandAction;
 use palpate_model::{Nanos, Seconds};
 

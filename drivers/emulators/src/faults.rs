@@ -1,6 +1,6 @@
 //! Faults on command: of the line, byte by byte, and of the device.
 
-use crate::sim::{Cause, Random};
+use palpate_drivers::sim::{Cause, Random};
 use palpate_model::Nanos;
 use std::fmt;
 use std::str::FromStr;

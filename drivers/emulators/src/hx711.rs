@@ -5,7 +5,7 @@
 
 use super::DeviceFault;
 use super::cell::{EmulatedCell, Felt};
-use crate::hx711::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, line};
+use palpate_drivers::hx711::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, line};
 use palpate_model::Nanos;
 
 /// Amplified signal at the end of the range, gain 128.

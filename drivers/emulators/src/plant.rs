@@ -1,6 +1,6 @@
 //! What every emulated device moves and feels: the slide of the simulated rig, its bench and its load cell.
 
-use crate::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
+use palpate_drivers::sim::{Bench, Cause, LoadCell, Random, SWITCH_MARGIN_MM, SimSettings, TRAVEL};
 use palpate_model::rig::HandAction;
 use palpate_model::{Newtons, Position, Seconds, Volts};
 

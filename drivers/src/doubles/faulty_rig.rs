@@ -4,7 +4,7 @@ use super::script::{FaultKind, Rail, ScriptedFault};
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use crate::sim::{Cause, Random, counts_from_volts, volts_from_counts};
 use palpate_model::rig::{
-    AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription,
+    AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
 };
 use palpate_model::{Nanos, Volts};
 use std::collections::VecDeque;
@@ -344,5 +344,9 @@ impl<R: Rig> Rig for FaultyRig<R> {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         self.inner.take_raw()
+    }
+
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        self.inner.take_sensors()
     }
 }

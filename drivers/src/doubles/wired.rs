@@ -2,7 +2,7 @@
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
-use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
+use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
 use std::sync::Arc;
 
 /// Any rig, whose commands and reports are told as bytes too: a line of text each, commands and answers with the
@@ -89,5 +89,9 @@ impl<R: Rig> Rig for WiredRig<R> {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         std::mem::take(&mut self.raw)
+    }
+
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        self.inner.take_sensors()
     }
 }

@@ -357,6 +357,7 @@ fn describe(
             |plan| plan.interval as f64,
         ),
         unseen_max: settings.unseen,
+        sensors: Default::default(),
         pulse_lag: Seconds(LAG_SAMPLES * tm * NANOS_PER_TM * 1e-9),
         cell_delay: Seconds(0.0),
     }

@@ -51,6 +51,15 @@ amount!(
     SimCompliance, "compliance", 0, (0..=1000), "0 to 1000 (whole micrometres per newton)"
 );
 
+amount!(
+    /// What the specimen's bath is heated to, in whole °C, from 21 as the rig is switched on; 0 is a rig without one.
+    SimBath, "bath", 0, (0..=60), "0 to 60 (whole degrees Celsius; 0 for no bath)"
+);
+amount!(
+    /// When digital input 1 goes high, in whole seconds after the rig is switched on; 0 is a rig without inputs.
+    SimInput, "input", 0, (0..=86_400), "0 to 86400 (whole seconds; 0 for no input)"
+);
+
 /// Samples a second in thousands. A tick of either clock divides by each of them into whole nanoseconds.
 const KILOHERTZ: [u32; 8] = [1, 2, 4, 5, 8, 10, 16, 20];
 
@@ -109,6 +118,22 @@ impl SimStiffness {
     #[must_use]
     pub fn share(self) -> f64 {
         f64::from(self.0) / 100.0
+    }
+}
+
+impl SimBath {
+    /// In °C; none without a bath.
+    #[must_use]
+    pub fn celsius(self) -> Option<f64> {
+        (self.0 > 0).then(|| f64::from(self.0))
+    }
+}
+
+impl SimInput {
+    /// In s; none without an input.
+    #[must_use]
+    pub fn seconds(self) -> Option<f64> {
+        (self.0 > 0).then(|| f64::from(self.0))
     }
 }
 

@@ -12,32 +12,36 @@ mod clock;
 mod load_cell;
 mod preconditioning;
 mod random;
+mod sensors;
 mod settings;
 mod slider;
 mod tissue;
 
-pub use amounts::{SimCompliance, SimNoise, SimRate, SimStiffness, SimThickness};
-pub(crate) use bench::Bench;
+pub use amounts::{
+    SimBath, SimCompliance, SimInput, SimNoise, SimRate, SimStiffness, SimThickness,
+};
+pub use bench::Bench;
 pub use load_cell::calibration;
-pub(crate) use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
+pub use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
 pub use preconditioning::SimPreconditioning;
-pub(crate) use random::{Cause, Random};
+pub use random::{Cause, Random};
 pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
-pub(crate) use slider::SWITCH_MARGIN_MM;
+pub use slider::SWITCH_MARGIN_MM;
 
 use crate::rig::{Rig, RigEvent, RigEventBody};
 use clock::{COMMAND_LATENCY, REPORT_LATENCY, ReportLink, TickClock};
 use palpate_model::calibration::Calibration;
-use palpate_model::rig::{Fault, HandAction, Reading, RigCommand, RigDescription};
+use palpate_model::rig::{Fault, HandAction, Reading, RigCommand, RigDescription, SensorReading};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{MmPerS, MmPerS2, Nanos, Newtons, Position, Seconds};
+use sensors::Sensors;
 use slider::{ACCELERATION_QUANTUM, Slider};
 use std::collections::VecDeque;
 
 /// Travel of one pulse of the thesis's slide (EZ limo EZS3-15), in mm.
-pub(crate) const MM_PER_PULSE: f64 = 0.015;
+pub const MM_PER_PULSE: f64 = 0.015;
 /// Stroke of the slide.
-pub(crate) const TRAVEL: Position = Position(150.0);
+pub const TRAVEL: Position = Position(150.0);
 /// 2 counts/s, the resolution of `SP` at a nominal millisecond in Galil's DMC command reference.
 const SPEED_QUANTUM: MmPerS = MmPerS(2.0 * MM_PER_PULSE);
 /// Faster than any published indentation of soft tissue with such a slide.
@@ -96,6 +100,7 @@ pub struct SimRig {
     slider: Slider,
     bench: Bench,
     load_cell: LoadCell,
+    sensors: Sensors,
     truth: Truth,
     /// Time of the newest event handed out: the host's present.
     now: Nanos,
@@ -138,6 +143,7 @@ impl SimRig {
             clock: TickClock::new(tick_count, description.tick_nanos),
             link: ReportLink::new(settings.seed),
             load_cell: LoadCell::new(&settings, tick),
+            sensors: Sensors::new(&settings),
             slider,
             bench,
             truth,
@@ -248,6 +254,10 @@ impl Rig for SimRig {
         true
     }
 
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        self.sensors.take(self.now)
+    }
+
     /// Acts at the next tick.
     fn by_hand(&mut self, action: HandAction) {
         self.bench.by_hand(action);
@@ -276,5 +286,6 @@ fn describe(name: &str, settings: &SimSettings) -> RigDescription {
         cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
+        sensors: Sensors::described(settings),
     }
 }

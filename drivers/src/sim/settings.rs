@@ -1,6 +1,8 @@
 //! What makes one simulated rig differ from another; with these values it can be rebuilt.
 
-use super::amounts::{SimCompliance, SimNoise, SimRate, SimStiffness, SimThickness};
+use super::amounts::{
+    SimBath, SimCompliance, SimInput, SimNoise, SimRate, SimStiffness, SimThickness,
+};
 use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
@@ -83,6 +85,10 @@ pub struct SimSettings {
     pub compliance: SimCompliance,
     /// How far loading moves the tissue's surface.
     pub preconditioning: SimPreconditioning,
+    /// What its bath is heated to.
+    pub bath: SimBath,
+    /// When its digital input goes high.
+    pub input: SimInput,
 }
 
 /// A setting of the simulated rig cannot be read.
@@ -116,7 +122,8 @@ impl SimSettings {
 
     /// The settings as a rig's description carries them: `profile`, `seed`, `clock` and, where they
     /// are not the usual ones, `rate` (samples a second), `softening` and `preconditioning` (percent), `noise`
-    /// (mN), `stiffness` (percent), `thickness` (mm) and `compliance` (um/N).
+    /// (mN), `stiffness` (percent), `thickness` (mm), `compliance` (um/N), `bath` (°C)
+    /// and `input` (s).
     #[must_use]
     pub fn to_map(&self) -> BTreeMap<String, String> {
         let mut map = BTreeMap::from([
@@ -132,6 +139,8 @@ impl SimSettings {
             unusual("thickness", self.thickness),
             unusual("compliance", self.compliance),
             unusual("preconditioning", self.preconditioning),
+            unusual("bath", self.bath),
+            unusual("input", self.input),
         ];
         map.extend(unusual.into_iter().flatten());
         map
@@ -154,6 +163,8 @@ impl SimSettings {
             thickness: usual_or(map, "thickness")?,
             compliance: usual_or(map, "compliance")?,
             preconditioning: usual_or(map, "preconditioning")?,
+            bath: usual_or(map, "bath")?,
+            input: usual_or(map, "input")?,
         })
     }
 }
@@ -263,6 +274,8 @@ mod tests {
             stiffness: "200".parse().unwrap(),
             thickness: "12.5".parse().unwrap(),
             compliance: "40".parse().unwrap(),
+            bath: "37".parse().unwrap(),
+            input: "30".parse().unwrap(),
             ..SimSettings::default()
         };
         let map = settings.to_map();

@@ -1,4 +1,4 @@
-//! A hundred million virtual ticks, 28 hours at 1 kHz: `cargo run --release -p palpate-model --example haptic_soak [TICKS]`.
+//! A hundred million virtual ticks, 28 hours at 1 kHz: `cargo run --release -p palpate-haptics --example haptic_soak [TICKS]`.
 //!
 //! The system goes in and out again and again; in every round it is held beside the same system started afresh. Ends with
 //! exit code 1 where anything differs or is no number.
@@ -8,10 +8,10 @@
     reason = "an example speaks to its user"
 )]
 
-use palpate_model::Newtons;
-use palpate_model::haptics::{
+use palpate_haptics::{
     Flags, Input, LawSettings, MasterSlave, MasterSlaveError, MasterSlaveSettings, Period, Snapshot,
 };
+use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use std::process::ExitCode;
 

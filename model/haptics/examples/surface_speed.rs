@@ -1,7 +1,7 @@
 //! What a tick of the deformable surface takes: recovery and poke of whatever is displaced, by the three
 //! methods and by a naive chain, in one run.
 //!
-//! `cargo run --release -p palpate-model --example surface_speed -- [TICKS [fast]]`; `fast`: the closed form alone
+//! `cargo run --release -p palpate-haptics --example surface_speed -- [TICKS [fast]]`; `fast`: the closed form alone
 //!
 //! Three cases each. `lasting`: a tool that stays at a depth whose reach is half the mesh along each axis,
 //! so that every tick recovers and pushes back the diamond between the middles of the edges, half of
@@ -17,13 +17,11 @@
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
-#[path = "../tests/support/naive_surface.rs"]
-mod naive;
-
-use palpate_model::Seconds;
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Node, Normals, Recovery, Rect, Shear, Side, Surface,
 };
+use palpate_model::Seconds;
+use palpate_test_support::naive_surface as naive;
 use std::hint::black_box;
 use std::time::Instant;
 

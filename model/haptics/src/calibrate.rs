@@ -6,7 +6,7 @@
 //! (1978) 461-464); the slope is that of both lines together. Between the ends of the line there is an answer, beyond
 //! them a refusal.
 
-use crate::units::{Newtons, Volts};
+use palpate_model::units::{Newtons, Volts};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -9,8 +9,8 @@ use super::master_slave::MasterSlaveError;
 use super::rig::{Hand, HandPath};
 use super::simulation::{Simulation, SimulationSettings};
 use super::torque::{DriveKind, TorqueSettings};
-use crate::units::{Depth, MmPerS, Newtons, Seconds, Volts};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use thiserror::Error;
 
 /// A check.

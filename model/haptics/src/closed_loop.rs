@@ -12,7 +12,7 @@ use super::rig::{
     Drive, Hand, HandPath, Motor, MotorState, Pinion, Rack, RackEnergies, RackForces, ThermalState,
 };
 use super::{BuzzDetector, BuzzSettings, DELAY_MAX, Flags, PassivityObserver, Period};
-use crate::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 
 /// A device and the hand on it.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,7 +1,7 @@
 //! The load cell as a detector of contact.
 
 use super::Flags;
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

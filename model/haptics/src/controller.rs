@@ -1,7 +1,7 @@
 //! Damping that takes back the energy a loop has made.
 
 use super::{Flags, PassivityObserver, Period, inertia};
-use crate::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 
 /// Bounds of a passivity controller.

@@ -1,6 +1,6 @@
 //! The trait every haptic device implements, simulated or real: where its stylus is, and a force on the hand.
 
-use palpate_model::scene::{DeviceSettings, Hand6, Pose};
+use crate::scene::{DeviceSettings, Hand6, Pose};
 use std::fmt::Debug;
 
 /// A haptic device with a stylus that is sensed in six axes and pushed along three.

@@ -1,13 +1,13 @@
 //! The model as a force law: a depth in, a force out, tick after tick.
 
 use super::{Flags, Period};
-use crate::families::{POWER_MAX, StepError};
-use crate::integrators::{
+use palpate_model::time::Nanos;
+use palpate_model::units::{Depth, MmPerS, Newtons};
+use palpate_rheology::families::{POWER_MAX, StepError};
+use palpate_rheology::integrators::{
     Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
     IntegratorError, Precision, Real, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
 };
-use crate::time::Nanos;
-use crate::units::{Depth, MmPerS, Newtons};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

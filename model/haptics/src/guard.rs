@@ -1,7 +1,7 @@
 //! What keeps the rendered force within bounds, whatever the model asks for.
 
 use super::{Flags, Period};
-use crate::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 
 /// Bounds of a force guard.
@@ -183,7 +183,7 @@ impl ForceGuard {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use palpate_model::random::SplitMix;
 
     const PERIOD: Period = Period::MILLISECOND;
 

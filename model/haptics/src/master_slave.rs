@@ -13,8 +13,8 @@ use super::rig::{
     ThermalState,
 };
 use super::torque::{TorqueError, TorqueSettings};
-use crate::time::Nanos;
-use crate::units::{Depth, MmPerS, Newtons, Volts};
+use palpate_model::time::Nanos;
+use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -1,7 +1,7 @@
 //! The length of a tick.
 
-use crate::time::Nanos;
-use crate::units::Seconds;
+use palpate_model::time::Nanos;
+use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -8,8 +8,8 @@ use super::master_slave::{
 use super::rig::{Hand, HandPath};
 use super::torque::{DriveKind, TorqueSettings};
 use super::{GuardSettings, Period};
-use crate::units::{Depth, MmPerS, Newtons, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
 
 /// What is simulated.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -2,7 +2,7 @@
 
 use super::Flags;
 use super::rig::{Drive, Motor, Pinion};
-use crate::units::{MmPerS, Newtons, Volts};
+use palpate_model::units::{MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

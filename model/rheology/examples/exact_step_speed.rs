@@ -1,14 +1,14 @@
 //! What a sample of the exact step costs at a constant rate, beside what memory allows.
 //!
-//! `cargo run --release -p palpate-model --example exact_step_speed`
+//! `cargo run --release -p palpate-rheology --example exact_step_speed`
 
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
-use palpate_model::families;
-use palpate_model::integrators::{Real, Scheme, SeriesBody};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
+use palpate_rheology::families;
+use palpate_rheology::integrators::{Real, Scheme, SeriesBody};
 use std::hint::black_box;
 use std::time::Instant;
 

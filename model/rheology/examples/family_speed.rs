@@ -9,9 +9,10 @@
     reason = "a measurement prints, reads a clock and may fail"
 )]
 
-use palpate_model::families;
-use palpate_model::fit::{FamilyOptions, FitSample, fit_family};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families;
+use palpate_rheology::fit::{FitOptions, FitSample, fit_joint};
+use std::sync::Arc;
 use std::time::Instant;
 
 fn main() {
@@ -53,11 +54,12 @@ fn main() {
         let mut total = 0.0;
         for family in families::all() {
             let start = Instant::now();
-            let fit = fit_family(
-                &*family,
-                &[("slow", &records[0]), ("fast", &records[1])],
-                FamilyOptions::default(),
-            );
+            let options = FitOptions::of(Arc::clone(&family));
+            let both = [
+                ("slow", records[0].as_slice()),
+                ("fast", records[1].as_slice()),
+            ];
+            let fit = fit_joint(&both, &options, &options.body_names());
             let seconds = start.elapsed().as_secs_f64();
             total += seconds;
             match fit {
@@ -65,7 +67,7 @@ fn main() {
                     "{:<12} {:8.1} ms  rms {:.5} N",
                     family.key(),
                     1e3 * seconds,
-                    fit.rms
+                    fit.rmse_n
                 ),
                 Err(err) => println!("{:<12} {:8.1} ms  {err}", family.key(), 1e3 * seconds),
             }

@@ -1,13 +1,13 @@
 //! What one sample and one answer of the live fit cost, and how close its last answer is.
 //!
-//! `cargo run --release -p palpate-model --example live_speed`
+//! `cargo run --release -p palpate-rheology --example live_speed`
 
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
-use palpate_model::fit::{FitOptions, FitSample, LiveFit, fit};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::fit::{FitOptions, FitSample, LiveFit, fit};
 use std::hint::black_box;
 use std::time::Instant;
 

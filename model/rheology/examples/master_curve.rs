@@ -8,11 +8,12 @@
 mod drawing;
 
 use drawing::{Axes, BLUE, RED};
-use palpate_model::families::{Model, Prony};
-use palpate_model::fit::{FamilyOptions, FitSample, fit_family, fit_family_at};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families::{Model, Prony};
+use palpate_rheology::fit::{FitOptions, FitSample, fit, fit_coefficients};
 use std::error::Error;
 use std::fmt::Write;
+use std::sync::Arc;
 
 /// Relaxation times of the published series, in s: one to a decade.
 const DECADES: std::ops::Range<i32> = -2..29;
@@ -39,7 +40,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     let samples = relaxation(&curve);
     let taus: Vec<f64> = DECADES.map(|decade| 10f64.powi(decade)).collect();
     let family = Prony::of_terms(taus.len()).ok_or("too many terms")?;
-    let fixed = fit_family_at(&family, &taus, &[("master curve", &samples)])?;
+    let fixed = fit_coefficients(Arc::new(family), &taus, &[("master curve", &samples)])?;
     let sum: f64 = fixed.linear.iter().sum();
     println!("relaxation times laid down: E_0 {sum:.2} MPa");
     for (tau, modulus) in taus.iter().zip(&fixed.linear[1..]) {
@@ -54,21 +55,19 @@ fn main() -> Result<(), Box<dyn Error>> {
     let mut best = fixed.clone();
     for terms in FREE {
         let family = Prony::of_terms(terms).ok_or("too many terms")?;
-        let options = FamilyOptions {
-            offset: false,
-            initial: false,
-        };
-        let fit = match fit_family(&family, &[("master curve", &samples)], options) {
+        let mut options = FitOptions::of(Arc::new(family)).at_rest();
+        options.fix("f_offset", 0.0)?;
+        let fit = match fit(&samples, &options) {
             Ok(fit) => fit,
             Err(reason) => {
                 println!("{terms:3} terms are refused: {reason}");
                 break;
             }
         };
-        println!("{terms:3} terms fitted:    rms {:.3} MPa", fit.rms);
-        ladder.push((terms as f64, fit.rms));
-        if fit.rms < rms(&fixed, &samples)? && best.family == fixed.family {
-            best = fit.model;
+        println!("{terms:3} terms fitted:    rms {:.3} MPa", fit.rmse_n);
+        ladder.push((terms as f64, fit.rmse_n));
+        if fit.rmse_n < rms(&fixed, &samples)? && best.family == fixed.family {
+            best = fit.body;
         }
     }
     let picture = picture(&samples, &fixed, &best, &ladder)?;

@@ -3,10 +3,11 @@
 //! `cargo run -p palpate-model --example rheos -- example1_data.csv docs/pictures/rheos.svg`
 
 mod drawing;
+mod maxwell_fit;
 
 use drawing::{Axes, BLUE, RED};
+use maxwell_fit::{MaxwellFit, StrainSample, fit_maxwell};
 use palpate_model::Seconds;
-use palpate_model::fit::{MaxwellFit, StrainSample, fit_maxwell};
 use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellState};
 use std::error::Error;
 

@@ -1,6 +1,6 @@
 //! How much force error matters, as people say it: in newtons, of the peak, or of what a hand notices.
 
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
 use std::fmt;
 use std::str::FromStr;
 use thiserror::Error;

@@ -2,6 +2,7 @@
 
 use super::command::Oscillation;
 use super::oscillation::Sine;
+use super::sensor::RigSensors;
 use crate::units::{MmPerS, MmPerS2, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +56,14 @@ pub struct RigDescription {
     /// How far the probe may go while no sample comes; from 0.02 to 0.5 mm.
     #[serde(default = "usual_unseen", skip_serializing_if = "is_usual_unseen")]
     pub unseen_max: Position,
+    /// What it tells beside load cell and axis.
+    #[serde(default, skip_serializing_if = "has_no_sensors")]
+    pub sensors: RigSensors,
+}
+
+#[expect(clippy::trivially_copy_pass_by_ref, reason = "serde hands a reference")]
+fn has_no_sensors(sensors: &RigSensors) -> bool {
+    *sensors == RigSensors::default()
 }
 
 const fn usual_unseen() -> Position {

@@ -14,6 +14,7 @@ pub mod phase;
 pub mod profile;
 pub mod raw;
 pub mod reading;
+pub mod sensor;
 pub mod signal;
 pub mod thickness;
 
@@ -31,5 +32,6 @@ pub use phase::Phase;
 pub use profile::Profile;
 pub use raw::RawBytes;
 pub use reading::{Age, AxisStatus, Reading};
+pub use sensor::{DIGITAL_INPUTS_MAX, RigSensors, SensorReading, SensorValues};
 pub use signal::SignalFacts;
 pub use thickness::{Thickness, ThicknessError, Touched, thickness};

@@ -15,13 +15,13 @@
 use super::psi::{PSI_COUNT, psi_all};
 
 /// Far below the last digit of any force (1e-16 of 1e-3 N), far above the subnormal numbers.
-pub(crate) const NEGLIGIBLE: f64 = 1e-200;
+pub const NEGLIGIBLE: f64 = 1e-200;
 
 /// A running sum with its rounding error carried along (Dekker's fast two-sum, Numer. Math. 18 (1971)
 /// 224-242: exact where the sum outweighs the increment, and where it does not, there is little to
 /// lose yet).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub(crate) struct Compensated {
+pub struct Compensated {
     /// The sum.
     pub value: f64,
     carry: f64,
@@ -56,7 +56,7 @@ impl Compensated {
 
 /// The psi functions of one step length at one relaxation time.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct StepWeights {
+pub struct StepWeights {
     /// Step length in s.
     pub dt: f64,
     /// `dt / tau`.
@@ -80,7 +80,7 @@ impl StepWeights {
 /// The weighted forcing of `f_1, f_2, f_3` over a straight piece from `x0` to `x0 + d`, by any
 /// functions in the place of psi (psi itself, or its derivative).
 #[inline]
-pub(crate) fn forcing(x0: f64, d: f64, psi: &[f64]) -> [f64; 3] {
+pub fn forcing(x0: f64, d: f64, psi: &[f64]) -> [f64; 3] {
     let linear = x0 * psi[0] + d * psi[1];
     let square = x0 * x0 * psi[0] + d * (2.0 * x0 * psi[1] + d * psi[2]);
     let cube =
@@ -90,7 +90,7 @@ pub(crate) fn forcing(x0: f64, d: f64, psi: &[f64]) -> [f64; 3] {
 
 /// A straight piece of depth, cut where it crosses the surface: at most one part in contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Pieces {
+pub enum Pieces {
     /// In contact all the way.
     Inside,
     /// Out of contact all the way.

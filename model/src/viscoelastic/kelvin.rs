@@ -129,7 +129,7 @@ impl KelvinState {
 
     /// The filtered powers of depth and the filtered viscous drive, in mm, mm^2, mm^3 and mm^2/s: what `mu1`,
     /// `mu2`, `mu3` and `tau_sig` multiply.
-    pub(crate) fn columns(&self) -> [f64; 4] {
+    pub fn columns(&self) -> [f64; 4] {
         let [f1, f2, f3] = &self.powers;
         [f1.value, f2.value, f3.value, self.viscous.value]
     }

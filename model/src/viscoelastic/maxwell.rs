@@ -42,7 +42,7 @@ pub enum Integrator {
 
 /// What a step of length `dt` does to the response to strain.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MaxwellStep {
+pub struct MaxwellStep {
     /// `dt / tau`.
     pub r: f64,
     /// Share of the response lost, `1 - e^-r`.
@@ -52,6 +52,8 @@ pub(crate) struct MaxwellStep {
 }
 
 impl MaxwellStep {
+    /// A step of `dt` seconds at a relaxation time of `tau` seconds.
+    #[must_use]
     pub fn new(dt: f64, tau: f64, integrator: Integrator) -> Self {
         let r = dt / tau;
         let lost = psi(0, r);

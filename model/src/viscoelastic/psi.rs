@@ -6,7 +6,7 @@
 //! tend to 1.
 
 /// `psi_0 ..= psi_4` at one `r`: enough for a cubic forcing and its derivative by `tau`.
-pub(crate) const PSI_COUNT: usize = 5;
+pub const PSI_COUNT: usize = 5;
 
 /// `psi_j(r)` for `r >= 0`, dimensionless; NaN for a negative or NaN `r`.
 ///
@@ -60,7 +60,7 @@ pub fn psi_derivative(j: u32, r: f64) -> f64 {
 }
 
 /// `psi_0 ..= psi_4` together.
-pub(crate) fn psi_all(r: f64) -> [f64; PSI_COUNT] {
+pub fn psi_all(r: f64) -> [f64; PSI_COUNT] {
     psi_first(r)
 }
 
@@ -68,7 +68,7 @@ pub(crate) fn psi_all(r: f64) -> [f64; PSI_COUNT] {
 ///
 /// Below 1 only the highest comes from its series; the others follow downwards by
 /// `psi_{j-1} = (r / j)(1 - psi_j)`, which damps errors because `psi_j < 1/2` there.
-pub(crate) fn psi_first<const N: usize>(r: f64) -> [f64; N] {
+pub fn psi_first<const N: usize>(r: f64) -> [f64; N] {
     let mut all = [0.0; N];
     if r < 1.0 {
         let top = N - 1;
@@ -85,7 +85,7 @@ pub(crate) fn psi_first<const N: usize>(r: f64) -> [f64; N] {
 }
 
 /// The derivatives of `psi_0 ..= psi_3` at `r`, given [`psi_all`] there.
-pub(crate) fn psi_derivatives(r: f64, all: &[f64; PSI_COUNT]) -> [f64; 4] {
+pub fn psi_derivatives(r: f64, all: &[f64; PSI_COUNT]) -> [f64; 4] {
     if r < 1.0 {
         std::array::from_fn(|j| match j {
             0 => 1.0 - all[0],

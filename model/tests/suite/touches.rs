@@ -1,10 +1,8 @@
 //! The contact position from two touches, for bodies unlike the one that is fitted: integrated here by small steps.
 
-mod support;
-
 use palpate_model::signal::{TouchEstimate, TouchPoint, fit_touch};
 use palpate_model::units::{Newtons, Position, Seconds};
-use support::Noise;
+use palpate_test_support::record::Noise;
 
 /// Where the surface is, in mm.
 const SURFACE: f64 = 14.0;

@@ -1,6 +1,6 @@
 //! Between two steps: the axis comes to rest, goes back if the step is tried again, and what follows begins.
 
-use super::context::{Context, Progress};
+use super::context::Context;
 use super::input::{EndingKind, Record, Recovery};
 use super::state::{Activity, Power, Then};
 use super::{step, stop};
@@ -67,7 +67,7 @@ pub(super) fn on_reading(cx: &mut Context<'_>, then: Then, deadline: Nanos) {
 }
 
 /// A step cannot be done: what the plan says follows.
-pub(super) fn on_failure(cx: &mut Context<'_>, reason: String) -> Progress {
+pub(super) fn fail(cx: &mut Context<'_>, reason: String) {
     let step_index = cx.state.step_index;
     let planned = cx.state.config.plan.steps.get(step_index);
     let policy = planned.map_or(OnFailure::Abort, |planned| planned.on_failure);
@@ -77,9 +77,8 @@ pub(super) fn on_failure(cx: &mut Context<'_>, reason: String) -> Progress {
             (Recovery::Retry(cx.state.retries), Then::Return(step_index))
         }
         OnFailure::Skip => (Recovery::Skip, Then::Begin(step_index + 1)),
-        _ => return Progress::Fail(reason),
+        _ => return stop::begin(cx, EndingKind::Abort, reason),
     };
     cx.record(Record::StepFailed { reason, then });
     come_to_rest(cx, next);
-    Progress::Continue
 }

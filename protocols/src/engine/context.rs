@@ -1,29 +1,28 @@
-//! What a step may do while it runs: ask for motion, write records. Arithmetic-free plumbing.
+//! What a step may see and do while it runs: ask for motion, write records.
 
 use super::input::{Effect, Record};
-use super::state::{MoveInFlight, Power, State};
+use super::pause;
+use super::state::{Contact, Derived, MoveInFlight, Pause, Power, State, UnloadedSignal};
 use palpate_model::Nanos;
-use palpate_model::rig::command::pulses_from_position;
-use palpate_model::rig::{MoveTo, Oscillation, Phase, Profile, RigCommand, Sine};
-use palpate_model::units::{MmPerS, Position, Seconds};
+use palpate_model::calibration::Curve;
+use palpate_model::estimate::LiveEstimate;
+use palpate_model::rig::command::{position_from_pulses, pulses_from_position};
+use palpate_model::rig::{
+    AxisStatus, HandAction, Limits, MoveTo, Oscillation, Phase, Profile, RigCommand,
+    RigDescription, SensorValues, Sine,
+};
+use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
-/// How a step stands after an input.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Progress {
-    Continue,
-    Done,
-    /// The step cannot be done; the reason is for the operator.
-    Fail(String),
-    /// The run is to stop, whatever the plan says of failures.
-    Stop(String),
-}
-
-/// The state, the time and the effects of one call of `step`.
-pub(super) struct Context<'a> {
-    pub state: &'a mut State,
+/// The state, the time and the effects of one call of `step`. A step of a plan sees of the state what its methods
+/// show: no interlock, no limit and no plan can be changed through them.
+pub(crate) struct Context<'a> {
+    pub(super) state: &'a mut State,
     pub now: Nanos,
-    pub effects: &'a mut Vec<Effect>,
+    pub(super) effects: &'a mut Vec<Effect>,
 }
+
+/// A search feels with the load cell.
+pub(crate) const NOT_TARED: &str = "tare the load cell before searching with it";
 
 /// Time a move may overrun its profile before the axis counts as stuck.
 const MOVE_GRACE: Seconds = Seconds(1.0);
@@ -37,6 +36,153 @@ pub(crate) fn outside_travel(what: &str, end: Position, travel: Position) -> Str
 }
 
 impl Context<'_> {
+    pub fn rig(&self) -> &RigDescription {
+        &self.state.config.rig
+    }
+
+    pub fn limits(&self) -> &Limits {
+        &self.state.config.limits
+    }
+
+    pub fn curve(&self) -> &Curve {
+        &self.state.config.curve
+    }
+
+    /// A step of the converter; 0 without one.
+    pub fn volts_per_count(&self) -> f64 {
+        self.rig().adc.map_or(0.0, |adc| adc.volts_per_count)
+    }
+
+    /// What was derived from the newest sample.
+    pub fn derived(&self) -> &Derived {
+        &self.state.derived
+    }
+
+    pub fn status(&self) -> AxisStatus {
+        self.state.status
+    }
+
+    pub fn pulses(&self) -> i64 {
+        self.state.pulses
+    }
+
+    /// Whole pulses of a distance in mm.
+    pub fn pulses_of(&self, distance_mm: f64) -> i64 {
+        (distance_mm / self.rig().mm_per_pulse).round() as i64
+    }
+
+    /// Controller tick of the newest sample.
+    pub fn tick(&self) -> u64 {
+        self.state.tick
+    }
+
+    pub fn ticks(&self, span: Seconds) -> u64 {
+        self.state.ticks(span)
+    }
+
+    pub fn tick_after(&self, span: Seconds) -> u64 {
+        self.state.tick + self.state.ticks(span)
+    }
+
+    /// Newest answer of the live fit.
+    pub fn live(&self) -> Option<&LiveEstimate> {
+        self.state.live.as_ref()
+    }
+
+    /// The newest values of the sensors beside load cell and axis.
+    pub fn sensors(&self) -> &SensorValues {
+        &self.state.sensors
+    }
+
+    pub fn is_homed(&self) -> bool {
+        self.state.is_homed
+    }
+
+    pub fn set_homed(&mut self, is_homed: bool) {
+        self.state.is_homed = is_homed;
+    }
+
+    pub fn unloaded(&self) -> Option<UnloadedSignal> {
+        self.state.tare
+    }
+
+    pub fn set_unloaded(&mut self, signal: Option<UnloadedSignal>) {
+        self.state.tare = signal;
+    }
+
+    pub fn known_contact(&self) -> Option<Contact> {
+        self.state.contact
+    }
+
+    pub fn contact(&self) -> Result<Contact, String> {
+        let unknown = "contact is not known; find it first";
+        self.state.contact.ok_or_else(|| unknown.to_owned())
+    }
+
+    pub fn set_contact(&mut self, contact: Option<Contact>) {
+        self.state.contact = contact;
+    }
+
+    /// Where a depth from contact is, within the travel.
+    pub fn position_of(&self, depth: Depth) -> Result<Position, String> {
+        let contact = self.contact()?;
+        let target = depth.position_from(contact.position);
+        let travel = self.limits().travel_max;
+        if target > travel {
+            return Err(format!(
+                "a depth of {depth} from contact at {:.3} mm ends at {:.3} mm, beyond the travel of {:.1} mm",
+                contact.position.0, target.0, travel.0
+            ));
+        }
+        Ok(target)
+    }
+
+    /// Whether the rig has accepted every command.
+    pub fn is_acknowledged(&self) -> bool {
+        self.state.unacknowledged.is_empty()
+    }
+
+    /// Whether the step is paused, and goes on waiting until the run is resumed.
+    pub fn is_extended(&self) -> bool {
+        self.state.pause == Some(Pause::Extended)
+    }
+
+    /// Who answers goes on.
+    pub fn end_pause(&mut self) {
+        if self.is_extended() {
+            pause::resume(self);
+        }
+    }
+
+    /// The signal's zero moved: forces before and after do not compare.
+    pub fn forget_force_rate(&mut self) {
+        self.state.watch.forget_rate();
+    }
+
+    /// Energises the motor of an axis told to stop.
+    pub fn energise(&mut self) {
+        self.state.power = Power::Reset;
+        self.command(RigCommand::EnableMotor);
+        self.command(RigCommand::Stop);
+    }
+
+    /// The rig was checked: motion is possible from now on.
+    pub fn allow_motion(&mut self) {
+        self.state.power = Power::Enabled;
+    }
+
+    /// A person has done something at the rig.
+    pub fn by_hand(&mut self, action: Option<HandAction>) {
+        self.effects.extend(action.map(Effect::ByHand));
+    }
+
+    /// Sends the axis out of the tissue. A way out never leads further in.
+    pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> Result<(), String> {
+        let target = self.position_of(Depth(-clearance_mm))?;
+        let out = target.0.clamp(0.0, self.state.derived.position.0.max(0.0));
+        self.move_to(Position(out), speed)
+    }
+
     pub fn command(&mut self, command: RigCommand) {
         self.state.unacknowledged.push_back((self.now, command));
         self.effects.push(Effect::Command(command));
@@ -78,7 +224,7 @@ impl Context<'_> {
             acceleration: rig.acceleration,
         };
         let from = self.state.derived.position;
-        let to = palpate_model::rig::command::position_from_pulses(target_pulses, rig.mm_per_pulse);
+        let to = position_from_pulses(target_pulses, rig.mm_per_pulse);
         let duration = Profile::to_rest(from, to, speed, rig.acceleration).duration();
         let deadline = self.now + Nanos::from_seconds(duration + MOVE_GRACE);
         let is_forward = target_pulses > self.state.pulses;

@@ -5,10 +5,11 @@ use super::state::Drift;
 use crate::plans::BodyParameter;
 use crate::plans::hold_until::percent;
 use palpate_model::Nanos;
-use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand};
+use palpate_model::estimate::LiveEstimate;
+use palpate_model::rig::{Ack, Fault, HandAction, Phase, Reading, RigCommand, SensorReading};
 use palpate_model::units::{Depth, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
 use std::fmt;
 
 /// Everything the engine can see.
@@ -43,6 +44,11 @@ pub enum Input {
     Lead {
         /// The depth.
         depth: Option<Depth>,
+    },
+    /// What a sensor beside load cell and axis says.
+    Sensor {
+        /// The value.
+        value: SensorReading,
     },
     /// No sample arrived for a while; time passed.
     Tick,
@@ -291,6 +297,14 @@ pub enum Record {
         /// Time until the signal had come to rest.
         waited: Seconds,
     },
+    /// What else a step has to say.
+    StepReported {
+        /// In words.
+        text: String,
+        /// In numbers, each with its unit in its name.
+        #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+        values: BTreeMap<String, f64>,
+    },
     /// Somebody wrote something down.
     Noted {
         /// What.
@@ -500,6 +514,7 @@ impl fmt::Display for Record {
                 let way = if *is_loading { "loading" } else { "unloading" };
                 write!(f, "{mass_g} g, {way} {repeat}: {volts:.4}")
             }
+            Self::StepReported { text, .. } => f.write_str(text),
             Self::Noted { text } => write!(f, "note: {text}"),
             Self::HomeChecked { missed_pulses } => match missed_pulses {
                 0 => f.write_str("home is where it was; no pulse was missed"),

@@ -2,7 +2,7 @@
 
 use super::millisecond::Millisecond;
 use super::state::{Power, State};
-use crate::plans::Step;
+use crate::steps::Step;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Limits, Phase, Reading, RigDescription};
 use palpate_model::units::{MmPerS, Newtons, Position, Seconds, Volts};
@@ -326,12 +326,7 @@ fn force_trip(force: Newtons, force_min: Newtons, force_max: Newtons) -> Option<
 
 fn rate_trip(rate: Option<f64>, rate_max: f64, step: Option<&Step>) -> Option<Trip> {
     let rate = rate.filter(|rate| rate.abs() > rate_max)?;
-    let advice = match step {
-        Some(Step::FindBase(_)) => {
-            "; what the search for the base met hardly gives way: give find-base a lower speed, or let a simulated rig give way (compliance 30)"
-        }
-        _ => "",
-    };
+    let advice = step.map_or("", |step| step.kind().rate_advice());
     trip(
         Interlock::ForceRate,
         format!("the force changes by {rate:.0} N/s, faster than {rate_max:.0} N/s{advice}"),

@@ -7,7 +7,7 @@ use palpate_model::rig::RigDescription;
 
 /// Samples being averaged.
 #[derive(Clone, Debug, PartialEq)]
-pub(super) struct Millisecond {
+pub(crate) struct Millisecond {
     samples: u32,
     count: u32,
     position: f64,

@@ -4,38 +4,24 @@
 //! clock, holds no device and knows no disk, so a dry run, a replay and a real run are the same
 //! code fed from different places.
 
-mod base;
 mod between;
-mod contact;
 mod context;
-mod creep;
-mod follow;
-mod hold;
-mod home;
 mod input;
 mod interlock;
-mod load;
 mod millisecond;
 mod monitor;
 mod pause;
-mod prompt;
-mod self_test;
 mod state;
-mod stats;
 mod step;
 mod stop;
-mod tare;
 #[cfg(test)]
 mod tests;
-mod touch_log;
-mod weigh;
 
-pub(crate) use base::SEATED_SHARE;
-pub(crate) use contact::NOT_TARED;
-pub(crate) use context::outside_travel;
+pub(crate) use context::{Context, NOT_TARED, outside_travel};
 pub use input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record, Recovery};
 pub use interlock::Interlock;
-pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, Tare};
+pub(crate) use millisecond::Millisecond;
+pub use state::{Config, Contact, Derived, Drift, PauseView, Power, State, UnloadedSignal};
 pub(crate) use step::NOT_HOMED;
 pub use step::{PLAN_COMPLETE, step};
 

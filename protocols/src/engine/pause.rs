@@ -3,46 +3,10 @@
 
 use super::context::Context;
 use super::input::Record;
-use super::state::{Active, Activity, Pause, Then};
+use super::state::{Activity, Pause, Then};
 use super::{between, step};
-use crate::plans::Step;
+use crate::steps::{Pausing, Step};
 use palpate_model::rig::Phase;
-
-/// What pausing means for a step in progress.
-enum Kind {
-    /// It only waits, and waits longer.
-    Wait,
-    /// It is short and does not move the probe: it is completed.
-    Complete,
-    /// It moves outside the measurement and can begin again.
-    Repeat,
-    /// It is the measurement.
-    Measure(&'static str),
-}
-
-fn kind(active: &Active, step: Option<&Step>) -> Kind {
-    match active {
-        Active::Hold(_) | Active::Rest { .. } | Active::Creep(_) | Active::Prompt { .. } => {
-            Kind::Wait
-        }
-        Active::SelfTest(_) | Active::Tare(_) | Active::Weigh(_) => Kind::Complete,
-        // What leads may be elsewhere by then, and the slave goes there.
-        Active::Home(_) | Active::Contact(_) | Active::Base(_) | Active::Follow(_) => Kind::Repeat,
-        Active::Load(_) => Kind::Measure("an interrupted indentation is another experiment"),
-        Active::Move => match step {
-            Some(Step::Ramp { .. }) => {
-                Kind::Measure("an interrupted indentation is another experiment")
-            }
-            Some(Step::Unload { .. }) => {
-                Kind::Measure("an interrupted unloading is another experiment")
-            }
-            Some(Step::Sine(_)) => {
-                Kind::Measure("an interrupted oscillation is another experiment")
-            }
-            _ => Kind::Repeat,
-        },
-    }
-}
 
 /// Who wants a pause.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -59,8 +23,8 @@ pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
     cx.state.is_paused_by_operator =
         by == By::Operator || is_paused && cx.state.is_paused_by_operator;
     let step_index = cx.state.step_index;
-    let kind = match &cx.state.activity {
-        Activity::Step(active) => kind(active, cx.state.current_step()),
+    let pausing = match &cx.state.activity {
+        Activity::Step(_) => pausing(cx),
         Activity::Between {
             then: Then::Begin(index) | Then::Return(index),
             ..
@@ -73,18 +37,25 @@ pub(super) fn now(cx: &mut Context<'_>, by: By, reason: String) {
             return cx.record(Record::Refused { reason });
         }
     };
-    match kind {
-        Kind::Wait => {
+    match pausing {
+        Some(Pausing::Wait | Pausing::Control) => {
             cx.state.pause = Some(Pause::Extended);
             cx.record(Record::Paused {
                 reason,
                 no_resume: None,
             });
         }
-        Kind::Complete => await_end_of(cx, step_index),
-        Kind::Repeat => halt_motion(cx, Ok(step_index), reason),
-        Kind::Measure(why) => halt_motion(cx, Err(why), reason),
+        Some(Pausing::Complete) | None => await_end_of(cx, step_index),
+        Some(Pausing::Repeat | Pausing::RepeatFromStart) => {
+            halt_motion(cx, Ok(step_index), reason);
+        }
+        Some(Pausing::Measure(why)) => halt_motion(cx, Err(why), reason),
     }
+}
+
+fn pausing(cx: &Context<'_>) -> Option<Pausing> {
+    let step = cx.state.current_step();
+    step.map(|step| step.kind().facts().pausing)
 }
 
 /// Pauses behind a step that has not ended yet.
@@ -139,7 +110,7 @@ pub(super) fn resume(cx: &mut Context<'_>) {
         (Activity::Paused { next: Ok(next), .. }, _) => {
             let next = *next;
             cx.record(Record::Resumed);
-            if next == cx.state.step_index && begins_from_its_place(cx.state.current_step()) {
+            if next == cx.state.step_index && pausing(cx) == Some(Pausing::RepeatFromStart) {
                 between::come_to_rest(cx, Then::Return(next));
             } else {
                 step::begin(cx, next);
@@ -160,15 +131,6 @@ pub(super) fn resume(cx: &mut Context<'_>) {
     }
 }
 
-/// Whether a step that is begun again must begin where it did: a search would feel the tissue at once, a jog would
-/// go too far. The others lead to a place, from wherever.
-fn begins_from_its_place(step: Option<&Step>) -> bool {
-    matches!(
-        step,
-        Some(Step::FindContact(_) | Step::FindBase(_) | Step::Jog { .. })
-    )
-}
-
 /// What paused the run is past: it goes on where that is sound, else the operator decides.
 pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
     let can_resume = matches!(cx.state.activity, Activity::Paused { next: Ok(_), .. })
@@ -182,9 +144,9 @@ pub(super) fn resume_by_itself(cx: &mut Context<'_>) {
 pub(super) fn finish(cx: &mut Context<'_>) {
     let is_at_rest = match &cx.state.activity {
         Activity::Paused { .. } => true,
-        Activity::Step(active) => {
-            cx.state.pause == Some(Pause::Extended)
-                && !matches!(active, Active::Creep(_) if !cx.state.is_at_rest())
+        Activity::Step(_) => {
+            let is_moving = pausing(cx) == Some(Pausing::Control) && !cx.state.is_at_rest();
+            cx.is_extended() && !is_moving
         }
         _ => false,
     };
@@ -196,7 +158,7 @@ pub(super) fn finish(cx: &mut Context<'_>) {
     cx.state.is_finished_early = true;
     cx.record(Record::FinishedEarly);
     let steps = &cx.state.config.plan.steps;
-    let is_retract = |index: &usize| matches!(steps[*index].step, Step::Retract { .. });
+    let is_retract = |index: &usize| matches!(steps[*index].step, Step::Retract(_));
     // The retract that was paused on its way is the last one too.
     let last = (cx.state.step_index..steps.len()).rev().find(is_retract);
     // Before contact there is nothing to leave.

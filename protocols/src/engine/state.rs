@@ -1,23 +1,16 @@
 //! The engine's state: a plain value, cloneable, comparable, printable.
 
-use super::base::BaseSearch;
-use super::contact::ContactSearch;
-use super::creep::Creeping;
-use super::follow::Following;
-use super::hold::Holding;
-use super::home::Homing;
 use super::input::{EndingKind, Outcome};
 use super::interlock::Watch;
-use super::load::Loading;
 use super::monitor::Condition;
-use super::self_test::SelfTest;
-use super::tare::Taring;
-use super::weigh::Weighing;
-use crate::plans::{Plan, Prompt, Step};
+use crate::plans::Plan;
+use crate::steps::{Active, Step};
 use palpate_model::Nanos;
-use palpate_model::calibration::{Curve, SettlingNow};
-use palpate_model::fit::LiveEstimate;
-use palpate_model::rig::{AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription};
+use palpate_model::calibration::Curve;
+use palpate_model::estimate::LiveEstimate;
+use palpate_model::rig::{
+    AxisStatus, Limits, PathTracker, Phase, RigCommand, RigDescription, SensorValues,
+};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use serde::{Deserialize, Serialize};
 use std::collections::VecDeque;
@@ -50,9 +43,9 @@ pub enum Power {
     Enabled,
 }
 
-/// The unloaded signal.
+/// The unloaded signal, as a tare averaged it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Tare {
+pub struct UnloadedSignal {
     /// Mean signal without load.
     pub volts: Volts,
     /// Standard deviation of one sample, quantisation included.
@@ -109,30 +102,6 @@ pub enum PauseView {
     Paused {
         /// Why it cannot go on from here; none if it can.
         no_resume: Option<&'static str>,
-    },
-}
-
-/// A step in progress, holding only its own data.
-#[derive(Clone, Debug, PartialEq)]
-pub(super) enum Active {
-    SelfTest(SelfTest),
-    Home(Homing),
-    Tare(Taring),
-    Contact(Box<ContactSearch>),
-    Base(Box<BaseSearch>),
-    /// Ramp, unload, retract and jog: one move, done when the axis rests.
-    Move,
-    Hold(Holding),
-    /// Stay until this controller tick.
-    Rest {
-        until_tick: u64,
-    },
-    Load(Loading),
-    Creep(Creeping),
-    Follow(Following),
-    Weigh(Box<Weighing>),
-    Prompt {
-        deadline: Nanos,
     },
 }
 
@@ -205,13 +174,14 @@ pub struct State {
     pub(super) pulses: i64,
     /// Axis status of the newest sample.
     pub(super) status: AxisStatus,
-    pub(super) tare: Option<Tare>,
+    pub(super) tare: Option<UnloadedSignal>,
     pub(super) contact: Option<Contact>,
     pub(super) derived: Derived,
     pub(super) watch: Watch,
     pub(super) unacknowledged: VecDeque<(Nanos, RigCommand)>,
     pub(super) in_flight: Option<MoveInFlight>,
     pub(super) live: Option<LiveEstimate>,
+    pub(super) sensors: SensorValues,
     pub(super) pause: Option<Pause>,
     /// Whether a person asked for the pause: only a person ends it then.
     pub(super) is_paused_by_operator: bool,
@@ -248,6 +218,7 @@ impl State {
             unacknowledged: VecDeque::new(),
             in_flight: None,
             live: None,
+            sensors: SensorValues::default(),
             pause: None,
             is_paused_by_operator: false,
             step_from: 0,
@@ -302,29 +273,12 @@ impl State {
         }
     }
 
-    /// The prompt that waits for an answer, and until when.
-    #[must_use]
-    pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
-        match (&self.activity, self.current_step()) {
-            (Activity::Step(Active::Prompt { deadline }), Some(Step::Prompt(prompt))) => {
-                Some((prompt, *deadline))
-            }
-            _ => None,
-        }
-    }
-
-    /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
-    #[must_use]
-    pub fn settling(&self) -> Option<SettlingNow> {
+    /// The step in progress.
+    pub(crate) fn active(&self) -> Option<&Active> {
         match &self.activity {
-            Activity::Step(Active::Weigh(weighing)) => Some(weighing.now()),
+            Activity::Step(active) => Some(active),
             _ => None,
         }
-    }
-
-    /// Whether the last weight can be read again now, or why not.
-    pub fn can_redo(&self) -> Result<(), &'static str> {
-        super::weigh::redo_step(self).map(|_| ())
     }
 
     /// Index of the step in progress, and since when.
@@ -365,7 +319,7 @@ impl State {
 
     /// The unloaded signal, once measured.
     #[must_use]
-    pub fn tare(&self) -> Option<Tare> {
+    pub fn tare(&self) -> Option<UnloadedSignal> {
         self.tare
     }
 

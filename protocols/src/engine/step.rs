@@ -1,24 +1,14 @@
 //! The one entry point: interlocks first, then the plan.
 
-use super::base::BaseSearch;
-use super::contact::ContactSearch;
-use super::context::{Context, Progress, outside_travel};
-use super::creep::Creeping;
-use super::follow::{self, Following};
-use super::hold::{self, Holding};
-use super::home::Homing;
+use super::context::Context;
 use super::input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record};
 use super::interlock::{self, Interlock, Trip};
-use super::load::Loading;
-use super::self_test::SelfTest;
-use super::state::{Active, Activity, Derived, Pause, PauseView, Power, State};
-use super::tare::Taring;
-use super::weigh::Weighing;
-use super::{between, monitor, pause, prompt, stop, weigh};
-use crate::plans::Step;
+use super::state::{Activity, Derived, Pause, PauseView, Power, State};
+use super::{between, monitor, pause, stop};
+use crate::steps::{Active, Progress, Step, StepEvent};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, PathTracker, Phase, Reading, RigCommand};
-use palpate_model::units::{Depth, Position, Seconds};
+use palpate_model::units::{Position, Seconds};
 
 /// Why a run ended that did everything its plan wanted.
 pub const PLAN_COMPLETE: &str = "the plan is complete";
@@ -45,9 +35,12 @@ pub fn step(mut state: State, now: Nanos, input: Input) -> (State, Vec<Effect>) 
         Input::Note { text } => cx.record(Record::Noted { text }),
         Input::LiveFit(estimate) => {
             cx.state.live = Some(estimate);
-            hold::on_live_fit(&mut cx);
+            pass_event(&mut cx, &StepEvent::LiveFit);
         }
-        Input::Lead { depth } => follow::on_lead(&mut cx, depth),
+        Input::Sensor { value } => cx.state.sensors.update(&value),
+        Input::Lead { depth } => {
+            pass_event(&mut cx, &StepEvent::Lead(depth));
+        }
     }
     (state, effects)
 }
@@ -106,40 +99,40 @@ fn derive(state: &mut State, reading: &Reading) -> Option<String> {
 }
 
 fn run_step(cx: &mut Context<'_>, mut active: Active, reading: &Reading) {
-    let progress = match &mut active {
-        Active::SelfTest(test) => test.on_reading(cx, reading),
-        Active::Home(homing) => homing.on_reading(cx, reading),
-        Active::Tare(taring) => taring.on_reading(cx, reading),
-        Active::Contact(search) => search.on_reading(cx, reading),
-        Active::Base(search) => search.on_reading(cx),
-        Active::Move => match cx.at_rest() {
-            Ok(true) => Progress::Done,
-            Ok(false) => Progress::Continue,
-            Err(reason) => Progress::Fail(reason),
-        },
-        Active::Hold(hold) => hold.on_reading(cx, reading),
-        Active::Rest { until_tick } if reading.tick >= *until_tick => Progress::Done,
-        Active::Rest { .. } => Progress::Continue,
-        Active::Load(load) => load.on_reading(cx),
-        Active::Creep(creep) => creep.on_reading(cx, reading),
-        Active::Follow(following) => following.on_reading(cx, reading),
-        Active::Weigh(weighing) => weighing.on_reading(cx, reading),
-        Active::Prompt { deadline } => prompt::on_time(cx, deadline),
-    };
-    // A wait that is paused stays what it is until the operator goes on.
-    let is_extended = cx.state.pause == Some(Pause::Extended);
-    match progress {
-        Progress::Done if is_extended => cx.state.activity = Activity::Step(active),
-        Progress::Continue => cx.state.activity = Activity::Step(active),
-        Progress::Done => next(cx),
-        Progress::Fail(reason) => fail(cx, reason),
-        Progress::Stop(reason) => stop::begin(cx, EndingKind::Stop, reason),
+    match active.in_progress().on_reading(cx, reading) {
+        Ok(progress) => keep_or_end(cx, active, progress),
+        Err(reason) => {
+            let label = cx
+                .state
+                .current_step()
+                .map_or("", |step| step.kind().facts().label);
+            let reason = match label {
+                "" => reason,
+                label => format!("{label}: {reason}"),
+            };
+            between::fail(cx, reason);
+        }
     }
 }
 
-fn fail(cx: &mut Context<'_>, reason: String) {
-    if let Progress::Fail(reason) = between::on_failure(cx, reason) {
-        stop::begin(cx, EndingKind::Abort, reason);
+/// Hands the step in progress what came beside samples; whether it took notice.
+fn pass_event(cx: &mut Context<'_>, event: &StepEvent) -> bool {
+    let Some(mut active) = cx.state.activity.take_step() else {
+        return false;
+    };
+    let progress = active.in_progress().on_event(cx, event);
+    let is_noticed = progress.is_some();
+    keep_or_end(cx, active, progress.unwrap_or(Progress::Continue));
+    is_noticed
+}
+
+fn keep_or_end(cx: &mut Context<'_>, active: Active, progress: Progress) {
+    match progress {
+        Progress::Continue => cx.state.activity = Activity::Step(active),
+        // A wait that is paused stays what it is until the operator goes on.
+        Progress::Done if cx.is_extended() => cx.state.activity = Activity::Step(active),
+        Progress::Done => next(cx),
+        Progress::Stop(reason) => stop::begin(cx, EndingKind::Stop, reason),
     }
 }
 
@@ -182,13 +175,13 @@ pub(super) fn begin(cx: &mut Context<'_>, step_index: usize) {
     cx.state.step_index = step_index;
     cx.state.step_started = cx.now;
     cx.state.step_from = cx.state.pulses;
-    if matches!(step, Step::Home { .. }) && cx.state.is_homed {
+    if step.is_done_already(cx) {
         return next(cx);
     }
     cx.enter_phase(step.phase());
     match begin_active(cx, step) {
         Ok(active) => cx.state.activity = Activity::Step(active),
-        Err(reason) => fail(cx, format!("{}: {reason}", step.phase())),
+        Err(reason) => between::fail(cx, format!("{}: {reason}", step.phase())),
     }
 }
 
@@ -199,84 +192,7 @@ fn begin_active(cx: &mut Context<'_>, step: &Step) -> Result<Active, String> {
     if step.needs_homed_axis() && !cx.state.is_homed {
         return Err(NOT_HOMED.into());
     }
-    Ok(match *step {
-        Step::SelfTest { duration } => Active::SelfTest(SelfTest::begin(cx, duration)),
-        Step::Home { speed, touch_speed } => Active::Home(Homing::begin(cx, speed, touch_speed)?),
-        Step::Tare { duration } => {
-            cx.state.tare = None;
-            cx.state.watch.forget_rate();
-            Active::Tare(Taring::begin(cx, duration))
-        }
-        Step::FindContact(plan) => {
-            cx.state.contact = None;
-            Active::Contact(Box::new(ContactSearch::begin(cx, plan)?))
-        }
-        Step::Ramp { speed, depth } => {
-            let target = position_of(cx, depth)?;
-            cx.move_to(target, speed)?;
-            Active::Move
-        }
-        Step::LoadTo(plan) => Active::Load(Loading::begin(cx, plan)?),
-        Step::Hold { duration, rate, .. } => Active::Hold(Holding::begin(cx, duration, rate)),
-        Step::HoldForce(plan) => Active::Creep(Creeping::begin(cx, plan)?),
-        Step::Follow(plan) => Active::Follow(Following::begin(cx, plan)?),
-        Step::Rest { duration } => Active::Rest {
-            until_tick: cx.state.tick + cx.state.ticks(duration),
-        },
-        Step::Prompt(ref asked) => prompt::begin(cx, asked),
-        Step::Unload {
-            speed,
-            clearance_mm,
-        }
-        | Step::Retract {
-            speed,
-            clearance_mm,
-        } => {
-            let target = position_of(cx, Depth(-clearance_mm))?;
-            // A way out never leads further in.
-            let out = target.0.clamp(0.0, cx.state.derived.position.0.max(0.0));
-            cx.move_to(Position(out), speed)?;
-            Active::Move
-        }
-        Step::Jog { distance_mm, speed } => {
-            let mm_per_pulse = cx.state.config.rig.mm_per_pulse;
-            let to = cx.state.pulses + (distance_mm / mm_per_pulse).round() as i64;
-            let end = to as f64 * mm_per_pulse;
-            let travel = cx.state.config.limits.travel_max;
-            // Where home is unknown the switches are all there is; a jog that comes back is always allowed.
-            if cx.state.is_homed && distance_mm > 0.0 && end > travel.0 {
-                return Err(outside_travel("jog", Position(end), travel));
-            }
-            cx.move_to_pulses(to, speed)?;
-            Active::Move
-        }
-        Step::Sine(ref sine) => {
-            let command = sine.command(&cx.state.config.rig);
-            cx.oscillate(command)?;
-            Active::Move
-        }
-        Step::Weigh(ref weigh) => Active::Weigh(Box::new(Weighing::begin(cx, weigh.clone()))),
-        Step::CheckHome { speed, touch_speed } => {
-            Active::Home(Homing::begin_check(cx, speed, touch_speed)?)
-        }
-        Step::FindBase(plan) => Active::Base(Box::new(BaseSearch::begin(cx, plan)?)),
-    })
-}
-
-fn position_of(cx: &Context<'_>, depth: Depth) -> Result<Position, String> {
-    let contact = cx
-        .state
-        .contact
-        .ok_or("contact is not known; find it first")?;
-    let target = depth.position_from(contact.position);
-    let travel = cx.state.config.limits.travel_max;
-    if target > travel {
-        return Err(format!(
-            "a depth of {depth} from contact at {:.3} mm ends at {:.3} mm, beyond the travel of {:.1} mm",
-            contact.position.0, target.0, travel.0
-        ));
-    }
-    Ok(target)
+    step.begin(cx)
 }
 
 fn on_tick(cx: &mut Context<'_>) {
@@ -426,9 +342,31 @@ fn on_operator(cx: &mut Context<'_>, choice: Operator) {
         Operator::PauseAfter { step_index } => pause::after(cx, step_index),
         Operator::Resume => pause::resume(cx),
         Operator::Finish => pause::finish(cx),
-        Operator::Confirm => prompt::answer(cx, Answer::Confirmed),
-        Operator::Decline => prompt::answer(cx, Answer::Declined),
-        Operator::Redo => weigh::redo(cx),
+        Operator::Confirm => answer(cx, Answer::Confirmed),
+        Operator::Decline => answer(cx, Answer::Declined),
+        Operator::Redo => redo(cx),
+    }
+}
+
+/// The operator answered.
+fn answer(cx: &mut Context<'_>, answer: Answer) {
+    if !pass_event(cx, &StepEvent::Answer(answer)) {
+        let reason = "there is no question to answer".to_owned();
+        cx.record(Record::Refused { reason });
+    }
+}
+
+/// The operator wants to read a weight again.
+fn redo(cx: &mut Context<'_>) {
+    match cx.state.redo_step() {
+        Ok(step_index) => {
+            cx.end_pause();
+            begin(cx, step_index);
+        }
+        Err(reason) => {
+            let reason = reason.to_owned();
+            cx.record(Record::Refused { reason });
+        }
     }
 }
 

@@ -3,7 +3,7 @@
 mod hold;
 
 use super::*;
-use crate::plans::{HoldUntil, LoadTo, Plan, Step};
+use crate::plans::{Hold, HoldUntil, Jog, LoadTo, Plan, Ramp, SelfTest, Step, Tare};
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{
@@ -44,6 +44,7 @@ fn rig() -> RigDescription {
         cell_delay: Seconds(0.0),
         ticks_per_sample: 1.0,
         unseen_max: RigDescription::UNSEEN_USUAL,
+        sensors: Default::default(),
     }
 }
 
@@ -84,17 +85,17 @@ impl Bench {
     /// The same on another rig.
     fn holding_on(rig: RigDescription, hold: f64, until: Option<HoldUntil>) -> Self {
         let steps = vec![
-            Step::SelfTest {
+            Step::SelfTest(SelfTest {
                 duration: Seconds(0.1),
-            },
-            Step::Tare {
+            }),
+            Step::Tare(Tare {
                 duration: Seconds(0.1),
-            },
-            Step::Hold {
+            }),
+            Step::Hold(Hold {
                 duration: Seconds(hold),
                 until,
                 rate: None,
-            },
+            }),
         ];
         let mut bench = Self::on(rig, steps);
         bench.start();
@@ -445,9 +446,9 @@ fn a_clock_that_runs_back_is_a_reset_controller() {
 
 #[test]
 fn a_command_without_acknowledgement_is_a_lost_link() {
-    let mut bench = Bench::new(vec![Step::SelfTest {
+    let mut bench = Bench::new(vec![Step::SelfTest(SelfTest {
         duration: Seconds(0.1),
-    }]);
+    })]);
     bench.give(Input::Operator {
         choice: Operator::Start,
     });
@@ -459,9 +460,9 @@ fn a_command_without_acknowledgement_is_a_lost_link() {
 fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
     let unhomed = |step: Step| {
         let mut bench = Bench::new(vec![
-            Step::SelfTest {
+            Step::SelfTest(SelfTest {
                 duration: Seconds(0.1),
-            },
+            }),
             step,
         ]);
         let mut config = bench.state().config().clone();
@@ -473,15 +474,15 @@ fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
             .collect();
         sent
     };
-    let ramp = Step::Ramp {
+    let ramp = Step::Ramp(Ramp {
         speed: MmPerS(0.75),
         depth: palpate_model::Depth(1.0),
-    };
+    });
     assert_eq!(unhomed(ramp), [RigCommand::Stop]);
-    let jog = Step::Jog {
+    let jog = Step::Jog(Jog {
         distance_mm: 1.5,
         speed: MmPerS(0.75),
-    };
+    });
     assert!(
         matches!(unhomed(jog)[..], [RigCommand::MoveTo(command)] if command.target_pulses == 100)
     );
@@ -490,9 +491,9 @@ fn a_move_needs_a_homed_axis_and_a_jog_does_not() {
 #[test]
 fn self_test_refuses_a_dead_a_noisy_and_a_loaded_cell() {
     let reason = |signal: fn(u64) -> f64| {
-        let mut bench = Bench::new(vec![Step::SelfTest {
+        let mut bench = Bench::new(vec![Step::SelfTest(SelfTest {
             duration: Seconds(0.1),
-        }]);
+        })]);
         bench.start();
         for _ in 0..120 {
             bench.tick += 1;
@@ -544,13 +545,13 @@ fn steps_are_pure() {
 /// Self-tested and jogging 15 mm at 9 mm/s; the command was sent with the last sample.
 fn jogging() -> Bench {
     let mut bench = Bench::new(vec![
-        Step::SelfTest {
+        Step::SelfTest(SelfTest {
             duration: Seconds(0.1),
-        },
-        Step::Jog {
+        }),
+        Step::Jog(Jog {
             distance_mm: 15.0,
             speed: MmPerS(9.0),
-        },
+        }),
     ]);
     bench.start();
     for _ in 0..200 {
@@ -610,10 +611,12 @@ fn an_axis_that_moves_after_a_stop_is_cut() {
 /// Loading to 1 N, which the first sample of the load has already: the move and the stop behind it are sent. With a brake
 /// the approach begins fast and goes on slower.
 fn reached_at_once(brake: Option<Newtons>) -> Bench {
-    let hold = |secs: f64| Step::Hold {
-        duration: Seconds(secs),
-        until: None,
-        rate: None,
+    let hold = |secs: f64| {
+        Step::Hold(Hold {
+            duration: Seconds(secs),
+            until: None,
+            rate: None,
+        })
     };
     let load = LoadTo {
         force: Newtons(1.0),
@@ -623,8 +626,8 @@ fn reached_at_once(brake: Option<Newtons>) -> Bench {
     };
     let (check, tare) = (Seconds(0.1), Seconds(0.1));
     let mut bench = Bench::new(vec![
-        Step::SelfTest { duration: check },
-        Step::Tare { duration: tare },
+        Step::SelfTest(SelfTest { duration: check }),
+        Step::Tare(Tare { duration: tare }),
         hold(0.1),
         Step::LoadTo(load),
         hold(10.0),

@@ -4,18 +4,14 @@
 //! [`FidelityMeter`] takes samples and decisions one by one, so that a run is judged in the memory of a few
 //! numbers a step, while it goes on or from its log.
 
-mod measure;
 mod verdict;
 
 pub use verdict::first_verdict;
 
-use crate::analysis::{SourceError, decisions};
 use crate::engine::{Effect, EndingKind, Record};
 use crate::plans::Plan;
-pub(crate) use measure::FORCE_FLOOR;
-use measure::Measuring;
-use palpate_model::rig::{Phase, RigDescription};
-use palpate_sessions::log::Session;
+use crate::steps::{MeterSample, StepMeter, Target};
+use palpate_model::rig::{AxisStatus, Phase, RigDescription};
 use palpate_sessions::record::Row;
 use serde::Serialize;
 
@@ -46,6 +42,35 @@ pub struct Achieved {
     pub allowed: f64,
     /// Whether the difference is within it.
     pub is_within: bool,
+}
+
+impl Achieved {
+    fn of(step_index: usize, step: &'static str, cycle: u32, one: &Target) -> Self {
+        let error = one.achieved - one.target;
+        Self {
+            step_index,
+            step,
+            cycle,
+            quantity: one.quantity,
+            unit: one.unit,
+            target: one.target,
+            achieved: one.achieved,
+            error_percent: (one.target != 0.0).then(|| 100.0 * error / one.target.abs()),
+            allowed: one.allowed,
+            is_within: error.abs() <= one.allowed,
+        }
+    }
+}
+
+/// What of a recorded sample a step's targets are about.
+fn sample(row: &Row) -> MeterSample {
+    MeterSample {
+        tick: row.tick,
+        status: AxisStatus(row.status),
+        pulses: row.pulses,
+        depth: row.depth,
+        force: row.force,
+    }
 }
 
 /// What a session's time went to, in s.
@@ -151,7 +176,8 @@ pub struct FidelityMeter {
     plan: Plan,
     rig: RigDescription,
     found: Fidelity,
-    current: Option<Measuring>,
+    /// The step in progress, by its place in the plan.
+    current: Option<(usize, StepMeter)>,
     last: Option<Row>,
 }
 
@@ -184,22 +210,22 @@ impl FidelityMeter {
                 if self
                     .current
                     .as_ref()
-                    .is_some_and(|one| one.step_index == *step_index)
+                    .is_some_and(|(index, _)| index == step_index)
                 {
                     return;
                 }
                 self.complete();
                 let planned = self.plan.steps.get(*step_index);
                 self.current =
-                    planned.map(|planned| Measuring::new(*step_index, planned, &self.rig));
+                    planned.map(|planned| (*step_index, StepMeter::new(&planned.step, &self.rig)));
             }
             Record::ForceReached { force, .. } => {
-                if let Some(current) = &mut self.current {
+                if let Some((_, current)) = &mut self.current {
                     current.force_reached(*force);
                 }
             }
             Record::HoldEndedEarly { .. } | Record::HoldSteady { .. } => {
-                if let Some(current) = &mut self.current {
+                if let Some((_, current)) = &mut self.current {
                     current.has_no_duration();
                 }
             }
@@ -212,7 +238,7 @@ impl FidelityMeter {
                 self.remark(record.to_string());
             }
             Record::LeadLost { .. } => {
-                if let Some(current) = &mut self.current {
+                if let Some((_, current)) = &mut self.current {
                     current.has_no_duration();
                 }
                 self.remark(record.to_string());
@@ -235,10 +261,21 @@ impl FidelityMeter {
 
     /// The step in progress has come to its end.
     fn complete(&mut self) {
-        if let (Some(current), Some(last)) = (self.current.take(), &self.last)
-            && let Some(remark) = current.finish(last, &mut self.found.targets)
-        {
-            self.remark(remark);
+        let (Some((step_index, meter)), Some(last)) = (self.current.take(), &self.last) else {
+            return;
+        };
+        let (Some((targets, doubt)), Some(planned)) =
+            (meter.finish(&sample(last)), self.plan.steps.get(step_index))
+        else {
+            return;
+        };
+        let step = planned.step.phase().name();
+        let achieved = targets
+            .into_iter()
+            .map(|target| Achieved::of(step_index, step, planned.cycle, &target));
+        self.found.targets.extend(achieved);
+        if let Some(doubt) = doubt {
+            self.remark(format!("step {} ({step}): {doubt}", step_index + 1));
         }
     }
 
@@ -270,8 +307,8 @@ impl FidelityMeter {
                 self.found.late_worst_s = self.found.late_worst_s.max(delay);
             }
         }
-        if let Some(current) = &mut self.current {
-            current.row(row);
+        if let Some((_, current)) = &mut self.current {
+            current.sample(&sample(row));
         }
         self.last = Some(*row);
     }
@@ -281,72 +318,23 @@ impl FidelityMeter {
     pub fn found(&self) -> &Fidelity {
         &self.found
     }
-}
 
-/// The fidelity of a recorded session.
-pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
-    let rig = match (&session.manifest.imported, &session.manifest.rig) {
-        (None, Some(rig)) => rig,
-        (imported, _) => {
-            let file = imported.as_ref().map(|from| from.file.clone());
-            let file = file.unwrap_or_default();
-            return Err(SourceError::Imported { file });
-        }
-    };
-    let plan: Plan =
-        serde_json::from_value(session.manifest.plan.clone()).map_err(|err| SourceError::Plan {
-            detail: err.to_string(),
-        })?;
-    let decisions = decisions(session)?;
-    let mut meter = FidelityMeter::new(&plan, rig);
-    let mut next = decisions.iter().peekable();
-    for (index, row) in session.rows.iter().enumerate() {
-        while let Some((_, effect)) = next.next_if(|(after, _)| *after <= index as u64 + 1) {
-            meter.effect(effect);
-        }
-        meter.row(row);
+    /// The fidelity, at the end.
+    #[must_use]
+    pub fn into_found(self) -> Fidelity {
+        self.found
     }
-    next.for_each(|(_, effect)| meter.effect(effect));
-    Ok(meter.found)
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_sessions::log::Session;
     use std::path::Path;
 
     fn recorded() -> Session {
         let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
         Session::open(&sessions.join("ramp-hold-lab")).unwrap()
-    }
-
-    fn of(found: &Fidelity, step: &str, quantity: &str) -> Achieved {
-        let is_it = |one: &&Achieved| (one.step, one.quantity) == (step, quantity);
-        found
-            .targets
-            .iter()
-            .find(is_it)
-            .cloned()
-            .unwrap_or_else(|| panic!("{found:?}"))
-    }
-
-    #[test]
-    fn a_sound_run_met_its_targets() {
-        let session = recorded();
-        let found = of_session(&session).unwrap();
-        assert_eq!(found.samples, session.rows.len() as u64);
-        assert_eq!(
-            (found.dropped, found.late, found.missed().count()),
-            (0, 0, 0)
-        );
-        for quantity in ["speed", "speed by pulses", "depth"] {
-            of(&found, "ramp", quantity);
-        }
-        // The hold is exact to the sample.
-        let hold = of(&found, "hold", "duration");
-        assert!((hold.achieved - hold.target).abs() < 1e-9, "{hold:?}");
-        let last = session.rows.last().unwrap().host.seconds().0;
-        assert!((found.time_use.total_s() - last).abs() < 1e-6);
     }
 
     #[test]
@@ -374,43 +362,5 @@ mod tests {
             [100, 149, 200].map(|ticks| missing(100.0, ticks)),
             [0, 0, 1]
         );
-    }
-
-    #[test]
-    fn what_is_missing_late_or_short_is_found() {
-        let mut session = recorded();
-        let phase = |phase| move |row: &Row| row.phase == phase;
-        let ramp = session.rows.iter().position(phase(Phase::Ramp)).unwrap();
-        let hold = session.rows.iter().position(phase(Phase::Hold)).unwrap();
-        let depth = of(&of_session(&session).unwrap(), "ramp", "depth").achieved;
-        // 50 ms late, and on time again at the next sample.
-        session.rows[hold + 100].host.0 += 50_000_000;
-        // A speed that is 3 % low, so the ramp ends short.
-        for row in &mut session.rows[ramp..hold] {
-            row.depth = row.depth.map(|depth| 0.97 * depth);
-        }
-        for entry in &mut session.entries {
-            entry.after_sample -= 3 * u64::from(entry.after_sample > hold as u64 + 503);
-        }
-        session.rows.drain(hold + 500..hold + 503);
-        let found = of_session(&session).unwrap();
-        assert_eq!((found.dropped, found.late), (3, 1));
-        // Arrival itself varies by half a millisecond.
-        assert!(
-            (found.late_worst_s - 0.05).abs() < 1e-3,
-            "{}",
-            found.late_worst_s
-        );
-        // A ramp that ends short takes some of its braking for cruise.
-        let speed = of(&found, "ramp", "speed");
-        assert!(
-            !speed.is_within && (speed.error_percent.unwrap() + 3.0).abs() < 0.05,
-            "{speed:?}"
-        );
-        assert!(of(&found, "ramp", "speed by pulses").is_within);
-        let short = of(&found, "ramp", "depth");
-        assert!(!short.is_within && (short.achieved - 0.97 * depth).abs() < 1e-9);
-        // Time goes by the controller's clock, missing samples or not.
-        assert!(of(&found, "hold", "duration").is_within);
     }
 }

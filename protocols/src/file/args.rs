@@ -4,7 +4,8 @@ use super::problem::{Problems, nearest, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
 use super::tree::Table;
-use super::words::{Key, Need, Range};
+use super::words::{Key, KeyNeed, Range};
+use palpate_model::units::{MmPerS, Seconds};
 
 /// Longest time, in s: a day is longer than any specimen lasts.
 const TIME_MAX: f64 = 86_400.0;
@@ -19,11 +20,11 @@ pub(super) const COUNT_MAX: f64 = 10_000.0;
 pub(super) const STEPS_HINT: &str = "write [procedure] on a line above it";
 
 /// Values of keys that were checked.
-pub(super) struct Args(Vec<(&'static str, Given)>);
+pub(crate) struct Args(Vec<(&'static str, Given)>);
 
 impl Args {
     /// Reads the keys of a table. `what` names it in sentences, `besides` are keys that are read elsewhere.
-    pub fn read(
+    pub(super) fn read(
         table: &Table,
         what: &str,
         keys: &[&'static [Key]],
@@ -64,7 +65,9 @@ impl Args {
                 // "none" is as good as no key where a key may be left out.
                 Some(given) if given.what == What::None && key.kind != Kind::Flag => match key.need
                 {
-                    Need::Required if !table.entries.iter().any(|entry| entry.key == "only_if") => {
+                    KeyNeed::Required
+                        if !table.entries.iter().any(|entry| entry.key == "only_if") =>
+                    {
                         problems.error(
                             entry.line,
                             format!(
@@ -81,12 +84,12 @@ impl Args {
             }
         }
         for key in all() {
-            if table.get(key.name).is_some() && !matches!(key.need, Need::Usual(_)) {
+            if table.get(key.name).is_some() && !matches!(key.need, KeyNeed::Usual(_)) {
                 continue;
             }
             match key.need {
-                Need::Required if meant.contains(&key.name) => {}
-                Need::Required => problems.error(
+                KeyNeed::Required if meant.contains(&key.name) => {}
+                KeyNeed::Required => problems.error(
                     table.line,
                     format!(
                         "{what} needs '{}': {}; write {} = {}",
@@ -96,10 +99,10 @@ impl Args {
                         key.kind.example()
                     ),
                 ),
-                Need::Usual(text) if !args.iter().any(|(name, _)| *name == key.name) => {
+                KeyNeed::Usual(text) if !args.iter().any(|(name, _)| *name == key.name) => {
                     args.push((key.name, Given::of_text(text)));
                 }
-                Need::Usual(_) | Need::Optional => {}
+                KeyNeed::Usual(_) | KeyNeed::Optional => {}
             }
         }
         Self(args)
@@ -124,6 +127,14 @@ impl Args {
     pub fn number(&self, key: &str) -> Result<f64, String> {
         self.maybe(key)
             .ok_or_else(|| format!("'{key}' has no value"))
+    }
+
+    pub fn speed(&self, key: &str) -> Result<MmPerS, String> {
+        self.number(key).map(MmPerS)
+    }
+
+    pub fn seconds(&self, key: &str) -> Result<Seconds, String> {
+        self.number(key).map(Seconds)
     }
 
     pub fn count(&self, key: &str) -> Result<u32, String> {

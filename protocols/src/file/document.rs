@@ -79,7 +79,7 @@ pub(super) fn read(text: &str, problems: &mut Problems) -> Option<Protocol> {
         source,
         ask,
         parameters,
-        crc32: palpate_sessions::text::checksum(text),
+        crc32: format!("{:08x}", crc32fast::hash(text.as_bytes())),
         limits: root.get("limits").cloned(),
         monitors: root.get("monitor").cloned(),
         procedure,

@@ -1,6 +1,6 @@
 //! Protocols as files: text in, a [`Protocol`] or every problem with its line out. Nothing here opens a file.
 //!
-//! The language is described in `docs/protocols.md`; its words are the table in `words.rs`. A protocol is read
+//! The language is described in `docs/protocols.md`; the words of a step are in its file in `steps`. A protocol is read
 //! once and written out to a [`Plan`] for the values a technician chose.
 
 mod args;
@@ -18,17 +18,18 @@ pub(crate) mod tree;
 mod watch;
 mod words;
 
+pub(crate) use args::Args;
 pub use builtin::{BUILT_IN, built_in, nearest_built_in};
 pub use check::{Checked, check};
-pub use order::word;
 pub use parameter::Parameter;
 pub use problem::{Problem, Severity};
 pub use quantity::{Given, Kind, What};
 pub use reference::reference;
+pub(crate) use words::Key;
 
 use crate::plans::{Plan, PlanSource};
 use palpate_sessions::Labels;
-use palpate_sessions::about::{KEYS, Key};
+use palpate_sessions::about::{self, KEYS};
 use problem::{Problems, suggestion};
 use scope::Scope;
 use std::collections::BTreeMap;
@@ -179,8 +180,8 @@ impl Protocol {
 
     /// What it asks for and was not told, in the order of [`KEYS`].
     #[must_use]
-    pub fn open_questions(&self, labels: &Labels) -> Vec<&'static Key> {
-        let is_open = |key: &&Key| {
+    pub fn open_questions(&self, labels: &Labels) -> Vec<&'static about::Key> {
+        let is_open = |key: &&about::Key| {
             self.ask.iter().any(|asked| asked == key.name) && !labels.is_told(key.name)
         };
         KEYS.iter().filter(is_open).collect()

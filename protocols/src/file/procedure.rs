@@ -5,8 +5,9 @@ use super::problem::{Problems, suggestion};
 use super::quantity::{Given, Kind, What};
 use super::scope::Scope;
 use super::tree::{Node, Table, Value};
-use super::words::{COMMON, Key, Need, Range, WORDS};
+use super::words::{COMMON, Key};
 use crate::plans::{OnFailure, PlannedStep};
+use crate::steps::{Build, Facts, KINDS};
 
 /// Steps and passes of loops in one plan. A day of steps of ten seconds each.
 pub(super) const STEPS_MAX: usize = 10_000;
@@ -16,42 +17,32 @@ const LOOPS_MAX: usize = 6;
 
 /// Keys of a loop, beside what it runs through.
 pub(super) const LOOP_KEYS: [Key; 5] = [
-    loop_key(
+    Key::optional(
         "as",
         Kind::Text,
         "name for the number of the pass, from 1: `$name` in values, `{name}` in texts",
     ),
-    loop_key(
+    Key::optional(
         "reverse",
         Kind::Flag,
         "`true` runs through the values backwards",
     ),
-    loop_key(
+    Key::optional(
         "cycle",
         Kind::Flag,
         "`true`: each pass is one repeat of the measurement; repeats are numbered 1, 2, 3 through the whole plan",
     ),
-    loop_key(
+    Key::optional(
         "checkpoint",
         Kind::Text,
         "name of a place behind each pass where the run may pause",
     ),
-    loop_key(
+    Key::optional(
         "only_if",
         Kind::Flag,
         "leaves the loop out where this is `false` or `\"none\"`",
     ),
 ];
-
-const fn loop_key(name: &'static str, kind: Kind, about: &'static str) -> Key {
-    Key {
-        name,
-        kind,
-        range: Range::Any,
-        need: Need::Optional,
-        about,
-    }
-}
 
 /// A step with the line it came from.
 pub(super) struct Placed {
@@ -132,7 +123,7 @@ impl Writer<'_> {
     }
 
     fn step(&mut self, table: &Table, cycle: u32) {
-        let known = WORDS.map(|word| word.name);
+        let known: Vec<&str> = kinds().map(|(kind, _)| kind.word).collect();
         let name = match table.get("do").map(|node| &node.value) {
             Some(Value::Text(name)) => name.as_str(),
             _ => {
@@ -142,7 +133,7 @@ impl Writer<'_> {
                 );
             }
         };
-        let Some(word) = WORDS.iter().find(|word| word.name == name) else {
+        let Some((kind, build)) = kinds().find(|(kind, _)| kind.word == name) else {
             return self.problems.error(
                 table.line,
                 format!("there is no step '{name}'; {}", suggestion(name, &known)),
@@ -153,7 +144,7 @@ impl Writer<'_> {
         let args = Args::read(
             table,
             &what,
-            &[word.keys, &COMMON],
+            &[kind.keys, &COMMON],
             &["do"],
             self.scope,
             self.problems,
@@ -166,7 +157,7 @@ impl Writer<'_> {
         if args.is_no("only_if") || self.problems.count() > before {
             return;
         }
-        let built = (word.build)(&args).map_err(|why| format!("{what}: {why}"));
+        let built = build(&args).map_err(|why| format!("{what}: {why}"));
         let (Some(step), Some(on_failure)) = (self.problems.take(table.line, built), on_failure)
         else {
             return;
@@ -340,6 +331,11 @@ impl Writer<'_> {
         }
         false
     }
+}
+
+/// The steps that a protocol can ask for, each with what makes it of its keys.
+fn kinds() -> impl Iterator<Item = (&'static Facts, Build)> {
+    KINDS.iter().filter_map(|kind| Some((*kind, kind.build?)))
 }
 
 fn on_failure(text: &str) -> Result<OnFailure, String> {

@@ -25,6 +25,8 @@ pub enum Kind {
     ForceRate,
     /// In V.
     Voltage,
+    /// In °C.
+    Temperature,
     /// A whole number without a unit.
     Count,
     /// `true` or `false`.
@@ -34,7 +36,7 @@ pub enum Kind {
 }
 
 /// Kinds that have units: name with its article, and the unit numbers are kept in.
-const QUANTITIES: [(Kind, &str, &str); 8] = [
+const QUANTITIES: [(Kind, &str, &str); 9] = [
     (Kind::Speed, "a speed", "mm/s"),
     (Kind::Length, "a length", "mm"),
     (Kind::Force, "a force", "N"),
@@ -43,6 +45,7 @@ const QUANTITIES: [(Kind, &str, &str); 8] = [
     (Kind::Frequency, "a frequency", "Hz"),
     (Kind::ForceRate, "a force over time", "N/s"),
     (Kind::Voltage, "a voltage", "V"),
+    (Kind::Temperature, "a temperature", "°C"),
 ];
 
 impl Kind {
@@ -85,6 +88,7 @@ impl Kind {
             Self::Frequency => "\"0.5 Hz\"",
             Self::ForceRate => "\"0.01 N/min\"",
             Self::Voltage => "\"1.8 V\"",
+            Self::Temperature => "\"37 °C\"",
             Self::Count => "10",
             Self::Flag => "true",
             Self::Text => "\"words\"",

@@ -3,8 +3,8 @@
 use super::procedure::LOOP_KEYS;
 use super::quantity::Kind;
 use super::watch::MONITOR_KEYS;
-use super::words::{COMMON, Key, Need, WORDS};
-use crate::plans::FindContact;
+use super::words::{COMMON, Key, KeyNeed};
+use crate::steps::KINDS;
 use palpate_sessions::about::KEYS;
 use std::fmt::Write;
 
@@ -12,15 +12,15 @@ use std::fmt::Write;
 #[must_use]
 pub fn reference() -> String {
     let mut text = String::new();
-    for word in &WORDS {
+    for kind in KINDS.iter().filter(|kind| kind.build.is_some()) {
         section(
             &mut text,
-            &format!("`{}`", word.name),
-            word.about,
-            word.keys,
+            &format!("`{}`", kind.word),
+            kind.about,
+            kind.keys,
         );
-        if word.name == "find-contact" {
-            text.push_str(&usual_search());
+        if let Some(note) = kind.note {
+            text.push_str(&note());
         }
     }
     section(
@@ -43,6 +43,7 @@ pub fn reference() -> String {
         Kind::Frequency,
         Kind::ForceRate,
         Kind::Voltage,
+        Kind::Temperature,
     ] {
         let units = kind.units().join(", ");
         let _ = writeln!(
@@ -58,25 +59,6 @@ pub fn reference() -> String {
     text
 }
 
-/// What a search for contact does without keys.
-fn usual_search() -> String {
-    let search = FindContact::default();
-    let press = search.press.map_or("no press".to_owned(), |press| {
-        format!("a press to {} and a dwell of {}", press.force, press.dwell)
-    });
-    format!(
-        "Without keys: a first pass at {}, felt at {}, {press}, a retreat of {} mm, a second pass at {} to {}, a \
-         recovery of {}, a standard error of {} mm at most.\n\n",
-        search.approach_speed,
-        search.criterion,
-        search.retreat_mm,
-        search.pass_speed,
-        search.pass_force,
-        search.recovery,
-        search.std_error_mm_max
-    )
-}
-
 fn section(text: &mut String, title: &str, about: &str, keys: &[Key]) {
     // Writing to a string does not fail.
     let _ = writeln!(
@@ -85,9 +67,9 @@ fn section(text: &mut String, title: &str, about: &str, keys: &[Key]) {
     );
     for key in keys {
         let without = match key.need {
-            Need::Required => "needed".to_owned(),
-            Need::Optional => String::new(),
-            Need::Usual(usual) => format!("`{usual}`"),
+            KeyNeed::Required => "needed".to_owned(),
+            KeyNeed::Optional => String::new(),
+            KeyNeed::Usual(usual) => format!("`{usual}`"),
         };
         let kind = key.kind.name();
         let kind = kind.strip_prefix("a ").unwrap_or(kind);

@@ -5,25 +5,21 @@ use super::problem::{Problem, Problems};
 use super::quantity::Kind;
 use super::scope::Scope;
 use super::tree::{Node, Table, Value};
-use super::words::{Key, Need, Range};
+use super::words::{Key, Range};
 use crate::plans::{Action, Monitor, PlanLimits, Side, Source};
 use palpate_model::units::{Newtons, Position, Seconds};
 
 const LIMIT_KEYS: [Key; 2] = [
-    Key {
-        name: "force_max",
-        kind: Kind::Force,
-        range: Range::Above0,
-        need: Need::Optional,
-        about: "highest force above tare; the rig's own limit holds too",
-    },
-    Key {
-        name: "travel_max",
-        kind: Kind::Length,
-        range: Range::Above0,
-        need: Need::Optional,
-        about: "furthest position from home, such as a little before the base; the rig's own end holds too",
-    },
+    Key::optional(
+        "force_max",
+        Kind::Force,
+        "highest force above tare; the rig's own limit holds too",
+    ),
+    Key::optional(
+        "travel_max",
+        Kind::Length,
+        "furthest position from home, such as a little before the base; the rig's own end holds too",
+    ),
 ];
 
 /// The limits of a plan for given values.
@@ -50,16 +46,6 @@ pub(super) fn limits(node: Option<&Node>, scope: &Scope, problems: &mut Problems
     }
 }
 
-const fn monitor_key(name: &'static str, range: Range, need: Need, about: &'static str) -> Key {
-    Key {
-        name,
-        kind: Kind::Text,
-        range,
-        need,
-        about,
-    }
-}
-
 /// What a monitor can look at, with its kind.
 const SOURCES: [(&str, Source, Kind); 4] = [
     ("force", Source::Force, Kind::Force),
@@ -78,31 +64,26 @@ const ACTIONS: [(&str, Action); 5] = [
 
 /// Keys of a monitor beside the values, whose unit depends on what is watched.
 pub(super) const MONITOR_KEYS: [Key; 4] = [
-    monitor_key(
+    Key::needed(
         "watch",
-        Range::OneOf(&["force", "depth", "signal", "position"]),
-        Need::Required,
+        Kind::Text,
         "`force`, `depth`, `signal` or `position`",
-    ),
-    Key {
-        name: "settle",
-        kind: Kind::Time,
-        range: Range::From0,
-        need: Need::Usual("1 s"),
-        about: "how long it must be past before a paused run goes on",
-    },
-    monitor_key(
+    )
+    .one_of(&["force", "depth", "signal", "position"]),
+    Key::usual(
+        "settle",
+        Kind::Time,
+        "1 s",
+        "how long it must be past before a paused run goes on",
+    )
+    .from_0(),
+    Key::needed(
         "action",
-        Range::OneOf(&["note", "pause", "stop", "retract", "halt"]),
-        Need::Required,
+        Kind::Text,
         "`note`, `pause`, `stop`, `retract` or `halt`",
-    ),
-    monitor_key(
-        "message",
-        Range::Any,
-        Need::Required,
-        "what the operator reads",
-    ),
+    )
+    .one_of(&["note", "pause", "stop", "retract", "halt"]),
+    Key::needed("message", Kind::Text, "what the operator reads"),
 ];
 
 /// The monitors of a plan for given values.

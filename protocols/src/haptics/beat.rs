@@ -3,7 +3,7 @@
 use super::timing::{Kept, Timing};
 use crate::runner::Metronome;
 use palpate_drivers::priority::{Granted, ask};
-use palpate_model::haptics::Period;
+use palpate_haptics::Period;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};

@@ -1,8 +1,8 @@
 //! The simulated device with a hand that is led from outside, and the trail of what was felt.
 
 use super::{Simulated, Ticking};
-use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
-use palpate_model::haptics::{Flags, MasterSlaveError, Period};
+use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
+use palpate_haptics::{Flags, MasterSlaveError, Period};
 use palpate_model::units::{MmPerS, Seconds};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
@@ -173,7 +173,7 @@ impl Ticking for Led {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::haptics::rig::{Hand, HandPath};
+    use palpate_haptics::rig::{Hand, HandPath};
     use palpate_model::viscoelastic::ModifiedKelvin;
 
     fn led() -> Led {

@@ -1,6 +1,6 @@
 //! The haptic loop: a thread that ticks at a fixed period, and how well it keeps to it.
 //!
-//! What happens in a tick is pure and lives in `palpate_model::haptics`; here are the thread ([`Beat`]), its
+//! What happens in a tick is pure and lives in `palpate_haptics`; here are the thread ([`Beat`]), its
 //! priority ([`priority`]) and its measured times ([`timing`]). A tick neither allocates nor locks nor waits;
 //! what others see of it is handed over by a triple buffer, of which the tick always has a part of its own.
 

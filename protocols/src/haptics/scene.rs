@@ -2,11 +2,11 @@
 
 use super::timing::Kept;
 use super::{Beat, Stylus, Ticking};
-use palpate_drivers::haptic::HapticDevice;
 use palpate_drivers::priority::Granted;
-use palpate_model::haptics::Period;
-use palpate_model::scene::{Hand6, Pose, Scene, ScenePath, SceneTick};
-use palpate_model::surface::{HeightField, Rect};
+use palpate_haptics::Period;
+use palpate_haptics::device::HapticDevice;
+use palpate_haptics::scene::{Hand6, Pose, Scene, ScenePath, SceneTick};
+use palpate_haptics::surface::{HeightField, Rect};
 use palpate_sessions::ticks::{Recorded, Recorder, Row};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};

@@ -1,11 +1,11 @@
 //! Scene files: which tissue, mesh, device, loop and tolerances a scene has, as TOML.
 
 use palpate_drivers::rig_file::fields::{Fields, Mistake, in_words};
-use palpate_model::haptics::Period;
-use palpate_model::integrators::Scheme;
-use palpate_model::scene::{DeviceSettings, Scene, SceneSettings};
-use palpate_model::surface::{Cut, Method};
+use palpate_haptics::Period;
+use palpate_haptics::scene::{DeviceSettings, Scene, SceneSettings};
+use palpate_haptics::surface::{Cut, Method};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::integrators::Scheme;
 use std::fmt::Write;
 
 /// Longest text of a scene file.

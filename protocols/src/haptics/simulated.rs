@@ -1,8 +1,8 @@
 //! The master-slave system on its simulated device, as a loop ticks it.
 
 use super::Ticking;
-use palpate_model::haptics::MasterSlaveError;
-use palpate_model::haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
+use palpate_haptics::MasterSlaveError;
+use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
 
 /// Ticks of a stall that the device is led through; after longer ones it stands where it was.

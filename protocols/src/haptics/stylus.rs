@@ -1,7 +1,7 @@
 //! The simulated haptic device with a hand on it that a path leads, and then who points.
 
-use palpate_drivers::haptic::HapticDevice;
-use palpate_model::scene::{
+use palpate_haptics::device::HapticDevice;
+use palpate_haptics::scene::{
     DeviceSettings, Hand6, Pose, SceneError, ScenePath, SceneSettings, SimulatedDevice,
 };
 use std::sync::Arc;

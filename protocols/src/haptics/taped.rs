@@ -2,7 +2,7 @@
 //! led from outside.
 
 use super::{Led, Live, Simulated, Ticking};
-use palpate_model::haptics::simulation::SimulationTick;
+use palpate_haptics::simulation::SimulationTick;
 use palpate_sessions::ticks::{Recorder, Row};
 
 /// Columns of a recorded master-slave system: whole numbers, then others.

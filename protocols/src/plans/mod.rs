@@ -5,7 +5,6 @@ pub mod hold_until;
 pub mod monitor;
 pub mod ramp_hold;
 mod slave;
-pub mod step;
 
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position};
@@ -13,14 +12,11 @@ use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fmt::Display;
 
+pub use crate::steps::*;
 pub use hold_rate::HoldRate;
 pub use hold_until::{BodyParameter, HoldUntil};
 pub use monitor::{Action, Monitor, Side, Source};
 pub use ramp_hold::{LEAVE, RampHold, approach};
-pub use step::{
-    FindBase, FindContact, Follow, HoldForce, LoadTo, OnTimeout, Press, Prompt, Settle, Sine, Step,
-    Weigh,
-};
 
 /// A list of steps, run in order by the one interpreter in [`crate::engine`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]

@@ -1,7 +1,9 @@
 //! Ramp and hold: find the tissue, indent at constant speed, hold while the force relaxes, and, if asked,
 //! unload at constant speed.
 
-use super::{FindContact, HoldUntil, Plan, Step};
+use super::{
+    FindContact, Hold, HoldUntil, Home, Plan, Ramp, Retract, SelfTest, Step, Tare, Unload,
+};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use serde::{Deserialize, Serialize};
 
@@ -10,10 +12,10 @@ use serde::{Deserialize, Serialize};
 const UNLOAD_CLEARANCE_MM: f64 = 0.5;
 
 /// The way out of the tissue behind a measurement.
-pub const LEAVE: Step = Step::Retract {
+pub const LEAVE: Step = Step::Retract(Retract {
     speed: MmPerS(6.0),
     clearance_mm: 10.0,
-};
+});
 
 /// Whole mains cycles, and long enough to tell a drift of 0.04 mV/s.
 pub(super) const TARE: Seconds = Seconds(4.0);
@@ -22,15 +24,17 @@ pub(super) const TARE: Seconds = Seconds(4.0);
 #[must_use]
 pub fn approach(tare: Seconds, contact: FindContact) -> Vec<Step> {
     vec![
-        Step::SelfTest {
+        SelfTest {
             duration: Seconds(0.5),
-        },
-        Step::Home {
+        }
+        .into(),
+        Home {
             speed: MmPerS(9.0),
             touch_speed: MmPerS(0.3),
-        },
-        Step::Tare { duration: tare },
-        Step::FindContact(contact),
+        }
+        .into(),
+        Tare { duration: tare }.into(),
+        contact.into(),
     ]
 }
 
@@ -70,19 +74,22 @@ impl RampHold {
     pub fn plan(&self) -> Plan {
         let mut steps = approach(TARE, FindContact::default());
         steps.extend([
-            Step::Ramp {
+            Ramp {
                 speed: self.speed,
                 depth: self.depth,
-            },
-            Step::Hold {
-                duration: self.hold,
+            }
+            .into(),
+            Hold {
                 until: self.until,
-                rate: None,
-            },
+                ..Hold::of(self.hold)
+            }
+            .into(),
         ]);
-        steps.extend(self.unload.map(|speed| Step::Unload {
-            speed,
-            clearance_mm: UNLOAD_CLEARANCE_MM,
+        steps.extend(self.unload.map(|speed| {
+            Step::Unload(Unload {
+                speed,
+                clearance_mm: UNLOAD_CLEARANCE_MM,
+            })
         }));
         steps.push(LEAVE);
         Plan::of("ramp-hold", 1, steps)

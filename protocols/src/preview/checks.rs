@@ -1,59 +1,26 @@
 //! What a step must be to run at all, each with the sentence of its refusal.
 
 use super::walk::Walk;
-use crate::engine::{NOT_TARED, outside_travel};
-use crate::fidelity::FORCE_FLOOR;
-use crate::plans::{HoldUntil, Press};
+use crate::engine::outside_travel;
+use crate::steps::FORCE_FLOOR;
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
 
-/// Contact finding never exerts more than 0.5 N; filter and brake need a sixth of it.
-const PRESS_MAX: Newtons = Newtons(0.42);
-
 impl Walk<'_> {
-    pub(super) fn check_press(&mut self, press: &Press) {
-        self.check_span(press.dwell);
-        let most = self.limits.force_max;
-        if !(press.force.0 > 0.0 && press.force <= PRESS_MAX) {
-            self.refusals.push(format!(
-                "finding contact cannot press to {}; give above 0 and up to {PRESS_MAX}",
-                press.force
-            ));
-        } else if press.force >= most {
-            self.refusals.push(format!(
-                "finding contact presses to {}, where the limit of {most} ends every run; allow more force or press less",
-                press.force
-            ));
-        }
-    }
-
-    pub(super) fn check_speed(&mut self, speed: MmPerS) {
+    pub fn check_speed(&mut self, speed: MmPerS) {
         self.refusals.extend(self.rig.check_speed(speed).err());
     }
 
-    pub(super) fn check_tare(&mut self) {
-        if !self.is_tared {
-            self.refusals.push(NOT_TARED.into());
-        }
-    }
-
     /// A way further in by so much ends within the travel, wherever contact is: in front of it home is.
-    pub(super) fn check_travel(&mut self, what: &str, further_mm: f64) {
+    pub fn check_travel(&mut self, what: &str, further_mm: f64) {
         let (travel, end) = (self.limits.travel_max, self.reach.low + further_mm);
-        if self.is_contact_known && end > travel.0 {
+        if self.known.contact && end > travel.0 {
             self.refusals
                 .push(outside_travel(what, Position(end), travel));
         }
     }
 
-    pub(super) fn check_contact(&mut self) {
-        if !self.is_contact_known {
-            self.refusals
-                .push("contact is not known here; put find-contact before it".into());
-        }
-    }
-
     /// Distances and forces of a plan are finite and no larger than any rig.
-    pub(super) fn check_sizes(&mut self, sizes: &[f64]) {
+    pub fn check_sizes(&mut self, sizes: &[f64]) {
         if let Some(size) = sizes
             .iter()
             .find(|size| size.is_nan() || size.abs() > 1000.0)
@@ -63,7 +30,7 @@ impl Walk<'_> {
         }
     }
 
-    pub(super) fn check_force(&mut self, force: Newtons) {
+    pub fn check_force(&mut self, force: Newtons) {
         let most = self.limits.force_max;
         if !(force.0 > 0.0 && force < most) {
             self.refusals.push(format!(
@@ -76,7 +43,7 @@ impl Walk<'_> {
         }
     }
 
-    pub(super) fn check_span(&mut self, span: Seconds) {
+    pub fn check_span(&mut self, span: Seconds) {
         // A day is longer than any specimen lasts and keeps every tick count small.
         if !(span.0 >= 0.0 && span.0 <= 86_400.0) {
             self.refusals.push(format!(
@@ -85,21 +52,7 @@ impl Walk<'_> {
         }
     }
 
-    pub(super) fn check_rule(&mut self, rule: &HoldUntil, duration: Seconds) {
-        match rule.check() {
-            Err(reason) => self.refusals.push(reason),
-            Ok(()) if rule.at_least < duration => self.notes.push(format!(
-                "the hold ends as soon as {rule}, after {:.0} at the earliest",
-                rule.at_least
-            )),
-            Ok(()) => self.notes.push(format!(
-                "the hold is too short to end early: that takes {:.0} at least",
-                rule.at_least
-            )),
-        }
-    }
-
-    pub(super) fn check_depth(&mut self, depth: Depth) {
+    pub fn check_depth(&mut self, depth: Depth) {
         let travel = self.limits.travel_max;
         if depth.0.is_nan() || depth.0 <= 0.0 {
             self.refusals.push(format!(

@@ -50,7 +50,7 @@ impl OutlinePoint {
 }
 
 /// The expected specimen on its way through the plan.
-pub(super) struct Expected {
+pub(crate) struct Expected {
     state: KelvinState,
     /// The probe stands before a stiff base instead of tissue.
     is_base: bool,

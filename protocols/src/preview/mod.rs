@@ -7,14 +7,16 @@ mod walk;
 
 pub use expected::OutlinePoint;
 
+pub(crate) use moves::Reach;
+pub(crate) use walk::{CONTACT_EXPECTED_SHARE, SETTLE_SECS, Span, Walk};
+
 use crate::plans::Plan;
+use crate::steps::Known;
 use expected::Expected;
-use moves::Reach;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::units::{Newtons, Seconds};
 use serde::{Deserialize, Serialize};
-use walk::Walk;
 
 /// Bytes that one sample takes in the session log, raw and derived: 16 measured on the lab profile,
 /// 23 on the ideal one, whose noise fills every digit; rounded up.
@@ -108,9 +110,11 @@ fn walk(
         refusals: Vec::new(),
         notes: Vec::new(),
         expected: Expected::new(has_outline),
-        is_homed,
-        is_contact_known: false,
-        is_tared: false,
+        known: Known {
+            home: is_homed,
+            ..Known::default()
+        },
+        phase: Phase::Idle,
         reach: Reach::at(0.0),
     };
     let steps: Vec<StepPreview> = plan

@@ -1,8 +1,8 @@
 //! How long moves and waits take, and where a move may begin and end.
 
 use super::walk::{Span, Walk};
-use palpate_model::rig::{Phase, Profile};
-use palpate_model::units::{MmPerS, Position, Seconds};
+use palpate_model::rig::Profile;
+use palpate_model::units::{Depth, MmPerS, Position, Seconds};
 
 /// Milliseconds from the sample that begins a move to the first tick of its motion, and from its last tick to the sample
 /// that shows rest: with a tick in each, report 1.0 to 1.5 ms and command 0.5 ms make one, the tick that shows rest the
@@ -14,7 +14,7 @@ const WHOLE: f64 = 1e-6;
 
 /// The depths between which the probe surely is, in mm; both ends the same where its depth is known to the pulse.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Reach {
+pub(crate) struct Reach {
     pub low: f64,
     pub high: f64,
 }
@@ -55,24 +55,24 @@ impl Reach {
 
 impl Walk<'_> {
     /// A move to a depth.
-    pub(super) fn go(&mut self, phase: Phase, depth_mm: f64, speed: MmPerS) -> Span {
-        let end = Reach::to(depth_mm, self.rig.mm_per_pulse);
-        self.go_within(phase, depth_mm, end, speed)
+    pub fn go(&mut self, depth: Depth, speed: MmPerS) -> Span {
+        let end = Reach::to(depth.0, self.rig.mm_per_pulse);
+        self.go_within(depth.0, end, speed)
     }
 
     /// A way out, which never leads further in.
-    pub(super) fn leave(&mut self, phase: Phase, clearance_mm: f64, speed: MmPerS) -> Span {
+    pub fn leave(&mut self, clearance_mm: f64, speed: MmPerS) -> Span {
         let to = Reach::to(-clearance_mm, self.rig.mm_per_pulse);
         let end = Reach {
             low: to.low.min(self.reach.low),
             high: to.high.min(self.reach.high),
         };
         let depth = (-clearance_mm).min(self.expected.depth());
-        self.go_within(phase, depth, end, speed)
+        self.go_within(depth, end, speed)
     }
 
-    fn go_within(&mut self, phase: Phase, depth_mm: f64, end: Reach, speed: MmPerS) -> Span {
-        if !self.refusals.is_empty() {
+    fn go_within(&mut self, depth_mm: f64, end: Reach, speed: MmPerS) -> Span {
+        if self.is_refused() {
             return Span(0.0, 0.0, true);
         }
         let (from, is_exact) = (
@@ -82,25 +82,25 @@ impl Walk<'_> {
         let expected = self.secs(self.move_ticks(depth_mm - self.expected.depth(), speed));
         let furthest = (end.high - from.low).abs().max((end.low - from.high).abs());
         let longest = self.secs(self.move_ticks(furthest, speed));
-        self.expected.go(phase, depth_mm, expected);
+        self.expected.go(self.phase, depth_mm, expected);
         self.reach = end;
         Span(expected, longest.max(expected), is_exact)
     }
 
     /// A wait of so many whole samples.
-    pub(super) fn wait(&mut self, phase: Phase, duration: Seconds) -> Span {
+    pub fn wait(&mut self, duration: Seconds) -> Span {
         let secs = self.secs(self.ticks(duration.0));
-        self.expected.stay(phase, secs);
+        self.expected.stay(self.phase, secs);
         Span(secs, secs, true)
     }
 
     /// Something whose duration only the rig or a person knows.
-    pub(super) fn unknown(&mut self, phase: Phase, expected: f64, longest: f64) -> Span {
-        self.expected.stay(phase, expected);
+    pub fn unknown(&mut self, expected: f64, longest: f64) -> Span {
+        self.expected.stay(self.phase, expected);
         Span(expected, longest, false)
     }
 
-    pub(super) fn move_ticks(&self, distance_mm: f64, speed: MmPerS) -> u64 {
+    pub fn move_ticks(&self, distance_mm: f64, speed: MmPerS) -> u64 {
         match self.ticks(self.move_secs(distance_mm, speed)) {
             0 => 0,
             ticks => ticks + self.answer_ticks(),
@@ -108,30 +108,25 @@ impl Walk<'_> {
     }
 
     /// Ticks beyond those of the motion itself that a move takes, at most.
-    pub(super) fn answer_ticks(&self) -> u64 {
+    pub fn answer_ticks(&self) -> u64 {
         MOVE_MS * u64::from(self.rig.samples_per_ms())
     }
 
     /// Whether a move takes just as many ticks more: those are long enough to hide when a report arrives.
-    pub(super) fn is_answer_exact(&self) -> bool {
+    pub fn is_answer_exact(&self) -> bool {
         self.rig.samples_per_ms() == 1
     }
 
     /// As the engine counts: rounded up, a millionth of a tick forgiven.
-    pub(super) fn ticks(&self, secs: f64) -> u64 {
+    pub fn ticks(&self, secs: f64) -> u64 {
         (secs / self.rig.tick().0 - 1e-6).ceil().max(0.0) as u64
     }
 
-    pub(super) fn secs(&self, ticks: u64) -> f64 {
+    pub fn secs(&self, ticks: u64) -> f64 {
         ticks as f64 * self.rig.tick().0
     }
 
-    pub(super) fn touch_secs(&self, speed: MmPerS, touch_speed: MmPerS) -> f64 {
-        // Back off 2 mm and touch again.
-        self.move_secs(2.0, speed) + self.move_secs(2.0, touch_speed)
-    }
-
-    pub(super) fn move_secs(&self, distance_mm: f64, speed: MmPerS) -> f64 {
+    pub fn move_secs(&self, distance_mm: f64, speed: MmPerS) -> f64 {
         if !(distance_mm.is_finite() && speed.0 > 0.0) {
             return 0.0;
         }

@@ -2,7 +2,7 @@
 
 use super::told::Told;
 use crate::file::{Problem, Protocol};
-use crate::plans::{OnTimeout, Plan, Prompt, Step};
+use crate::plans::{OnTimeout, Plan, Prompt, Rest, Step};
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
 use palpate_sessions::Labels;
@@ -100,13 +100,12 @@ impl Task {
         let mut plan = self.protocol.plan(&self.values).ok()?;
         let mut before = Vec::new();
         if repeat > 1 && self.rest.0 > 0.0 {
-            before.push(Step::Rest {
-                duration: self.rest,
-            });
+            let duration = self.rest;
+            before.push(Rest { duration }.into());
         }
         if remount.is_some() {
             // What broke off may have left the probe in the tissue, and nobody clips in anything under it.
-            let ways_up = |step: &&Step| matches!(step, Step::SelfTest { .. } | Step::Home { .. });
+            let ways_up = |step: &&Step| matches!(step, Step::SelfTest(_) | Step::Home(_));
             before.extend(
                 plan.steps
                     .iter()

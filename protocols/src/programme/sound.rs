@@ -46,7 +46,7 @@ fn unfitted(task: &Task) -> Option<String> {
     }
     let plan = task.plan(1, None)?;
     let is_sine = |step: &Step| matches!(step, Step::Sine(_));
-    let is_way_in = |step: &Step| matches!(step, Step::Ramp { .. } | Step::LoadTo(_));
+    let is_way_in = |step: &Step| matches!(step, Step::Ramp(_) | Step::LoadTo(_));
     if plan.steps.iter().any(|planned| is_sine(&planned.step)) {
         return Some(format!("its protocol {name} follows a sine"));
     }

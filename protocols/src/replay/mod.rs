@@ -6,7 +6,7 @@
 use crate::engine::{self, ENGINE_VERSION, Effect, Input, State};
 use crate::runner::{LiveFeed, to_json};
 use palpate_model::Nanos;
-use palpate_model::fit::LiveEstimate;
+use palpate_model::estimate::LiveEstimate;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{Entry, EntryKind, Row};
 use serde::{Deserialize, Serialize};

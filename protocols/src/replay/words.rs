@@ -1,7 +1,6 @@
 //! Differences in the words of the protocol and its records.
 
 use crate::engine::{Effect, State};
-use crate::file::word;
 use palpate_model::rig::{HandAction, RigCommand};
 use serde_json::Value;
 
@@ -16,7 +15,7 @@ pub(super) fn of_step(state: &State) -> String {
         "step {} of {}, {}",
         index + 1,
         steps.len(),
-        word(&planned.step)
+        planned.step.word()
     );
     match state.cycle() {
         0 => place,

@@ -361,7 +361,14 @@ impl ActiveRun {
         {
             self.log_error = Some(err.to_string());
         }
-        let (verdict, reason) = first_verdict(&outcome, self.fidelity.found());
+        let (mut verdict, mut reason) = first_verdict(&outcome, self.fidelity.found());
+        if let Some(err) = &self.log_error {
+            // Who measured well and kept it badly has nothing that is valid.
+            if verdict == Verdict::Valid {
+                verdict = Verdict::Suspect;
+            }
+            reason = format!("not all of it may be kept: {err}; {reason}");
+        }
         self.record_verdict(verdict, &reason);
         self.verdict = Some((verdict, reason));
     }

@@ -1,10 +1,10 @@
 //! The live fit of a run, fed sample by sample. Should it ever panic, it is off, and nothing else is.
 
 use crate::engine::{Config, State};
-use crate::plans::Step;
-use palpate_model::fit::{LiveEstimate, LiveFit};
+use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_rheology::fit::LiveFit;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -116,14 +116,8 @@ fn words(panic: &(dyn Any + Send)) -> &str {
 
 /// The deepest point of the plan: the scale of the fit's basis.
 fn deepest(config: &Config) -> Depth {
-    let deepest = config
-        .plan
-        .steps
-        .iter()
-        .fold(0.0f64, |deepest, planned| match planned.step {
-            Step::Ramp { depth, .. } => deepest.max(depth.0),
-            Step::LoadTo(load) => deepest.max(load.depth_max.0),
-            _ => deepest,
-        });
+    let depths = config.plan.steps.iter();
+    let depths = depths.filter_map(|planned| planned.step.deepest());
+    let deepest = depths.fold(0.0f64, |deepest, depth| deepest.max(depth.0));
     Depth(if deepest > 0.0 { deepest } else { 1.0 })
 }

@@ -1,5 +1,9 @@
 //! The only loop: wait for time or a request, collect what the rig reports, let the engine
 //! decide, act, publish.
+#![expect(
+    clippy::disallowed_methods,
+    reason = "commands to a rig are sent from here and nowhere else"
+)]
 
 use super::active_run::{ActiveRun, ToRig};
 use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
@@ -271,6 +275,7 @@ impl MainLoop {
             while let Some(event) = self.rig.next_event(limit) {
                 self.now = event.at;
                 self.on_event(event.body);
+                self.feed_sensors();
             }
             self.now = limit;
             if limit == self.next_tick {
@@ -278,6 +283,14 @@ impl MainLoop {
                 if !std::mem::take(&mut self.is_sample_seen) {
                     self.feed(Input::Tick);
                 }
+            }
+        }
+    }
+
+    fn feed_sensors(&mut self) {
+        for value in self.rig.take_sensors() {
+            if value.is_possible() {
+                self.feed(Input::Sensor { value });
             }
         }
     }

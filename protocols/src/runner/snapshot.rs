@@ -1,12 +1,12 @@
 //! What the runner shows the world: one immutable value, swapped as a whole.
 
 use crate::base::FoundBase;
-use crate::engine::{Contact, Derived, Outcome, PauseView, Power, Tare};
+use crate::engine::{Contact, Derived, Outcome, PauseView, Power, UnloadedSignal};
 use crate::preview::StepPreview;
 use crate::weighed::Weighed;
 use palpate_model::Nanos;
 use palpate_model::calibration::SettlingNow;
-use palpate_model::fit::LiveEstimate;
+use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Newtons, Position, Seconds};
@@ -75,7 +75,7 @@ pub struct RunView {
     /// Newest derived values.
     pub derived: Derived,
     /// The unloaded signal.
-    pub tare: Option<Tare>,
+    pub tare: Option<UnloadedSignal>,
     /// Where the tissue begins.
     pub contact: Option<Contact>,
     /// The base behind it and the thickness between, once found.

@@ -11,7 +11,7 @@ use arc_swap::ArcSwap;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
-use palpate_model::fit::LiveEstimate;
+use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_sessions::health::{Told, Why};

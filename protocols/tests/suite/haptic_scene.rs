@@ -1,8 +1,8 @@
 //! The scene as a loop: a tick allocates nothing, frames are the surface, and a recording is computed again bit by bit.
 
-use palpate_drivers::haptic::HapticDevice;
-use palpate_model::haptics::Period;
-use palpate_model::scene::{
+use palpate_haptics::Period;
+use palpate_haptics::device::HapticDevice;
+use palpate_haptics::scene::{
     DeviceSettings, Hand6, LedScene, Pose, Scene, ScenePath, SceneSettings,
 };
 use palpate_protocols::haptics::scene::{
@@ -12,6 +12,7 @@ use palpate_protocols::haptics::scene::{
 use palpate_protocols::haptics::scene_file::SceneFile;
 use palpate_protocols::haptics::{SceneLoop, Stylus, Ticking};
 use palpate_sessions::ticks::{End, Recording};
+use palpate_test_support::wait::until;
 
 fn scene(settings: SceneSettings) -> Scene {
     Scene::new(settings).expect("a scene")
@@ -111,13 +112,10 @@ fn a_recorded_loop_is_computed_again_bit_by_bit() {
         at: [20.0, 30.0, 5.0],
         turn: [0.0; 3],
     });
-    for _ in 0..1000 {
-        if (live.view().tick.device[0] - 20.0).abs() < 1.0 {
-            break;
-        }
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
-    assert!((live.view().tick.device[0] - 20.0).abs() < 1.0);
+    until(
+        || ((live.view().tick.device[0] - 20.0).abs() < 1.0).then_some(()),
+        || "the device where the pointer is".into(),
+    );
     let end = live.stop().unwrap();
     assert!(end.kept.work.count > 100);
     let told = end.recorded.unwrap().unwrap();
@@ -274,9 +272,10 @@ fn a_recording_of_another_device_is_computed_again_from_where_it_was_sensed() {
     let (device, _given) = Scripted::new(pressed);
     let mut live = SceneLoop::on(device, scene(settings), Some(recorder)).unwrap();
     assert!(live.is_over());
-    while live.view().tick.tick < 1200 {
-        std::thread::sleep(std::time::Duration::from_millis(5));
-    }
+    until(
+        || (live.view().tick.tick >= 1200).then_some(()),
+        || "1200 ticks".into(),
+    );
     let end = live.stop().unwrap();
     let found = Recording::read(&folder, SENSED_COLUMNS).unwrap();
     let mut again = scene(settings);

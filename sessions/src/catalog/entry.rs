@@ -2,6 +2,7 @@
 
 use super::walk::Place;
 use crate::analyses::{Analysed, Analyses};
+use crate::chain::Head;
 use crate::edits::{Edits, Review, Verdict};
 use crate::log::Summary;
 use crate::manifest::Manifest;
@@ -73,6 +74,17 @@ pub struct Entry {
     pub words: Vec<String>,
     /// Why it cannot be read, or not all of it.
     pub trouble: Option<String>,
+    /// How far its edits and its analyses go, or went when there were most: what confirms that none was taken away.
+    pub heads: Heads,
+}
+
+/// How far the files of lines beside a log go.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct Heads {
+    /// Its edits.
+    pub edits: Head,
+    /// Its analyses.
+    pub analyses: Head,
 }
 
 /// An analysis of a session.
@@ -144,10 +156,12 @@ pub struct Named {
 }
 
 impl Entry {
-    /// Reads a session. One that cannot be read has its reason in `trouble`.
-    pub(super) fn read(place: &Place) -> Self {
+    /// Reads a session. One that cannot be read has its reason in `trouble`, as has one that lacks what `former`, the
+    /// entry of the same folder, had seen of it.
+    pub(super) fn read(place: &Place, former: Option<&Self>) -> Self {
         let mut entry = Self {
             folder: place.name.clone(),
+            heads: former.map(|former| former.heads).unwrap_or_default(),
             ..Self::default()
         };
         match Summary::read(&place.path) {
@@ -160,16 +174,28 @@ impl Entry {
                 return entry;
             }
         }
-        let analyses = Analyses::read(&place.path, &entry.session_id);
+        let id = &entry.session_id;
+        if former.is_some_and(|former| former.session_id != *id) {
+            entry.heads = Heads::default();
+        }
+        let heads = entry.heads;
+        let edits = Edits::read_since(&place.path, id, heads.edits);
+        let analyses = Analyses::read_since(&place.path, id, heads.analyses);
+        let mut trouble = Vec::new();
         let analyses = analyses.unwrap_or_else(|err| {
-            entry.trouble = Some(err.to_string());
-            Analyses::default()
+            trouble.push(err.to_string());
+            Analyses {
+                head: heads.analyses,
+                ..Analyses::default()
+            }
         });
-        match Edits::read(&place.path, &entry.session_id) {
+        entry.heads.analyses = analyses.head;
+        match edits {
             Ok(edits) => entry.take_edits(&edits, &analyses),
-            Err(err) => entry.trouble = Some(err.to_string()),
+            Err(err) => trouble.push(err.to_string()),
         }
         entry.take_analyses(&analyses);
+        entry.trouble = (!trouble.is_empty()).then(|| trouble.join("; "));
         entry
     }
 
@@ -249,6 +275,7 @@ impl Entry {
     }
 
     fn take_edits(&mut self, edits: &Edits, analyses: &Analyses) {
+        self.heads.edits = edits.head;
         if let Some((verdict, edit)) = edits.verdict() {
             self.verdict = Some(verdict);
             self.verdict_reason.clone_from(&edit.reason);

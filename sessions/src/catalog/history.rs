@@ -72,12 +72,11 @@ impl Catalog {
                 by: entry.operator.clone(),
                 sentence: format!("{}, {:.1} s, {ending}", entry.protocol, entry.duration_s),
             });
-            match Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
-                Ok(edits) => {
-                    events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)))
-                }
-                Err(err) => remarks.push(err.to_string()),
+            // What of it cannot be read, its edits among them, is in the entry.
+            if let Ok(edits) = Edits::read(&self.library.join(&entry.folder), &entry.session_id) {
+                events.extend(edits.all.iter().map(|one| Event::said(&entry.folder, one)));
             }
+            remarks.extend(entry.trouble);
             events.extend(
                 entry
                     .analyses

@@ -17,12 +17,13 @@ mod update;
 mod walk;
 
 pub use condition::{Condition, ConditionError};
-pub use entry::{Entry, Made, Named, Origin, Source};
+pub use entry::{Entry, Heads, Made, Named, Origin, Source};
 pub use history::{Event, Subject};
 pub use search::{Choices, Found, Order, Query, ReviewIs, VerdictIs};
 pub use typed::{DayError, beginning, ending, words_and_conditions};
 pub use update::{Changes, Doubt};
 
+use crate::lock::{Busy, NotLocked, holder_of, lock_soon};
 use rusqlite::{Connection, ErrorCode};
 use std::fs;
 use std::io;
@@ -35,7 +36,7 @@ pub const CATALOG_FILE: &str = "catalog.sqlite";
 /// Held for the moment in which a catalog is opened or replaced.
 const GATE_FILE: &str = "catalog.lock";
 /// Longest wait for another process that writes: it writes in pieces of a fraction of a second.
-const PATIENCE: Duration = Duration::from_secs(10);
+const PATIENCE: Duration = Duration::from_secs(5);
 
 /// The catalog could not be made or read.
 #[derive(Debug, Error)]
@@ -51,12 +52,9 @@ pub enum CatalogError {
         /// What the system said.
         source: io::Error,
     },
-    /// Another process writes and does not end.
-    #[error("the catalog is in use by another process, {}; try again when that has ended", path.display())]
-    Busy {
-        /// The file.
-        path: PathBuf,
-    },
+    /// Another process has locked it and does not let go.
+    #[error("the catalog cannot be used: {0}")]
+    Busy(Busy),
     /// SQLite refused.
     #[error("the catalog cannot be used ({source}), {}; delete the file, it is made anew from the sessions", path.display())]
     Sql {
@@ -71,7 +69,11 @@ impl CatalogError {
     fn of(path: &Path, source: rusqlite::Error) -> Self {
         let path = path.to_owned();
         match source.sqlite_error_code() {
-            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => Self::Busy { path },
+            Some(ErrorCode::DatabaseBusy | ErrorCode::DatabaseLocked) => {
+                // SQLite locks the file itself, or those beside it.
+                let holder = parts(&path).iter().find_map(|part| holder_of(part));
+                Self::Busy(Busy { path, holder })
+            }
             _ => Self::Sql { path, source },
         }
     }
@@ -232,23 +234,28 @@ fn open_new(path: &Path) -> Result<Connection, CatalogError> {
     match open_file(path)? {
         Opened::Ours(db) => Ok(db),
         // Nobody else can have made one: the gate is ours.
-        Opened::OtherVersion | Opened::Foreign => Err(CatalogError::Busy { path: path.into() }),
+        Opened::OtherVersion | Opened::Foreign => Err(CatalogError::Busy(Busy::of(path))),
     }
 }
 
 /// One process at a time opens or replaces the file. The system lets go when the process dies.
 fn gate(library: &Path) -> Result<fs::File, CatalogError> {
     let path = library.join(GATE_FILE);
+    let failed = |source| CatalogError::Io {
+        what: "opened",
+        path: path.clone(),
+        source,
+    };
     let mut options = fs::OpenOptions::new();
     let options = options.write(true).create(true).truncate(false);
-    fs::create_dir_all(library)
+    let file = fs::create_dir_all(library)
         .and_then(|()| options.open(&path))
-        .and_then(|file| file.lock().map(|()| file))
-        .map_err(|source| CatalogError::Io {
-            what: "opened",
-            path,
-            source,
-        })
+        .map_err(failed)?;
+    match lock_soon(&file, &path) {
+        Ok(()) => Ok(file),
+        Err(NotLocked::Busy(busy)) => Err(CatalogError::Busy(busy)),
+        Err(NotLocked::Io(source)) => Err(failed(source)),
+    }
 }
 
 /// A catalog and the two files that SQLite keeps beside it.

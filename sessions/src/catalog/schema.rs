@@ -5,7 +5,7 @@ use rusqlite::{Connection, TransactionBehavior};
 /// Marks the file as ours: "palp".
 pub(super) const APPLICATION: i64 = 0x7061_6c70;
 /// Version of the tables and of what stands in them. Another one is replaced.
-pub(super) const VERSION: i64 = 6;
+pub(super) const VERSION: i64 = 7;
 
 /// `entry` has all that is known of a session, as JSON, with its own checksum, for SQLite has none; the other
 /// columns are what is searched.

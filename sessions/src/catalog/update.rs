@@ -77,7 +77,8 @@ impl Catalog {
                 if flow.is_break() {
                     break;
                 }
-                entries.push((*place, Entry::read(place)));
+                let former = self.entry(&place.name)?;
+                entries.push((*place, Entry::read(place, former.as_ref())));
                 done += 1;
                 flow = progress(done, new.len());
             }
@@ -122,7 +123,7 @@ impl Catalog {
             progress(done, places.len());
             let sentence = match known.remove(&place.name) {
                 None => "the session is not in the catalog",
-                Some(entry) if entry != Entry::read(place) => {
+                Some(entry) if entry != Entry::read(place, Some(&entry)) => {
                     "the session has changed since the catalog read it"
                 }
                 Some(_) => continue,
@@ -146,6 +147,16 @@ impl Catalog {
             let mut statement = self.db.prepare_cached(sql)?;
             let rows = statement.query_map([], entry_of)?;
             rows.collect()
+        };
+        read().map_err(self.failed())
+    }
+
+    /// The entry of a folder, if there is one.
+    fn entry(&self, folder: &str) -> Result<Option<Entry>, CatalogError> {
+        let read = || {
+            let sql = "SELECT entry, checksum FROM session WHERE folder = ?";
+            let mut statement = self.db.prepare_cached(sql)?;
+            statement.query_row([folder], entry_of).optional()
         };
         read().map_err(self.failed())
     }

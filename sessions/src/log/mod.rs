@@ -1,7 +1,11 @@
 //! The session log: an append-only writer, its thread, and a strict reader.
 
 pub(crate) mod content;
+mod error;
+pub(crate) mod files;
 pub(crate) mod frames;
+mod json;
+mod news;
 pub mod reader;
 mod scribe;
 mod segment;
@@ -13,8 +17,10 @@ pub(crate) mod walk;
 pub mod writer;
 
 pub use content::Part;
+pub use error::LogError;
+pub use news::{News, Notice};
 pub use reader::{Beside, Outline, ReadError, Session};
-pub use sink::{FileSink, FolderSegments, SegmentSource, Sink};
+pub use sink::{Alteration, ClosedCheck, FileSink, FolderSegments, SegmentSource, Sink};
 pub use summary::Summary;
-pub use thread::{Notice, Pace, SessionWriter};
-pub use writer::{BATCHES_PER_SEGMENT, LogError, LogWriter, Parts};
+pub use thread::{Pace, SessionWriter};
+pub use writer::{BATCHES_PER_SEGMENT, LogWriter, Parts};

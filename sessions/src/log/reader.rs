@@ -8,16 +8,16 @@
 //! numbers, message numbers and entries must go on where the segment before stopped.
 
 use super::content::{Content, Part, Refusal};
+use super::files::{absent_spare, away, check_files, find_files};
 use super::frames::ChunkReader;
 use super::source::Source;
 use super::walk::walk;
-use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
+use crate::folder::LOG_FILE;
 use crate::health::HealthSummary;
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::record::{Block, EndRecord, Entry, Row};
 use palpate_model::Nanos;
-use std::collections::BTreeMap;
-use std::io::{self, Read};
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -188,88 +188,6 @@ impl Session {
     }
 }
 
-/// With more missing segments than that, what is behind them is not looked at: a name alone must not
-/// ask for endless work.
-const MISSING_MAX: usize = 1000;
-
-/// The files to read.
-pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
-    if !path.exists() {
-        return Err(ReadError::Missing { path: path.into() });
-    }
-    if !path.is_dir() {
-        return Ok(vec![path.into()]);
-    }
-    let failed = |source| ReadError::Io {
-        path: path.into(),
-        source,
-    };
-    let mut found = BTreeMap::new();
-    let mut add = |folder: &Path| -> io::Result<()> {
-        for item in std::fs::read_dir(folder)? {
-            let name = item?.file_name();
-            if let Some(number) = name.to_str().and_then(segment_number) {
-                found.entry(number).or_insert(folder.join(name));
-            }
-        }
-        Ok(())
-    };
-    add(path).map_err(failed)?;
-    // If it is not there, neither is its disk: see `absent_spare`.
-    if let Some(spare) = spare_of(path).filter(|spare| spare.is_dir()) {
-        add(&spare).map_err(failed)?;
-    }
-    // A missing one is listed too: it will be looked for and not found.
-    let last = found.last_key_value().map_or(0, |(number, _)| *number);
-    let many = last as usize > found.len() + MISSING_MAX;
-    let last = if many { found.len() as u32 } else { last };
-    Ok((0..=last)
-        .map(|number| {
-            let own = || path.join(segment_file(number));
-            found.remove(&number).unwrap_or_else(own)
-        })
-        .collect())
-}
-
-/// The other folder that segments of a session may be in.
-fn spare_of(path: &Path) -> Option<PathBuf> {
-    let pointer = path.join(SPARE_FILE);
-    // Whatever somebody put there in place of the file is neither waited for nor read without end.
-    if !std::fs::symlink_metadata(&pointer).ok()?.is_file() {
-        return None;
-    }
-    let mut spare = String::new();
-    let mut file = std::fs::File::open(pointer).ok()?.take(SPARE_BYTES_MAX);
-    file.read_to_string(&mut spare).ok()?;
-    (!spare.is_empty()).then(|| spare.into())
-}
-
-/// The longest path that Linux takes (`PATH_MAX`).
-const SPARE_BYTES_MAX: u64 = 4096;
-
-/// The folder that segments may be in and that is not there, as on a disk that is not connected. The writer makes
-/// it before the log.
-pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
-    spare_of(path).filter(|spare| !spare.is_dir())
-}
-
-/// What to say of such a folder.
-pub(crate) fn away(spare: &Path) -> String {
-    let spare = spare.display();
-    format!("a part of it may be in {spare}, which is not there; connect that disk")
-}
-
-/// Refuses a folder without a log.
-pub(crate) fn check_files(path: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
-    if files[0].is_file() || (files.len() > 1 && path.is_dir()) {
-        return Ok(());
-    }
-    Err(ReadError::NotASession {
-        path: path.into(),
-        reason: format!("it holds no {LOG_FILE}"),
-    })
-}
-
 /// What a segment adds to the session.
 enum Outcome {
     /// The next segment goes on from here.
@@ -333,7 +251,7 @@ impl<'v> Reader<'v> {
         let files = std::mem::take(&mut self.files);
         let mut damage = None;
         for (number, file) in files.iter().enumerate() {
-            match self.read_file(file, number == 0)? {
+            match self.read_file(file, number == 0, files.len() == 1)? {
                 Ok(Outcome::GoOn) => {}
                 Ok(Outcome::Nothing) => {
                     let name = name_of(file);
@@ -430,6 +348,7 @@ impl<'v> Reader<'v> {
         &mut self,
         path: &Path,
         is_first: bool,
+        is_alone: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
         let damage = |offset: u64, reason: &str| Damage {
             path: path.into(),
@@ -450,14 +369,15 @@ impl<'v> Reader<'v> {
         }
         let source = Source::open(path).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
-        if is_first {
+        if is_first && is_alone {
             check_beginning(path, &source, is_ours)?;
-        } else if source.is_barely_begun().map_err(failed)? {
+        } else if is_first && !is_ours {
+            return Ok(Err(damage(0, NO_BEGINNING)));
+        } else if !is_first && source.is_barely_begun().map_err(failed)? {
             // What should be in it shows as missing in the next, if anything follows.
             return Ok(Ok(Outcome::Nothing));
         } else if !is_ours {
-            self.broken_off
-                .push(damage(0, "it does not begin like a segment"));
+            self.broken_off.push(damage(0, NO_BEGINNING));
             return Ok(Ok(Outcome::GoOn));
         }
         let had_end = self.content.end.is_some();
@@ -505,7 +425,9 @@ impl<'v> Reader<'v> {
         if let Some(name) = self.unfinished.take() {
             self.notes.push(if is_rewrite {
                 let name_here = name_of(path);
-                format!("the disk failed while {name} was written; {name_here} holds what it may have lost")
+                format!(
+                    "{name} failed while it was written; {name_here} holds what it may have lost"
+                )
             } else {
                 format!("{name} was not finished; the next segment goes on where it stops")
             });
@@ -522,6 +444,7 @@ const NO_INDEX: &str = "the index at the end is missing; all samples and entries
 const LATER_PART: &str =
     "this is a later part of a recording; open the session's folder for what came before";
 
+pub(crate) const NO_BEGINNING: &str = "it does not begin like a segment";
 pub(crate) const NOT_BEGUN: &str =
     "the recording was interrupted before it began, or its beginning is lost";
 

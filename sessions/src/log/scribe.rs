@@ -1,8 +1,10 @@
 //! The thread's part of the session writer: batches to the disk, and what to do when that fails.
 
+use super::error::LogError;
+use super::news::{Notice, Shared};
 use super::sink::Sink;
-use super::thread::{Batch, Notice, Shared};
-use super::writer::{LogError, LogWriter, Parts};
+use super::thread::Batch;
+use super::writer::{LogWriter, Parts};
 use std::sync::atomic::Ordering;
 use std::sync::mpsc::{Receiver, RecvTimeoutError};
 use std::time::{Duration, Instant};
@@ -27,6 +29,8 @@ struct Scribe<'a, S: Sink, C: Fn() -> Instant> {
     /// When the last synchronisation began: what came after it may be lost.
     last_sync: Instant,
     moves: u32,
+    /// What another program did to the log first.
+    altered: Option<LogError>,
 }
 
 /// The thread: writes batches until there are no more, and synchronises after events and whenever it is time.
@@ -43,6 +47,7 @@ pub(super) fn write_batches<S: Sink>(
         last_sync: clock(),
         clock,
         moves: 0,
+        altered: None,
     };
     if let Err(err) = scribe.run(receiver) {
         shared.fail(err);
@@ -108,6 +113,13 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
                 self.go_on_elsewhere(&err)?;
             }
         }
+        if let Some(err) = self.log.take_altered() {
+            self.note_altered(err);
+        }
+        // Told last, so that the log has its end whatever became of what was before.
+        if let (Some(_), Some(err)) = (&end, &self.altered) {
+            return Err(err.clone());
+        }
         let saved = &self.shared.saved_through_ns;
         saved.store(through.0, Ordering::Release);
         Ok(end.is_some())
@@ -128,10 +140,19 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         Ok(())
     }
 
-    /// After the disk has failed: a new segment, with everything that may be lost of the old one.
+    /// What another program did is a fault of the session, which nothing makes good.
+    fn note_altered(&mut self, err: LogError) {
+        self.shared.tell(Notice::Altered(err.clone()));
+        self.altered.get_or_insert(err);
+    }
+
+    /// After the disk has failed, or another program has changed the file: a new segment, with everything that may be lost
+    /// of the old one.
     fn go_on_elsewhere(&mut self, err: &LogError) -> Result<(), LogError> {
-        let LogError::Disk { reason, .. } = err else {
-            return Err(err.clone());
+        let reason = match err {
+            LogError::Disk { reason, .. } => reason.clone(),
+            LogError::Altered { alteration, .. } => alteration.to_string(),
+            _ => return Err(err.clone()),
         };
         let again: Vec<Parts<'_>> = self.since_sync.iter().map(Batch::parts).collect();
         let began = (self.clock)();
@@ -146,8 +167,12 @@ impl<S: Sink, C: Fn() -> Instant> Scribe<'_, S, C> {
         };
         self.since_sync.clear();
         self.last_sync = began;
+        if let LogError::Altered { .. } = err {
+            self.note_altered(err.clone());
+            return Ok(());
+        }
         self.shared.tell(Notice::Moved {
-            reason: reason.clone(),
+            reason,
             path,
             is_last: is_elsewhere || self.moves == MOVES_MAX,
         });
@@ -221,6 +246,7 @@ mod tests {
             last_sync: clock(),
             clock,
             moves: 0,
+            altered: None,
         }
     }
 

@@ -1,7 +1,7 @@
 //! One file of a session log: the container, its bytes on their way to the sink, and the sink.
 
-use super::sink::Sink;
-use super::writer::{LogError, encode_error};
+use super::error::{LogError, encode_error};
+use super::sink::{Alteration, ClosedCheck, Sink};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use std::io::{self, Seek, SeekFrom, Write};
@@ -133,10 +133,23 @@ impl<S: Sink> Segment<S> {
         self.hand_over()
     }
 
-    /// Makes everything handed to the sink survive a power cut.
+    /// Makes everything handed to the sink survive a power cut, and sees that it is still there.
     pub fn sync(&mut self) -> Result<(), LogError> {
         let outcome = self.sink.sync();
-        self.disk(outcome)
+        self.disk(outcome)?;
+        self.unaltered(self.sink.check())
+    }
+
+    /// Its path, and what checks it once it is closed.
+    pub fn closed(self) -> (String, ClosedCheck) {
+        (self.path, self.sink.closed_check())
+    }
+
+    fn unaltered(&self, outcome: Result<(), Alteration>) -> Result<(), LogError> {
+        outcome.map_err(|alteration| LogError::Altered {
+            alteration,
+            path: self.path.clone(),
+        })
     }
 
     /// Free room on the sink's disk in bytes, if that is known.
@@ -144,11 +157,12 @@ impl<S: Sink> Segment<S> {
         self.sink.free_bytes()
     }
 
-    /// Writes the index and makes the whole file durable.
+    /// Writes the index, makes the whole file durable and reads it back.
     pub fn finish(&mut self) -> Result<(), LogError> {
         self.container.finish().map_err(encode_error("index"))?;
         self.hand_over()?;
-        self.sync()
+        self.sync()?;
+        self.unaltered(self.sink.read_back())
     }
 
     fn hand_over(&mut self) -> Result<(), LogError> {

@@ -1,9 +1,40 @@
-//! The one door to the disk: appending bytes and making them durable.
+//! The one door to the disk: appending bytes, making them durable, and finding out whether they are still there.
 
 use crate::folder::{SPARE_FILE, create_folder, segment_file};
 use std::fs::{File, OpenOptions};
-use std::io::{self, Write};
+use std::io::{self, Read, Write};
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// How a file differs from what was written to it. Only another program can have done that, or a disk that lies.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[non_exhaustive]
+pub enum Alteration {
+    /// No file has its name.
+    #[error("it is not there any more")]
+    Gone,
+    /// Another file has its name.
+    #[error("another file is in its place")]
+    Replaced,
+    /// It was cut, emptied or added to.
+    #[error("it has {found} bytes and {written} were written")]
+    Length {
+        /// Bytes it has.
+        found: u64,
+        /// Bytes that were written.
+        written: u64,
+    },
+    /// As many bytes as were written, but others.
+    #[error("its content is not what was written")]
+    Content,
+    /// The system does not let it be read.
+    #[error("it cannot be read back ({0})")]
+    Unreadable(String),
+}
+
+/// Checks a file that was closed.
+pub type ClosedCheck = Box<dyn Fn() -> Result<(), Alteration> + Send>;
 
 /// Takes bytes in order. After an error it is not used again.
 pub trait Sink: Send {
@@ -12,6 +43,21 @@ pub trait Sink: Send {
 
     /// Returns once everything appended survives a power cut.
     fn sync(&mut self) -> io::Result<()>;
+
+    /// Compares what the disk says of the file with what was written: name and length. That is quickly done.
+    fn check(&self) -> Result<(), Alteration> {
+        Ok(())
+    }
+
+    /// As [`check`](Self::check), and compares every byte.
+    fn read_back(&self) -> Result<(), Alteration> {
+        self.check()
+    }
+
+    /// What checks the file as [`check`](Self::check) does once it is finished and closed.
+    fn closed_check(&self) -> ClosedCheck {
+        Box::new(|| Ok(()))
+    }
 
     /// Free room on its disk in bytes, if that is known. May wait for the disk.
     fn free_bytes(&self) -> Option<u64> {
@@ -99,9 +145,16 @@ impl SegmentSource for FolderSegments {
 #[derive(Debug)]
 pub struct FileSink {
     file: File,
+    path: PathBuf,
     /// The file's folder, until its entry for the file is known to be on disk.
     folder: Option<File>,
+    /// Bytes written, and their CRC-32.
+    written: u64,
+    sum: crc32fast::Hasher,
 }
+
+/// Bytes that are read back at once.
+const WINDOW_BYTES: usize = 1 << 18;
 
 impl FileSink {
     /// Makes a file. An existing one is never touched.
@@ -116,14 +169,21 @@ impl FileSink {
         };
         Ok(Self {
             file,
+            // The program may go to another folder before the file is looked for again.
+            path: std::path::absolute(path)?,
             folder: Some(folder),
+            written: 0,
+            sum: crc32fast::Hasher::new(),
         })
     }
 }
 
 impl Sink for FileSink {
     fn append(&mut self, bytes: &[u8]) -> io::Result<()> {
-        self.file.write_all(bytes)
+        self.file.write_all(bytes)?;
+        self.written += bytes.len() as u64;
+        self.sum.update(bytes);
+        Ok(())
     }
 
     fn sync(&mut self) -> io::Result<()> {
@@ -136,8 +196,58 @@ impl Sink for FileSink {
         Ok(())
     }
 
+    fn check(&self) -> Result<(), Alteration> {
+        let own = self.file.metadata().map_err(unreadable)?;
+        check_file(&self.path, (own.dev(), own.ino()), self.written)
+    }
+
+    fn read_back(&self) -> Result<(), Alteration> {
+        self.check()?;
+        let mut file = File::open(&self.path).map_err(unreadable)?;
+        let mut sum = crc32fast::Hasher::new();
+        let mut window = vec![0; WINDOW_BYTES];
+        loop {
+            match file.read(&mut window).map_err(unreadable)? {
+                0 => break,
+                count => sum.update(&window[..count]),
+            }
+        }
+        match sum.finalize() == self.sum.clone().finalize() {
+            true => Ok(()),
+            false => Err(Alteration::Content),
+        }
+    }
+
+    fn closed_check(&self) -> ClosedCheck {
+        let (path, written) = (self.path.clone(), self.written);
+        let own = self.file.metadata().map(|own| (own.dev(), own.ino()));
+        Box::new(move || match own {
+            Ok(id) => check_file(&path, id, written),
+            Err(_) => Ok(()),
+        })
+    }
+
     fn free_bytes(&self) -> Option<u64> {
         let disk = rustix::fs::fstatvfs(&self.file).ok()?;
         Some(disk.f_bavail.saturating_mul(disk.f_frsize))
+    }
+}
+
+/// Whether the file of this device and number has the name, and so many bytes.
+fn check_file(path: &Path, id: (u64, u64), written: u64) -> Result<(), Alteration> {
+    let there = std::fs::metadata(path).map_err(unreadable)?;
+    if (there.dev(), there.ino()) != id {
+        return Err(Alteration::Replaced);
+    }
+    match there.len() {
+        found if found == written => Ok(()),
+        found => Err(Alteration::Length { found, written }),
+    }
+}
+
+fn unreadable(err: io::Error) -> Alteration {
+    match err.kind() {
+        io::ErrorKind::NotFound => Alteration::Gone,
+        _ => Alteration::Unreadable(err.to_string()),
     }
 }

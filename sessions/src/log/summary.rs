@@ -1,8 +1,9 @@
 //! What a session is, from its first and its last chunk alone: the same effort for any length.
 
 use super::content::{Content, Part};
+use super::files::find_files;
 use super::frames::{ChunkReader, FRAME_HEADER_BYTES, Fields};
-use super::reader::{NOT_BEGUN, ReadError, check_beginning, damaged, find_files, refused};
+use super::reader::{NOT_BEGUN, ReadError, check_beginning, damaged, refused};
 use super::source::Source;
 use crate::manifest::Manifest;
 use crate::record::EndRecord;

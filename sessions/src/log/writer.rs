@@ -10,19 +10,19 @@
 //! than the index of one segment is ever held, so the memory of a run does not grow with its
 //! length.
 
+use super::error::LogError;
+use super::json::{entry_json, readable_json};
 use super::segment::Segment;
-use super::sink::{SegmentSource, Sink};
+use super::sink::{ClosedCheck, SegmentSource, Sink};
 use crate::health::Health;
 use crate::manifest::Manifest;
 use crate::raw::raw_blocks;
-use crate::record::{EndRecord, Entry, EntryMessageRef, Row, View, block_slices, blocks_from_rows};
+use crate::record::{EndRecord, Entry, Row, View, block_slices, blocks_from_rows};
 use crate::schema::Channel;
 use mcap::records::MessageHeader;
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 use prost::Message;
-use std::io;
-use thiserror::Error;
 
 /// Batches in one segment: ten minutes of batches of 100 ms. Each ends a chunk, whose index entry
 /// of about 600 bytes stays in memory until the segment is finished: under 4 MB in all. Shorter
@@ -30,70 +30,6 @@ use thiserror::Error;
 pub const BATCHES_PER_SEGMENT: u32 = 6000;
 /// Largest message the writer makes; the reader's limit for a whole chunk is four times this.
 pub(crate) const MESSAGE_BYTES_MAX: usize = 16 << 20;
-/// Deepest nesting of an entry; the JSON parser that reads it back stops at 128.
-const JSON_DEPTH_MAX: usize = 100;
-
-/// A session could not be written.
-#[derive(Clone, Debug, PartialEq, Eq, Error)]
-#[non_exhaustive]
-pub enum LogError {
-    /// The disk refused. The file is not written to again: what a failed write or sync left
-    /// behind is unknown.
-    #[error("cannot write the session log ({reason}): {path}; everything saved before is kept")]
-    Disk {
-        /// What the system said.
-        reason: String,
-        /// The log.
-        path: String,
-    },
-    /// The disk was too slow for too long.
-    #[error(
-        "the disk did not keep up for {seconds} s and no more samples fit in memory: {path}; everything saved before is kept, use a faster disk"
-    )]
-    TooSlow {
-        /// Session time that waited in memory, in s.
-        seconds: u64,
-        /// The log.
-        path: String,
-    },
-    /// A value is not a number.
-    #[error(
-        "the {what} is not a number and was not recorded; check the signal and the calibration"
-    )]
-    NotFinite {
-        /// Which value.
-        what: String,
-    },
-    /// Entries must be in order.
-    #[error("entry {order} came after entry {previous}; entries must be recorded in order")]
-    OutOfOrder {
-        /// The entry's place.
-        order: u64,
-        /// The place of the entry before.
-        previous: u64,
-    },
-    /// A message does not fit the file format.
-    #[error("the {what} cannot be recorded ({reason})")]
-    Encode {
-        /// What was to be recorded.
-        what: &'static str,
-        /// Why not.
-        reason: String,
-    },
-    /// The writer has ended.
-    #[error("the session log is closed; start a new session")]
-    Closed,
-}
-
-impl LogError {
-    pub(crate) fn disk(err: &io::Error, path: &str) -> Self {
-        Self::Disk {
-            reason: err.to_string(),
-            path: path.into(),
-        }
-    }
-}
-
 /// Session time between two samples of the thinned channel: a plot of 50 points a second shows
 /// every step of a run, and its messages, each with an index entry of 16 bytes, stay below a tenth
 /// of a log at 1 kHz.
@@ -159,6 +95,10 @@ pub struct LogWriter<S: Sink> {
     /// Where `at` stood when everything before was known to survive a power cut.
     synced: Counters,
     failure: Option<LogError>,
+    /// Segments that are finished: their paths and what checks them.
+    closed: Vec<(String, ClosedCheck)>,
+    /// What became of one of them; the log goes on all the same.
+    altered: Option<LogError>,
 }
 
 impl<S: Sink> LogWriter<S> {
@@ -180,6 +120,8 @@ impl<S: Sink> LogWriter<S> {
             at: Counters::default(),
             synced: Counters::default(),
             failure: None,
+            closed: Vec::new(),
+            altered: None,
         };
         writer.put_manifest()?;
         writer.sync()?;
@@ -227,8 +169,17 @@ impl<S: Sink> LogWriter<S> {
         let mut former = std::mem::replace(&mut self.segment, next);
         (self.number, self.batches) = (number, 0);
         self.put_manifest()?;
-        let outcome = self.segment.sync().and_then(|()| former.finish());
-        self.noted(outcome)
+        let outcome = self.segment.sync();
+        self.noted(outcome)?;
+        match former.finish() {
+            // Nothing can be written to it again; what comes goes into the new one.
+            Err(err @ LogError::Altered { .. }) => drop(self.altered.get_or_insert(err)),
+            outcome => {
+                self.noted(outcome)?;
+                self.closed.push(former.closed());
+            }
+        }
+        Ok(())
     }
 
     /// Begins the segment with the manifest.
@@ -388,7 +339,7 @@ impl<S: Sink> LogWriter<S> {
         Ok(())
     }
 
-    /// Writes the end record and the index and makes them durable.
+    /// Writes the end record and the index, makes them durable and reads the file back.
     ///
     /// `samples`, `entries` and `raw_bytes` of the record are replaced by what was really written.
     pub fn finish(&mut self, end: EndRecord) -> Result<(), LogError> {
@@ -407,7 +358,20 @@ impl<S: Sink> LogWriter<S> {
         let json = readable_json("end record", &end)?;
         self.put(Channel::End, end.ended_at, &json)?;
         let outcome = self.segment.finish();
-        self.noted(outcome)
+        self.noted(outcome)?;
+        for (path, check) in &self.closed {
+            if let Err(alteration) = check() {
+                let path = path.clone();
+                let err = LogError::Altered { alteration, path };
+                self.altered.get_or_insert(err);
+            }
+        }
+        Ok(())
+    }
+
+    /// What another program did to a segment that was finished before; told once. Nothing of it can be made good here.
+    pub fn take_altered(&mut self) -> Option<LogError> {
+        self.altered.take()
     }
 
     /// Free room on the log's disk in bytes, if that is known.
@@ -483,65 +447,5 @@ pub(crate) fn check_order(order: u64, previous: Option<u64>) -> Result<(), LogEr
     match previous {
         Some(previous) if order <= previous => Err(LogError::OutOfOrder { order, previous }),
         _ => Ok(()),
-    }
-}
-
-/// An entry's message.
-fn entry_json(entry: &Entry) -> Result<Vec<u8>, LogError> {
-    if !is_shallow(&entry.body, JSON_DEPTH_MAX) {
-        return Err(LogError::Encode {
-            what: "entry",
-            reason: format!("it is nested more than {JSON_DEPTH_MAX} levels deep"),
-        });
-    }
-    let message = EntryMessageRef {
-        order: entry.order,
-        after_sample: entry.after_sample,
-        now_ns: entry.now.0,
-        body: &entry.body,
-    };
-    serde_json::to_vec(&message).map_err(json_error("entry"))
-}
-
-fn is_shallow(value: &serde_json::Value, depth: usize) -> bool {
-    use serde_json::Value;
-    let Some(below) = depth.checked_sub(1) else {
-        return false;
-    };
-    match value {
-        Value::Array(items) => items.iter().all(|item| is_shallow(item, below)),
-        Value::Object(items) => items.values().all(|item| is_shallow(item, below)),
-        _ => true,
-    }
-}
-
-/// JSON that reads back as the same value; a number that is not finite would come back as null.
-fn readable_json<T>(what: &'static str, value: &T) -> Result<Vec<u8>, LogError>
-where
-    T: serde::Serialize + serde::de::DeserializeOwned + PartialEq,
-{
-    let json = serde_json::to_vec(value).map_err(json_error(what))?;
-    let back: T = serde_json::from_slice(&json).map_err(json_error(what))?;
-    if back == *value {
-        Ok(json)
-    } else {
-        Err(LogError::Encode {
-            what,
-            reason: "it does not read back as it was written".into(),
-        })
-    }
-}
-
-fn json_error(what: &'static str) -> impl Fn(serde_json::Error) -> LogError {
-    move |err| LogError::Encode {
-        what,
-        reason: err.to_string(),
-    }
-}
-
-pub(crate) fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> LogError {
-    move |err| LogError::Encode {
-        what,
-        reason: err.to_string(),
     }
 }

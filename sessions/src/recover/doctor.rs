@@ -3,7 +3,7 @@
 use super::write::{is_in_use, recover};
 use super::wrong_beside::wrong_beside;
 use super::{Missing, recovered_folder, salvage};
-use crate::log::reader::{absent_spare, away};
+use crate::log::files::{absent_spare, away};
 use crate::log::{ReadError, Session, Summary};
 use chrono::{DateTime, Utc};
 use serde::Serialize;

@@ -12,7 +12,9 @@ mod wrong_beside;
 
 pub use doctor::{Health, Patient, examine, examine_library, recover_library};
 pub use salvage::{Salvage, salvage};
-pub use write::{RecoverError, Recovered, Recovery, recover, recovered_folder, recovered_id};
+pub use write::{
+    RecoverError, Recovered, Recovery, is_in_use, recover, recovered_folder, recovered_id,
+};
 
 use crate::record::is_zero;
 use serde::{Deserialize, Serialize};

@@ -2,10 +2,9 @@
 
 use super::{Gap, Missing, Wound};
 use crate::log::content::{Content, Part};
+use crate::log::files::{check_files, find_files};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
-use crate::log::reader::{
-    NOT_BEGUN, check_beginning, check_files, damaged, find_files, name_of, refused,
-};
+use crate::log::reader::{NO_BEGINNING, NOT_BEGUN, check_beginning, damaged, name_of, refused};
 use crate::log::source::Source;
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
@@ -191,7 +190,12 @@ impl Search<'_, '_> {
         let source = Source::open(file).map_err(failed)?;
         let is_ours = source.begins_with(mcap::MAGIC).map_err(failed)?;
         if !is_ours && self.content.manifest.is_none() {
-            check_beginning(file, &source, is_ours)?;
+            let refused = check_beginning(file, &source, is_ours);
+            // Where others follow, it was one: a later one tells what the session is.
+            if next == self.files.len() {
+                refused?;
+            }
+            self.wound(file, 0, NO_BEGINNING);
         }
         self.content.begin_segment();
         let mut from = Some(mcap::MAGIC.len() as u64);

@@ -5,13 +5,15 @@ use super::salvage::parts;
 use super::{Missing, Salvage, salvage};
 use crate::chain::ChainError;
 use crate::folder::{FolderError, SessionFolder, sync_folder_of};
-use crate::log::reader::{absent_spare, away};
+use crate::lock::{self, Busy, NotLocked};
+use crate::log::files::{absent_spare, away};
 use crate::log::{FileSink, LogError, LogWriter, Part, Parts, ReadError};
 use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
 use serde::{Deserialize, Serialize};
+use std::fs::File;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -46,6 +48,14 @@ pub enum RecoverError {
     InUse {
         /// The session.
         path: PathBuf,
+    },
+    /// Somebody else is at it.
+    #[error("{} is being recovered by {} already; wait until that is done, and use what it made", path.display(), lock::named(*holder))]
+    InProgress {
+        /// The session.
+        path: PathBuf,
+        /// Process number of who does it, where the system tells.
+        holder: Option<u32>,
     },
     /// A disk that its segments may be on is not there.
     #[error("{} is not recovered yet: {}, or, if it is lost for good, take the file 'spare' out of the session's folder", path.display(), away(spare))]
@@ -133,7 +143,8 @@ pub fn recovered_id(session_id: &str) -> String {
 }
 
 /// Whether a session's folder is locked by whoever records it. The lock is only looked at.
-pub(super) fn is_in_use(path: &Path) -> bool {
+#[must_use]
+pub fn is_in_use(path: &Path) -> bool {
     let lock = std::fs::File::open(path.join(crate::folder::LOCK_FILE));
     lock.is_ok_and(|file| {
         let looked = file.try_lock_shared();
@@ -153,6 +164,7 @@ pub fn recover(
     software_version: &str,
     at: DateTime<Utc>,
 ) -> Result<Recovery, RecoverError> {
+    let _alone = alone(path)?;
     if is_in_use(path) {
         return Err(RecoverError::InUse { path: path.into() });
     }
@@ -209,6 +221,22 @@ pub fn recover(
         session_id,
         salvage: left,
     })
+}
+
+/// Makes sure that nobody else recovers the session, and waits a little for who does. The folder itself is locked, so nothing is
+/// written into it or left beside it; where a disk cannot do that, nothing is made sure of.
+fn alone(path: &Path) -> Result<Option<File>, RecoverError> {
+    let Ok(session) = File::open(path) else {
+        // It is told why when it is read.
+        return Ok(None);
+    };
+    match lock::lock_soon(&session, path) {
+        Ok(()) => Ok(Some(session)),
+        Err(NotLocked::Io(_)) => Ok(None),
+        Err(NotLocked::Busy(Busy { path, holder })) => {
+            Err(RecoverError::InProgress { path, holder })
+        }
+    }
 }
 
 /// Takes away what an attempt that died left behind. It holds nothing that the original does not.

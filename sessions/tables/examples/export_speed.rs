@@ -1,11 +1,11 @@
 //! How fast a session becomes Parquet, from its log and from memory. `scripts/measure export` compares it with pyarrow.
 //!
-//! `cargo run --release -p palpate-sessions --example export_speed -- SESSION FOLDER`
+//! `cargo run --release -p palpate-tables --example export_speed -- SESSION FOLDER`
 //! prints one JSON object, times in s; the tables stay in FOLDER.
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
-use palpate_sessions::export::{Beside, Feed, Format, Selection, Table};
 use palpate_sessions::{Block, Session};
+use palpate_tables::export::{Beside, Feed, Format, Selection, Table};
 use std::path::Path;
 use std::time::Instant;
 

@@ -1,8 +1,10 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
-use palpate_sessions::export::{Beside, Format, Selection, Table, dictionary_path};
-use palpate_sessions::{ExportError, Row, Session, read_table};
+use palpate_sessions::{Row, Session};
+use palpate_tables::export::{Beside, Format, Selection, Table, dictionary_path};
+use palpate_tables::{ExportError, read_table};
+use palpate_test_support::skip::{self, Need, skip};
 use polars::prelude::{ParquetReader, SerReader};
 use std::path::Path;
 use std::process::Command;
@@ -146,20 +148,17 @@ fn value_of_hash(session: &Session) -> String {
 /// What a script of Python's says of a file, as JSON. Where Python or a package of it is not installed it says so, and
 /// nothing is compared.
 fn python(script: &str, path: &Path) -> Option<serde_json::Value> {
+    if skip::lacks_program("python3") {
+        return None;
+    }
     let run = Command::new("python3")
         .args(["-c", script])
         .arg(path)
         .output();
-    let output = match run {
-        Ok(output) => output,
-        Err(err) => {
-            println!("skipped: python3 does not run ({err})");
-            return None;
-        }
-    };
+    let output = run.unwrap();
     let text = String::from_utf8_lossy(&output.stdout);
     if let Some(package) = text.trim().strip_prefix("no ") {
-        println!("skipped: python3 has no {package}");
+        skip(Need::Python(package), "python3 does not import it");
         return None;
     }
     let found = serde_json::from_str(&text);

@@ -4,10 +4,11 @@
 
 use chrono::{TimeZone, Utc};
 use palpate_model::rig::Phase;
-use palpate_sessions::import::{
+use palpate_sessions::{Labels, ORIGINAL_FOLDER, Session};
+use palpate_tables::import::{
     Foreign, ForeignPart, Kept, Sample, Told, folder_name, keep, open_foreign, parse_foreign,
 };
-use palpate_sessions::{Labels, ORIGINAL_FOLDER, Session};
+use palpate_test_support::skip;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -526,12 +527,12 @@ fn times_that_no_session_holds_are_refused() {
 fn real_recordings_are_read_as_another_reader_reads_them() {
     let shared = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../shared/data");
     let path = shared.join("perineal_P002_load_hold_unload.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        eprintln!("skipped: {} is not there", path.display());
+    if skip::lacks_file(&path) {
         return;
-    };
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
     // Columns t_s, F_N, x_mm; the reader of tables for fits goes another way to the numbers.
-    let table = palpate_sessions::parse_table(&text, None).unwrap();
+    let table = palpate_tables::parse_table(&text, None).unwrap();
     let part = open_foreign(&path, &told()).unwrap().parts.remove(0);
     let expected: Vec<[f64; 3]> = (0..table.t.len())
         .map(|i| [table.t[i], table.depth[i], table.force[i]])

@@ -3,7 +3,7 @@
 use crate::hostile::limit_memory;
 use crate::support::{put, quick_folder};
 use crate::worker::{command, told};
-use palpate_sessions::import::{Told, parse_foreign};
+use palpate_tables::import::{Told, parse_foreign};
 use std::fs;
 use std::io::{Cursor, Write};
 use std::path::Path;

@@ -8,23 +8,25 @@ use crate::worker::{Work, command, edit, told};
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
 use palpate_sessions::recover::{recover, recovered_folder, salvage};
 use palpate_sessions::{EDITS_FILE, Edit, Edits, LOG_FILE, Session, SessionFolder, segment_file};
+use palpate_test_support::skip::{self, Need, skip};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
 /// Why processes cannot be killed at a system call here; `None` if they can.
-pub fn hindrance() -> Option<String> {
+pub fn is_hindered() -> bool {
+    if skip::lacks_program("strace") {
+        return true;
+    }
     let outcome = Command::new("strace")
         .args(["-f", "-qq", "-o", "/dev/null", "-e", "trace=write", "true"])
         .output();
-    match outcome {
-        Err(err) => Some(format!("no strace ({err})")),
-        Ok(output) if !output.status.success() => {
-            let said = String::from_utf8_lossy(&output.stderr).trim().to_owned();
-            Some(format!("strace may not trace here ({said})"))
-        }
-        Ok(_) => None,
+    let output = outcome.unwrap();
+    if !output.status.success() {
+        let said = String::from_utf8_lossy(&output.stderr);
+        skip(Need::System("tracing of processes"), &said);
     }
+    !output.status.success()
 }
 
 /// What a killed process left.
@@ -149,8 +151,7 @@ fn check_recording(work: &Work, folder: &Path, left: &Left, context: &str) -> (u
 
 #[test]
 fn a_killed_recording_has_everything_it_called_saved() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let (mut killed, mut most_more, mut most_less) = (0, 0, 0);
@@ -178,8 +179,7 @@ fn a_killed_recording_has_everything_it_called_saved() {
 /// What the simulated disk of the power cuts does, the real files do.
 #[test]
 fn a_session_is_on_the_disk_before_a_sample_is_taken() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let parent = tempfile::tempdir().unwrap();
@@ -214,8 +214,7 @@ fn a_session_is_on_the_disk_before_a_sample_is_taken() {
 
 #[test]
 fn a_killed_recovery_leaves_the_original_and_can_be_repeated() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let work = Work::new(2000);
@@ -252,8 +251,7 @@ fn a_killed_recovery_leaves_the_original_and_can_be_repeated() {
 
 #[test]
 fn a_killed_edit_counts_or_does_not() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let mut killed = 0;

@@ -1,12 +1,13 @@
 use crate::support::{end, log_bytes, open_bytes, rows};
 use palpate_model::Nanos;
+use palpate_sessions::atomic;
 use palpate_sessions::edits::Verdict;
-use palpate_sessions::export::ExportError;
-use palpate_sessions::lake::{
+use palpate_sessions::{Entry, EntryKind, Outline, Session};
+use palpate_tables::export::ExportError;
+use palpate_tables::lake::{
     Added, FitFile, FitState, LakeError, Told, add, is_lake, keep_fit, read_session, sessions,
     state_of_fit,
 };
-use palpate_sessions::{Entry, EntryKind, Outline, Session};
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -53,16 +54,9 @@ fn put(lake: &Path, session: &Session, told: Told) -> Result<Added, ExportError>
 }
 
 fn files(folder: &Path) -> Vec<PathBuf> {
-    let mut found = Vec::new();
-    for entry in fs::read_dir(folder).unwrap() {
-        let path = entry.unwrap().path();
-        match path.is_dir() {
-            true => found.extend(files(&path)),
-            false => found.push(path),
-        }
-    }
-    found.sort();
-    found
+    let all = walkdir::WalkDir::new(folder).sort_by_file_name();
+    let all = all.into_iter().map(|one| one.unwrap().into_path());
+    all.filter(|path| path.is_file()).collect()
 }
 
 #[test]
@@ -108,15 +102,13 @@ fn files_of_a_lake_never_change() {
         .iter()
         .map(|path| fs::read(path).unwrap())
         .collect();
-    // What a killed writer left, longer than what comes.
+    // What a killed writer left.
     let samples = &files(lake)[2];
     let name = samples.file_name().unwrap().to_string_lossy();
-    fs::write(
-        samples.with_file_name(format!(".{name}.tmp")),
-        vec![7; 1 << 20],
-    )
-    .unwrap();
+    let left = samples.with_file_name(format!(".{name}.abcdef.palpate.tmp"));
+    fs::write(&left, vec![7; 1 << 20]).unwrap();
     assert!(put(lake, &session, Told::default()).unwrap().was_there);
+    assert_eq!(atomic::sweep(lake, usize::MAX), [left]);
     let mut other = session.clone();
     other.rows[100].force = Some(1.0);
     let refusal = put(lake, &other, Told::default()).unwrap_err();

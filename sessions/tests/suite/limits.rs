@@ -2,7 +2,7 @@
 //! another process at the same files.
 
 use crate::hostile::limit_memory;
-use crate::killed::hindrance;
+use crate::killed::is_hindered;
 use crate::support::{end, log_bytes, manifest, rows, same_bits};
 use crate::worker::{Work, command, told};
 use palpate_model::Nanos;
@@ -11,6 +11,7 @@ use palpate_sessions::{
     Catalog, FolderError, LOG_FILE, LockError, Notice, Pace, Session, SessionFolder, SessionWriter,
     segment_file,
 };
+use palpate_test_support::skip::{Need, skip};
 use std::fs;
 use std::io::{BufRead, BufReader};
 use std::path::Path;
@@ -110,7 +111,10 @@ fn a_disk_that_is_really_full_sends_the_recording_elsewhere() {
         .args([&script, "true"])
         .output();
     if !possible.is_ok_and(|output| output.status.success()) {
-        println!("skipped: no disk of its own can be had for a process (unshare, mount)");
+        skip(
+            Need::System("mount namespaces"),
+            "unshare or mount is refused",
+        );
         return;
     }
     let program = [&own_disk[..], &[&script]].concat();
@@ -171,8 +175,7 @@ fn words(program: &[String]) -> Vec<&str> {
 
 #[test]
 fn an_error_of_the_disk_costs_a_real_recording_nothing() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let work = Work::new(3000);
@@ -195,7 +198,7 @@ fn an_error_of_the_disk_costs_a_real_recording_nothing() {
         assert_eq!(read.entries, work.entries);
         let notes = read.notes.join("; ");
         assert!(
-            notes.contains("the disk failed while 000.mcap was written"),
+            notes.contains("000.mcap failed while it was written"),
             "{notes}"
         );
     }
@@ -203,8 +206,7 @@ fn an_error_of_the_disk_costs_a_real_recording_nothing() {
 
 #[test]
 fn an_error_of_the_disk_under_a_recovery_is_told_and_leaves_the_original() {
-    if let Some(reason) = hindrance() {
-        println!("skipped: {reason}");
+    if is_hindered() {
         return;
     }
     let rows = rows(1500, 92);

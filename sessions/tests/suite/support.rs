@@ -82,6 +82,7 @@ pub fn manifest() -> Manifest {
             cell_delay: palpate_model::units::Seconds(0.0),
             ticks_per_sample: 1.0,
             unseen_max: RigDescription::UNSEEN_USUAL,
+            sensors: Default::default(),
         }),
         limits: Some(Limits::for_travel(Position(149.999_999_999_999_97))),
         calibration: serde_json::json!({"slope_n_per_v": 3.591_234_567_890_123_4}),

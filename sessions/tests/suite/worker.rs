@@ -5,12 +5,14 @@ use crate::support::{end, entries, manifest, raw_of, rows};
 use crate::{foreign_damage, hostile, limits};
 use chrono::DateTime;
 use palpate_model::Nanos;
+use palpate_sessions::atomic::Draft;
 use palpate_sessions::journal::Journal;
-use palpate_sessions::recover::recover;
+use palpate_sessions::recover::{RecoverError, recover};
 use palpate_sessions::{
     Change, Edit, Entry, FolderSegments, LogWriter, Pace, Parts, Row, SessionFolder, SessionWriter,
     add_edit,
 };
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -79,6 +81,9 @@ fn does_its_task() {
         "little" => limits::record_in_little_memory(&folder, number),
         "catalog" => limits::update_catalog(&folder),
         "hold" => hold(&folder),
+        "lock" => lock(&folder.join(name.unwrap())),
+        "draft" => draft(&folder.join(name.unwrap())),
+        "sqlite" => lock_database(&folder.join(name.unwrap())),
         "workbook" => foreign_damage::read_workbook(&folder),
         "damage" => hostile::damage(&folder, name.unwrap(), number),
         "fuzz" => hostile::fuzz(&folder, name.unwrap(), number),
@@ -149,9 +154,38 @@ fn hold(folder: &Path) {
     std::io::read_to_string(std::io::stdin()).unwrap();
 }
 
+/// Locks a file until its input ends.
+fn lock(file: &Path) {
+    let file = std::fs::File::open(file).unwrap();
+    file.lock().unwrap();
+    eprintln!("saved 0");
+    std::io::read_to_string(std::io::stdin()).unwrap();
+}
+
+/// Begins a file and does not finish it.
+fn draft(file: &Path) {
+    let draft = Draft::new(file).unwrap();
+    draft.writer().write_all(b"half").unwrap();
+    eprintln!("saved 0");
+    std::io::read_to_string(std::io::stdin()).unwrap();
+}
+
+/// Locks a database for itself alone until its input ends.
+fn lock_database(file: &Path) {
+    let db = rusqlite::Connection::open(file).unwrap();
+    db.execute_batch("PRAGMA locking_mode = EXCLUSIVE; BEGIN EXCLUSIVE; DELETE FROM tag;")
+        .unwrap();
+    eprintln!("saved 0");
+    std::io::read_to_string(std::io::stdin()).unwrap();
+}
+
+/// Tells 1 if it did it, 0 if another process was at it or had done it.
 fn recover_session(folder: &Path) {
-    recover(folder, "1", DateTime::UNIX_EPOCH).unwrap();
-    eprintln!("saved 1");
+    match recover(folder, "1", DateTime::UNIX_EPOCH) {
+        Ok(_) => eprintln!("saved 1"),
+        Err(RecoverError::InProgress { .. } | RecoverError::Before { .. }) => eprintln!("saved 0"),
+        Err(err) => panic!("{err:?}"),
+    }
 }
 
 /// An edit as the worker makes it.

@@ -325,7 +325,7 @@ fn a_full_disk_sends_the_recording_to_the_spare_folder() {
                 session
                     .notes
                     .iter()
-                    .any(|note| note.contains("the disk failed while")),
+                    .any(|note| note.contains(" failed while it was written")),
                 "{:?}",
                 session.notes
             );

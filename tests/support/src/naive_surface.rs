@@ -1,7 +1,5 @@
 //! ChainMail along z as it is first written: a queue and a set that allocate, limits by link. Order
 //! and limits can be chosen, wrong ones too.
-#![allow(dead_code, reason = "tests and the example use their own part")]
-
 use std::collections::{HashSet, VecDeque};
 
 /// Which of the waiting nodes comes next.

@@ -1,9 +1,7 @@
 //! Records made for tests: exact responses, seeded noise.
-#![allow(dead_code, reason = "every test file uses its own part of this module")]
-
-use palpate_model::fit::FitSample;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::fit::FitSample;
 
 /// Noise with a recorded seed: PCG-XSH-RR 64/32 (O'Neill 2014) through Box-Muller.
 pub struct Noise {
@@ -11,6 +9,8 @@ pub struct Noise {
 }
 
 impl Noise {
+    /// Equal seeds give equal noise.
+    #[must_use]
     pub fn seeded(seed: u64) -> Self {
         let mut noise = Self {
             state: seed.wrapping_mul(0x9E37_79B9_7F4A_7C15) ^ 0x853C_49E6_748F_EA9B,
@@ -30,6 +30,7 @@ impl Noise {
         (f64::from(word) + 0.5) / 4_294_967_296.0
     }
 
+    /// Of mean 0 and standard deviation 1.
     pub fn normal(&mut self) -> f64 {
         let radius = (-2.0 * self.uniform().ln()).sqrt();
         radius * (std::f64::consts::TAU * self.uniform()).cos()
@@ -37,6 +38,7 @@ impl Noise {
 }
 
 /// A ramp of `speed` mm/s to 30 mm and a hold of `hold` s, sampled every `dt` s.
+#[must_use]
 pub fn ramp_hold(speed: f64, hold: f64, dt: f64) -> Vec<(f64, f64)> {
     let count = ((30.0 / speed + hold) / dt).round() as u32;
     (0..=count)
@@ -48,6 +50,7 @@ pub fn ramp_hold(speed: f64, hold: f64, dt: f64) -> Vec<(f64, f64)> {
 }
 
 /// The exact force of a body along a path of (s, mm), relaxed at its start.
+#[must_use]
 pub fn respond(body: &ModifiedKelvin, path: &[(f64, f64)]) -> Vec<FitSample> {
     let mut state = KelvinState::at_rest_from(Depth(path[0].1));
     let mut before = path[0].0;
@@ -66,6 +69,7 @@ pub fn respond(body: &ModifiedKelvin, path: &[(f64, f64)]) -> Vec<FitSample> {
 }
 
 /// The same samples with noise of each sample's own sigma.
+#[must_use]
 pub fn noisy(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
     let mut noise = Noise::seeded(seed);
     samples
@@ -79,6 +83,7 @@ pub fn noisy(samples: &[FitSample], seed: u64) -> Vec<FitSample> {
 
 /// The same samples with slow noise (standard deviation `slow`, exponential memory of `memory` s) and
 /// white noise (standard deviation `white`), in N.
+#[must_use]
 pub fn remembering(
     samples: &[FitSample],
     seed: u64,

@@ -1,13 +1,11 @@
 //! A rig that gives way: how much, found on a stiff surface, and what a fit makes of depths with and without it.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
+use palpate_analysis::compliance::{Corrections, MeasureError, measured};
+use palpate_analysis::source::{FitSource, Stretch, samples_of};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
-use palpate_model::fit::{FitOptions, FitReport, fit};
 use palpate_model::units::Seconds;
-use palpate_protocols::analysis::{FitSource, Stretch, samples_of};
-use palpate_protocols::compliance::{Corrections, MeasureError, measured};
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::RampHold;
+use palpate_rheology::fit::{FitOptions, FitReport, fit};
 use palpate_sessions::Session;
 use palpate_sessions::shelf::save;
 use palpate_tests::recorded;

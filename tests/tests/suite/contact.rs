@@ -2,11 +2,6 @@
 //! the search has to be refused.
 //!
 //! `PALPATE_CONTACT_SEEDS` sets the runs of each combination (`scripts/soak contact`: 1000).
-#![expect(
-    clippy::print_stdout,
-    reason = "the table of the search is printed here"
-)]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::{HandAction, Phase};

@@ -1,17 +1,17 @@
 //! Cycles and a sine on the simulated rig, analysed as a user's record is.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
-use palpate_app::report::cycles::{CycleReport, Question, picture, whole};
+use palpate_analysis::cycles::CycleSource;
+use palpate_analysis::report::cycles::{CycleReport, Question, picture, whole};
 use palpate_drivers::sim::{SimPreconditioning, SimProfile, SimRig, SimSettings};
-use palpate_model::cycles::{CycleSample, sinusoid};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::KelvinState;
-use palpate_protocols::cycles::CycleSource;
 use palpate_protocols::engine::EndingKind;
-use palpate_protocols::plans::{FindContact, Plan, PlannedStep, Sine, Step};
+use palpate_protocols::plans::{
+    FindContact, Hold, Plan, PlannedStep, Ramp, Rest, Sine, Step, Unload,
+};
+use palpate_rheology::cycles::{CycleSample, sinusoid};
 use palpate_tests::lab::{Lab, retract, set_up};
-
 fn rig(percent: u8) -> SimRig {
     SimRig::new(SimSettings {
         profile: SimProfile::Ideal,
@@ -56,17 +56,17 @@ fn samples(lab: &Lab<SimRig>) -> Vec<CycleSample> {
 
 /// Ten cycles to 25 mm at 3 mm/s, each followed by a rest of 20 s.
 fn ten_cycles() -> impl Iterator<Item = PlannedStep> {
-    let ramp = Step::Ramp {
+    let ramp = Step::Ramp(Ramp {
         speed: MmPerS(3.0),
         depth: Depth(25.0),
-    };
-    let unload = Step::Unload {
+    });
+    let unload = Step::Unload(Unload {
         speed: MmPerS(3.0),
         clearance_mm: 0.5,
-    };
-    let rest = Step::Rest {
+    });
+    let rest = Step::Rest(Rest {
         duration: Seconds(20.0),
-    };
+    });
     (1..=10).flat_map(move |cycle| {
         [ramp.clone(), unload.clone(), rest.clone()].map(|step| PlannedStep {
             cycle,
@@ -126,15 +126,15 @@ fn a_preconditioned_specimen_becomes_steady_and_an_elastic_one_is() {
 fn a_sine_finds_the_stiffness_of_the_body() {
     let frequency = 0.5;
     let steps = [
-        Step::Ramp {
+        Step::Ramp(Ramp {
             speed: MmPerS(3.0),
             depth: Depth(18.0),
-        },
-        Step::Hold {
+        }),
+        Step::Hold(Hold {
             duration: Seconds(10.0),
             until: None,
             rate: None,
-        },
+        }),
         Step::Sine(Sine {
             amplitude_mm: 0.75,
             frequency_hz: frequency,

@@ -1,14 +1,13 @@
 //! What plans can ask for beside a ramp and hold, on the simulated rig.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimCompliance, SimProfile, SimRig, SimSettings, SimThickness};
 use palpate_model::rig::{HandAction, Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record};
 use palpate_protocols::plans::{
-    Action, FindBase, FindContact, HoldForce, HoldRate, LoadTo, Monitor, OnFailure, OnTimeout,
-    Plan, PlannedStep, Prompt, Settle, Side, Sine, Source, Step, Weigh,
+    Action, CheckHome, FindBase, FindContact, Hold, HoldForce, HoldRate, LoadTo, Monitor,
+    OnFailure, OnTimeout, Plan, PlannedStep, Prompt, Ramp, Rest, Settle, Side, Sine, Source, Step,
+    Unload, Weigh,
 };
 use palpate_protocols::preview::preview;
 use palpate_tests::lab::{Lab, retract, set_up};
@@ -50,21 +49,21 @@ fn cycles(count: u32, rest: f64) -> Plan {
     let last = plan.steps.pop().unwrap();
     for cycle in 1..=count {
         let steps = [
-            Step::Ramp {
+            Step::Ramp(Ramp {
                 speed: MmPerS(1.5),
                 depth: Depth(12.0),
-            },
-            Step::Unload {
+            }),
+            Step::Unload(Unload {
                 speed: MmPerS(1.5),
                 clearance_mm: 0.0,
-            },
-            Step::Rest {
+            }),
+            Step::Rest(Rest {
                 duration: Seconds(rest),
-            },
+            }),
         ];
         plan.steps.extend(steps.map(|step| PlannedStep {
             cycle,
-            checkpoint: matches!(step, Step::Rest { .. }).then(|| format!("after cycle {cycle}")),
+            checkpoint: matches!(step, Step::Rest(_)).then(|| format!("after cycle {cycle}")),
             ..step.into()
         }));
     }
@@ -197,11 +196,11 @@ fn force_is_kept_while_the_tissue_creeps() {
 #[test]
 fn a_hold_ends_when_the_force_is_steady() {
     let steps = vec![
-        Step::Ramp {
+        Step::Ramp(Ramp {
             speed: MmPerS(3.0),
             depth: Depth(15.0),
-        },
-        Step::Hold {
+        }),
+        Step::Hold(Hold {
             duration: Seconds(300.0),
             until: None,
             // 0.01 N/min over 10 s, as Mach-1 ends its holds.
@@ -209,7 +208,7 @@ fn a_hold_ends_when_the_force_is_steady() {
                 below_n_per_s: 0.01 / 60.0,
                 over: Seconds(10.0),
             }),
-        },
+        }),
     ];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
     let held = lab.records.iter().find_map(|(_, record)| match record {
@@ -247,10 +246,10 @@ fn a_sine_comes_back_to_where_it_began() {
         cycles: 4,
     };
     let steps = vec![
-        Step::Ramp {
+        Step::Ramp(Ramp {
             speed: MmPerS(3.0),
             depth: Depth(8.0),
-        },
+        }),
         Step::Sine(sine),
     ];
     let lab = finished(lab(SimProfile::Ideal, plan(steps)));
@@ -271,10 +270,10 @@ fn a_sine_comes_back_to_where_it_began() {
 
 #[test]
 fn home_is_where_it_was() {
-    let check = Step::CheckHome {
+    let check = Step::CheckHome(CheckHome {
         speed: MmPerS(9.0),
         touch_speed: MmPerS(0.3),
-    };
+    });
     let mut plan = plan(Vec::new());
     plan.steps.push(check.into());
     let lab = finished(lab(SimProfile::Lab, plan));
@@ -364,13 +363,13 @@ fn the_base_tells_how_thick_the_specimen_is() {
 
 /// A plan that loads, with a monitor of the force.
 fn watched(action: Action, threshold: f64) -> Plan {
-    let ramp = Step::Ramp {
+    let ramp = Step::Ramp(Ramp {
         speed: MmPerS(1.5),
         depth: Depth(20.0),
-    };
-    let rest = Step::Rest {
+    });
+    let rest = Step::Rest(Rest {
         duration: Seconds(30.0),
-    };
+    });
     let mut plan = plan(vec![rest, ramp]);
     plan.monitors = vec![Monitor {
         source: Source::Force,
@@ -542,10 +541,10 @@ fn depth_counts_from_the_base_once_it_is_found() {
         brake: None,
     };
     // A stiff surface is left slowly: the force's rate has an interlock.
-    let unload = Step::Unload {
+    let unload = Step::Unload(Unload {
         speed: MmPerS(0.3),
         clearance_mm: 0.0,
-    };
+    });
     let lab = finished(base_search(
         "60",
         vec![Step::LoadTo(load), unload, retract()],

@@ -1,9 +1,6 @@
 //! Twenty times the usual rate: the same run, found and fitted better, with every sample on disk.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
-use palpate_model::fit::{FitOptions, fit};
 use palpate_model::rig::{Limits, Phase};
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Record};
@@ -11,12 +8,13 @@ use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::preview;
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::TimeScale;
+use palpate_rheology::fit::{FitOptions, fit};
 use palpate_sessions::{EntryKind, Session};
+use palpate_test_support::wait::PATIENCE;
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
 use palpate_tests::shipped;
 use palpate_tests::simulated::run;
-use std::time::Duration;
 
 fn settings(profile: SimProfile, rate: &str, seed: u64) -> SimSettings {
     SimSettings {
@@ -208,7 +206,7 @@ fn a_fast_rig_loses_nothing_at_real_pace_with_the_live_fit() {
             .is_some_and(|run| run.outcome.is_some())
     };
     while !ended() {
-        woken.recv_timeout(Duration::from_secs(60)).unwrap();
+        woken.recv_timeout(PATIENCE).unwrap();
     }
     let lateness = runner.snapshot().run.as_ref().unwrap().lateness.unwrap();
     assert!(lateness.worst.0 >= 0.0 && lateness.given_up.0 >= 0.0);

@@ -9,8 +9,8 @@ use palpate_protocols::plans::RampHold;
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::{Runner, TimeScale};
 use palpate_sessions::Session;
+use palpate_test_support::wait::PATIENCE;
 use palpate_tests::recorded;
-use std::time::Duration;
 
 fn params() -> RampHold {
     RampHold {
@@ -115,7 +115,7 @@ fn who_watches_a_run_may_panic_and_the_axis_stops_and_the_session_is_closed() {
                 run.is_some_and(|run| run.phase == Phase::Ramp)
             };
             while !is_pressing(&runner) {
-                woken.recv_timeout(Duration::from_secs(60)).unwrap();
+                woken.recv_timeout(PATIENCE).unwrap();
             }
             panic!("as if drawing had failed");
         })

@@ -1,19 +1,17 @@
 //! A slave that goes where it is led, on the simulated rig: its bounds, its lag, its stops, and the whole with a master.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
+use palpate_analysis::fidelity::of_session;
+use palpate_analysis::source::{Stretch, samples_of};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
+use palpate_haptics::Period;
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
-use palpate_model::haptics::Period;
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::simulation::SimulationSettings;
 use palpate_model::rig::{AxisStatus, Fault, Limits, Phase, Reading, RigCommand};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds, Volts};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_protocols::analysis::{Stretch, samples_of};
 use palpate_protocols::engine::{EndingKind, Input, Interlock, Operator, Record};
-use palpate_protocols::fidelity::of_session;
 use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
 use palpate_protocols::plans::Follow;
 use palpate_protocols::replay::replay;

@@ -1,9 +1,7 @@
 //! The library's screen: found, chosen, looked at, spoken of, taken back, written out.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use eframe::egui::{Key, Modifiers, Role};
 use egui_kittest::kittest::Queryable;
-use palpate_protocols::edited;
+use palpate_analysis::edited;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::edits::{Change, Edits, Verdict};
 use palpate_tests::flow::{Flow, Window};
@@ -213,7 +211,7 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.type_into("reason", "hair again");
     flow.click("Rejected");
     says(&mut flow, "rejected: hair again");
-    let subject = palpate_app::workers::edits::Subject::read(&sessions[20]).unwrap();
+    let subject = palpate_analysis::edits::Subject::read(&sessions[20]).unwrap();
     let verdict = Verdict::Suspect;
     subject
         .say("Mary", "not that bad", Change::Verdict { verdict })

@@ -1,12 +1,12 @@
 //! A link that is lost between runs, in the window: what it says, and how it is made again.
 
-use palpate_app::window::WindowOptions;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigError, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand, RigDescription};
 use palpate_protocols::runner::TimeScale;
 use palpate_tests::flow::Flow;
+use palpate_window::window::WindowOptions;
 
 /// A rig whose plug is pulled after a second, and put back after the first try to connect again.
 struct Unplugged {

@@ -1,12 +1,10 @@
 //! The screens beside the run screen: which model, what accuracy costs, what happens at the extremes.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
-use palpate_model::families::by_key;
-use palpate_model::haptics::Flags;
+use palpate_haptics::Flags;
 use palpate_model::{Depth, Seconds};
 use palpate_protocols::runner::TimeScale;
+use palpate_rheology::families::by_key;
 use palpate_tests::flow::{Flow, Window};
 use std::fmt::Write;
 use std::path::Path;

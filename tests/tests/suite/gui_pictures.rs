@@ -1,22 +1,21 @@
 //! A picture of every screen in light and dark, drawn without a graphics card and compared with the one that is kept.
 //!
 //! Where no software renderer (Mesa's lavapipe) is installed they are left out, and say so. After a change that is meant,
-//! `UPDATE_SNAPSHOTS=true cargo test --workspace --test gui_pictures` keeps the new ones; look at them before.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
+//! `UPDATE_SNAPSHOTS=true cargo test -p palpate-tests gui_pictures` keeps the new ones; look at them before.
 use eframe::egui::{Key, Modifiers, Theme};
 use egui_kittest::kittest::Queryable;
 use egui_kittest::{Harness, SnapshotOptions, SnapshotResults};
-use palpate_app::app::WorkbenchApp;
-use palpate_app::shell::rail::Screen;
-use palpate_app::window::WindowOptions;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
 use palpate_protocols::runner::TimeScale;
+use palpate_test_support::skip::{Need, skip};
 use palpate_tests::workspace;
+use palpate_window::app::WorkbenchApp;
+use palpate_window::shell::rail::Screen;
+use palpate_window::window::WindowOptions;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
@@ -32,6 +31,9 @@ fn has_renderer() -> bool {
         .flatten();
     files.any(|file| file.file_name().to_string_lossy().starts_with("lvp"))
 }
+
+/// Most frames of a wait: five minutes.
+const FRAMES_MAX: usize = 60_000;
 
 /// Recorded sessions that stand in the library.
 const SESSIONS: [&str; 3] = ["ramp-hold-lab", "every-motion", "over-force-galil"];
@@ -93,7 +95,7 @@ fn open(library: &Path) -> Window {
 
 /// Lets threads answer until nothing on the screen waits.
 fn settle(window: &mut Window) {
-    for _ in 0..2000 {
+    for _ in 0..FRAMES_MAX {
         window.step();
         let waits = [
             "still reading",
@@ -147,7 +149,7 @@ fn check_buzz(window: &mut Window) {
         window.run_steps(2);
     }
     window.get_by_label("Check  F6").click_accesskit();
-    for _ in 0..2000 {
+    for _ in 0..FRAMES_MAX {
         window.step();
         if window.state().haptics().looked().is_some() {
             // A caret in a field would come and go.
@@ -162,7 +164,7 @@ fn check_buzz(window: &mut Window) {
 
 /// Waits for the poke that the scene screen computes when it is shown first: at its deepest, whatever the computer's pace.
 fn compute_poke(window: &mut Window) {
-    for _ in 0..2000 {
+    for _ in 0..FRAMES_MAX {
         window.step();
         if window.state().scene().ahead().is_some() {
             window.run_steps(2);
@@ -176,7 +178,10 @@ fn compute_poke(window: &mut Window) {
 #[test]
 fn every_screen_looks_as_it_did() {
     if !has_renderer() {
-        println!("skipped: no software renderer (mesa-vulkan-drivers) is installed");
+        skip(
+            Need::File(Path::new("/usr/share/vulkan/icd.d/lvp_icd.json")),
+            "no software renderer (mesa-vulkan-drivers) is installed",
+        );
         return;
     }
     let library = library();
@@ -202,7 +207,7 @@ fn every_screen_looks_as_it_did() {
             }
             settle(&mut window);
             let found = format!("{} sessions, found in", SESSIONS.len());
-            for _ in 0..2000 {
+            for _ in 0..FRAMES_MAX {
                 // All of them: before they are read there are none.
                 let mut found = window.query_all_by_label_contains(&found);
                 if screen != Screen::Library || found.next().is_some() {

@@ -1,16 +1,15 @@
 //! The window of a replay, driven by accessible name: no display, no pixels.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use egui_kittest::Harness;
 use egui_kittest::kittest::Queryable;
-use palpate_app::playback::{PlaybackApp, PlaybackOptions};
+use palpate_analysis::opening::PlaybackRequest;
+use palpate_analysis::source::calibration_of;
 use palpate_model::units::Newtons;
-use palpate_protocols::analysis::calibration_of;
 use palpate_protocols::engine::EndingKind;
 use palpate_protocols::replay::Player;
 use palpate_protocols::runner::{RunView, TimeScale};
 use palpate_sessions::Session;
 use palpate_tests::workspace;
+use palpate_window::playback::PlaybackApp;
 use std::time::Duration;
 
 type Window = Harness<'static, PlaybackApp>;
@@ -18,7 +17,7 @@ type Window = Harness<'static, PlaybackApp>;
 fn open(scale: TimeScale) -> Window {
     let folder = workspace().join("tests/sessions/ramp-hold-lab");
     let session = Session::open(&folder).unwrap();
-    let options = PlaybackOptions {
+    let options = PlaybackRequest {
         calibration: calibration_of(&session).unwrap(),
         player: Player::new(session, folder).unwrap(),
         force_max: Newtons(9.0),

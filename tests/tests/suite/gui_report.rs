@@ -3,16 +3,16 @@
 
 use egui_kittest::Harness;
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_app::report::text;
-use palpate_app::screens::review::Looked;
-use palpate_app::screens::review::analyses::AnalysesPanel;
-use palpate_app::workers::fit::fit_source;
+use palpate_analysis::fit::fit_source;
+use palpate_analysis::report::text;
+use palpate_analysis::source::Wanted;
 use palpate_model::calibration::Calibration;
-use palpate_model::fit::FitOptions;
-use palpate_protocols::analysis::Wanted;
+use palpate_rheology::fit::FitOptions;
 use palpate_sessions::analyses::{Analysed, Analyses};
 use palpate_sessions::edits::{Edits, Verdict};
 use palpate_tests::workspace;
+use palpate_window::screens::review::Looked;
+use palpate_window::screens::review::analyses::AnalysesPanel;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::time::Duration;

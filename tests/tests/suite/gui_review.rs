@@ -1,6 +1,4 @@
 //! The review screen, driven by accessible name: sessions closely and beside each other.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use eframe::egui::{Key, Modifiers};
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::Session;
@@ -131,21 +129,21 @@ fn sessions_are_fitted_compared_and_foretold() {
     });
     flow.window.run_steps(2);
     // The same words as the command line has.
-    let fitted = palpate_app::workers::fit::fit_source(
+    let fitted = palpate_analysis::fit::fit_source(
         &path,
         None,
-        palpate_protocols::analysis::Wanted::whatever_it_is_worth(),
-        &palpate_model::fit::FitOptions::default(),
+        palpate_analysis::source::Wanted::whatever_it_is_worth(),
+        &palpate_rheology::fit::FitOptions::default(),
     );
     let report = fitted.unwrap().result.unwrap();
-    assert!(flow.says(&palpate_app::report::text::quality(&report)));
+    assert!(flow.says(&palpate_analysis::report::text::quality(&report)));
     for sentence in report.sentences() {
         assert!(flow.says(sentence), "{sentence}");
     }
     flow.click("Over time");
     flow.click("Residuals of the fit");
     flow.click("Parameters");
-    let tau = palpate_app::report::text::cell(report.parameter("tau_eps").unwrap());
+    let tau = palpate_analysis::report::text::cell(report.parameter("tau_eps").unwrap());
     assert!(flow.says("tau_eps (s)") && flow.says(&tau), "{tau}");
     flow.window.check_accessibility();
     flow.click("Prediction");

@@ -1,6 +1,4 @@
 //! Recordings of what is felt in the window: which tick differs, of what kind they are, and how they end.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use eframe::App;
 use eframe::egui::{DroppedFile, Key, Modifiers};
 use egui_kittest::kittest::Queryable;

@@ -1,8 +1,6 @@
 //! The tutorial, done as it is written: every step of `docs/tutorial.md` in the window.
 //!
 //! Press, Type and Wait at the beginning of a sentence are done; what they name is found by its accessible name.
-#![expect(clippy::unwrap_used, reason = "a test that cannot go on must fail")]
-
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
 use palpate_protocols::runner::TimeScale;

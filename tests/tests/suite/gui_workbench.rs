@@ -3,9 +3,6 @@
 use eframe::egui::accesskit::Role;
 use eframe::egui::{Key, Modifiers, pos2, vec2};
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_app::shell::rail::Screen;
-use palpate_app::widgets::places::places;
-use palpate_app::window::WindowOptions;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
@@ -14,6 +11,9 @@ use palpate_protocols::replay::replay;
 use palpate_protocols::runner::TimeScale;
 use palpate_sessions::log::Session;
 use palpate_tests::flow::Flow;
+use palpate_window::shell::rail::Screen;
+use palpate_window::widgets::places::places;
+use palpate_window::window::WindowOptions;
 
 /// Opens the palette, types and takes the first that is found.
 fn by_name(flow: &mut Flow, words: &str) {

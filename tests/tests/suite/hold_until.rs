@@ -1,13 +1,11 @@
 //! A hold that ends when the live fit knows enough: through the runner, and again in replay.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::sim::{SimRig, SimSettings};
-use palpate_model::fit::{FitOptions, LiveFit, fit};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::engine::Record;
 use palpate_protocols::plans::{BodyParameter, HoldUntil, RampHold};
 use palpate_protocols::replay::replay;
+use palpate_rheology::fit::{FitOptions, LiveFit, fit};
 use palpate_sessions::{EntryKind, Session};
 use palpate_tests::recorded;
 use serde_json::json;

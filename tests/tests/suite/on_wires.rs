@@ -1,24 +1,26 @@
 //! A whole protocol on an emulated controller behind a pseudo-terminal, at real pace: what is in its session, and a link
 //! that is lost and made again. A computer that is busy with other tests may keep samples waiting until an interlock ends
-//! the run; everything else holds however it ended.
+//! the run, as it must: such a run is checked as far as it went and made again, and one has to finish.
 
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings};
-use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, open_wired};
+use palpate_emulators::galil::{GalilEmulator, GalilSettings};
+use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
+use palpate_haptics::Period;
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
-use palpate_model::haptics::Period;
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::simulation::SimulationSettings;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings};
+use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
 use palpate_protocols::plans::{FindContact, Follow, Plan, Step};
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::{Request, Runner, TimeScale, driver_clock};
 use palpate_sessions::Session;
+use palpate_test_support::skip;
+use palpate_test_support::wait::{Deadline, PATIENCE};
 use palpate_tests::lab::{retract, set_up};
 use palpate_tests::{recorded, shipped};
 use std::path::Path;
@@ -59,7 +61,7 @@ impl Emulator {
                 let _ = serve(&mut device, &options, &received, &stop, &mut tell);
             })
             .map_err(|err| err.to_string())?;
-        match told.recv_timeout(Duration::from_secs(20)) {
+        match told.recv_timeout(PATIENCE) {
             Ok(Told::Ready(_)) => Ok(Self(is_over, Some(thread))),
             _ => Err("there is no pseudo-terminal".into()),
         }
@@ -77,8 +79,8 @@ impl Drop for Emulator {
 
 /// Waits until a snapshot is as wanted.
 fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) -> bool {
-    // 30 snapshots a second.
-    for _ in 0..1800 {
+    let end = Deadline::new();
+    while !end.is_over() {
         if is_it() {
             return true;
         }
@@ -89,12 +91,22 @@ fn wait(runner: &Runner, woken: &Receiver<()>, mut is_it: impl FnMut() -> bool) 
     false
 }
 
+/// Runs that may end late before one finishes.
+const ATTEMPTS: usize = 10;
+
+/// What the first attempt that finishes gives.
+fn finished<T>(mut attempt: impl FnMut() -> Result<Option<T>, String>) -> T {
+    (0..ATTEMPTS)
+        .find_map(|_| attempt().unwrap())
+        .unwrap_or_else(|| panic!("none of {ATTEMPTS} runs finished"))
+}
+
 /// The rig of an emulated controller, by a rig file, and the calibration of its cell.
 fn bench(folder: &Path, port: &Path) -> Result<(Box<dyn Rig>, Calibration), String> {
     let file = folder.join("bench.toml");
     let text = format!(
         "device = \"galil\"\nport = \"{}\"\nmm_per_pulse = 0.015\ntravel_mm = 150\nspeed_max_mm_s = 20\n\
-         acceleration_mm_s2 = 61.44\nconverter = \"16 bit\"\n",
+         acceleration_mm_s2 = 61.44\nunseen_mm = 0.5\nconverter = \"16 bit\"\n",
         port.display()
     );
     std::fs::write(&file, text).map_err(|err| err.to_string())?;
@@ -115,12 +127,35 @@ fn is_finished(session: &Session) -> Result<bool, String> {
 
 #[test]
 fn a_slave_on_wires_follows_a_master_in_real_time() {
-    let folder = tempfile::tempdir().unwrap();
-    let port = folder.path().join("galil");
-    if !Path::new("/dev/ptmx").exists() {
-        println!("skipped: this system has no pseudo-terminals");
+    if skip::lacks_terminals() {
         return;
     }
+    let (slaved, session) = finished(slave_once);
+    println!("{slaved:?}");
+    let deepest = deepest_followed(&session);
+    assert!(deepest > 1.0, "{deepest}");
+    // A move of the hand's 3.8 mm/s takes a quarter of a second, and more on a busy computer.
+    let lag = slaved.lag_ms.unwrap().median;
+    assert!(lag > 50.0, "{lag}");
+    let lost = session.entries.iter();
+    let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
+    assert_eq!(lost.count(), 0);
+    // Its loop is in real time: a tick a millisecond of what followed, missed ones among them.
+    let kept = slaved.master_loop.unwrap().kept;
+    let ticks = kept.late.count + kept.missed;
+    assert!(ticks >= 5_500, "{ticks}");
+}
+
+/// The deepest that a slave was led.
+fn deepest_followed(session: &Session) -> f64 {
+    let followed = session.rows.iter().filter(|row| row.phase == Phase::Follow);
+    followed.filter_map(|row| row.depth).fold(0.0, f64::max)
+}
+
+/// One run of a slave, checked however it ended; what was followed if it finished.
+fn slave_once() -> Result<Option<(Slaved, Session)>, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("galil");
     let _emulator = Emulator::at(&port).unwrap();
     let (rig, calibration) = bench(folder.path(), &port).unwrap();
     let follow = Follow {
@@ -157,37 +192,27 @@ fn a_slave_on_wires_follows_a_master_in_real_time() {
     let plan = Plan::of("slave", 1, steps);
     let scale = TimeScale::Factor(1.0);
     let session = recorded::of_led_plan(rig, calibration, plan, scale, Arc::clone(&leader) as _);
-    let is_finished = is_finished(&session).unwrap();
+    let is_finished = is_finished(&session)?;
     println!("finished: {is_finished}; {} samples", session.rows.len());
-    let followed = session.rows.iter().filter(|row| row.phase == Phase::Follow);
-    let deepest = followed.filter_map(|row| row.depth).fold(0.0, f64::max);
+    let deepest = deepest_followed(&session);
     assert!(deepest <= 4.0 + 1e-9, "{deepest}");
     assert_eq!(replay(&session, &[]).unwrap().first_difference, None);
-    if is_finished {
-        let slaved = leader.lock().unwrap().slaved().unwrap();
-        println!("{slaved:?}");
-        assert!(deepest > 1.0, "{deepest}");
-        // A move of the hand's 3.8 mm/s takes a quarter of a second.
-        let lag = slaved.lag_ms.unwrap().median;
-        assert!((50.0..600.0).contains(&lag), "{lag}");
-        let lost = session.entries.iter();
-        let lost = lost.filter(|entry| entry.body["record"] == "lead_lost");
-        assert_eq!(lost.count(), 0);
-        // Its loop is in real time: a tick a millisecond of what followed, missed ones among them.
-        let kept = slaved.master_loop.unwrap().kept;
-        let ticks = kept.late.count + kept.missed;
-        assert!((5_500..20_000).contains(&ticks), "{ticks}");
-    }
+    let slaved = leader.lock().unwrap().slaved();
+    Ok(is_finished.then(|| (slaved.unwrap(), session)))
 }
 
 #[test]
 fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
-    let folder = tempfile::tempdir().unwrap();
-    let port = folder.path().join("galil");
-    if !Path::new("/dev/ptmx").exists() {
-        println!("skipped: this system has no pseudo-terminals");
+    if skip::lacks_terminals() {
         return;
     }
+    finished(protocol_once);
+}
+
+/// One run of a protocol and its link, checked however it ended; something if it finished.
+fn protocol_once() -> Result<Option<()>, String> {
+    let folder = tempfile::tempdir().unwrap();
+    let port = folder.path().join("galil");
     let emulator = Emulator::at(&port).unwrap();
     let (rig, calibration) = bench(folder.path(), &port).unwrap();
     let plan = shipped("check-home", &[]);
@@ -203,7 +228,7 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
     assert!(wait(&runner, &woken, has_ended), "the run does not end");
 
     let session = Session::open(&out).unwrap();
-    let is_finished = is_finished(&session).unwrap();
+    let is_finished = is_finished(&session)?;
     println!("finished: {is_finished}; {} samples", session.rows.len());
     let rig = session.manifest.rig.as_ref().unwrap();
     assert!(rig.identity.contains("watchdog"), "{}", rig.identity);
@@ -234,4 +259,5 @@ fn a_protocol_runs_over_a_pseudo_terminal_and_the_link_is_made_again() {
         "{:?}",
         runner.snapshot().rig.link_error
     );
+    Ok(is_finished.then_some(()))
 }

@@ -1,7 +1,5 @@
 //! Every step of every protocol that comes with the program, paused in its midst: what can go on does, and the rest of
 //! the run is as long and as deep as without; what cannot says why.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::Nanos;
@@ -9,7 +7,7 @@ use palpate_model::rig::Limits;
 use palpate_model::units::{MmPerS, Seconds};
 use palpate_protocols::engine::{EndingKind, Operator, PauseView, Record, State};
 use palpate_protocols::file::{BUILT_IN, built_in};
-use palpate_protocols::plans::{Plan, Press, Step};
+use palpate_protocols::plans::{Plan, Press, Step, Tare};
 use palpate_protocols::preview::preview;
 use palpate_tests::lab::{Lab, Seen};
 use std::collections::BTreeMap;
@@ -97,7 +95,7 @@ fn plan(name: &str) -> Plan {
                 });
                 search.pass_speed = MmPerS(0.3);
             }
-            Step::Tare { duration } => *duration = Seconds(1.0),
+            Step::Tare(Tare { duration }) => *duration = Seconds(1.0),
             _ => {}
         }
     }
@@ -215,7 +213,7 @@ fn compare(what: &str, plan: &Plan, paused: usize, now: &Lab<SimRig>, before: &L
     // Tissue goes on relaxing and recovering in a pause.
     let has_rested = matches!(
         plan.steps[paused].step,
-        Step::Hold { .. } | Step::HoldForce(_) | Step::Rest { .. }
+        Step::Hold(_) | Step::HoldForce(_) | Step::Rest(_)
     );
     for (index, (planned, foreseen)) in plan.steps.iter().zip(&previewed.steps).enumerate() {
         // A prompt lasts until somebody answers.
@@ -279,7 +277,7 @@ fn every_step_of(name: &str) {
         );
         let is_motion_measured = matches!(
             planned.step,
-            Step::Ramp { .. } | Step::LoadTo(_) | Step::Unload { .. } | Step::Sine(_)
+            Step::Ramp(_) | Step::LoadTo(_) | Step::Unload(_) | Step::Sine(_)
         );
         assert_eq!(can_go_on, !is_motion_measured, "{what}");
         if can_go_on {

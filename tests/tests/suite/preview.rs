@@ -1,7 +1,5 @@
 //! What a preview says is what a run does: the time of every move and wait to one sample, and no refusal at its start
 //! that the preview kept quiet about.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::calibration::Curve;
@@ -9,7 +7,9 @@ use palpate_model::random::SplitMix;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_protocols::engine::EndingKind;
-use palpate_protocols::plans::{FindContact, LoadTo, Plan, Sine, Step};
+use palpate_protocols::plans::{
+    FindContact, Hold, Jog, LoadTo, Plan, Ramp, Rest, Sine, Step, Unload,
+};
 use palpate_protocols::preview::{Preview, preview};
 use palpate_tests::lab::{Lab, retract, set_up};
 
@@ -100,24 +100,24 @@ fn compare(lab: &Lab<SimRig>, expected: &Preview, what: &str) -> usize {
 }
 
 fn jog(distance_mm: f64) -> Step {
-    Step::Jog {
+    Step::Jog(Jog {
         distance_mm,
         speed: MmPerS(1.5),
-    }
+    })
 }
 
 fn ramp(depth: f64) -> Step {
-    Step::Ramp {
+    Step::Ramp(Ramp {
         speed: MmPerS(1.5),
         depth: Depth(depth),
-    }
+    })
 }
 
 fn unload(clearance_mm: f64) -> Step {
-    Step::Unload {
+    Step::Unload(Unload {
         speed: MmPerS(1.5),
         clearance_mm,
-    }
+    })
 }
 
 fn load(deepest: f64) -> Step {
@@ -235,24 +235,24 @@ fn any_step(random: &mut SplitMix) -> Step {
     let speed = MmPerS((between(random, 0.6, 4.0) / 0.03).round() * 0.03);
     let span = Seconds(between(random, 0.0, 0.7));
     match random.below(9) {
-        0 | 1 => Step::Jog {
+        0 | 1 => Step::Jog(Jog {
             distance_mm: aside,
             speed,
-        },
-        2 | 3 => Step::Ramp {
+        }),
+        2 | 3 => Step::Ramp(Ramp {
             speed,
             depth: Depth(depth),
-        },
-        4 => Step::Unload {
+        }),
+        4 => Step::Unload(Unload {
             speed,
             clearance_mm: clearance,
-        },
-        5 => Step::Rest { duration: span },
-        6 => Step::Hold {
+        }),
+        5 => Step::Rest(Rest { duration: span }),
+        6 => Step::Hold(Hold {
             duration: span,
             until: None,
             rate: None,
-        },
+        }),
         7 => Step::Sine(Sine {
             amplitude_mm: between(random, 0.1, 1.0),
             frequency_hz: between(random, 0.4, 1.0),

@@ -1,7 +1,5 @@
 //! Random plans, faults and operators: however a run goes, it ends with the axis stopped, its limits kept but for
 //! the way of the brake, and a reason. A few hundred here; `scripts/soak runs` for a hundred thousand.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, Truth};
@@ -11,9 +9,9 @@ use palpate_model::rig::{HandAction, Limits, RigCommand};
 use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
 use palpate_protocols::engine::{EndingKind, Input, Operator};
 use palpate_protocols::plans::{
-    Action, FindBase, FindContact, Follow, HoldForce, HoldRate, HoldUntil, LoadTo, Monitor,
-    OnFailure, OnTimeout, Plan, PlannedStep, Press, Prompt, Settle, Side, Sine, Source, Step,
-    Weigh,
+    Action, CheckHome, FindBase, FindContact, Follow, Hold, HoldForce, HoldRate, HoldUntil, Home,
+    Jog, LoadTo, Monitor, OnFailure, OnTimeout, Plan, PlannedStep, Press, Prompt, Ramp, Rest,
+    Retract, SelfTest, Settle, Side, Sine, Source, Step, Tare, Unload, Weigh,
 };
 use palpate_protocols::replay::replay;
 use palpate_protocols::runner::StartError;
@@ -39,13 +37,13 @@ fn speed(random: &mut SplitMix, most: f64) -> MmPerS {
 
 fn any_step(random: &mut SplitMix) -> Step {
     match random.below(16) {
-        0 => Step::Jog {
+        0 => Step::Jog(Jog {
             distance_mm: between(random, -30.0, 30.0),
             speed: speed(random, 20.0),
-        },
-        1 => Step::Rest {
+        }),
+        1 => Step::Rest(Rest {
             duration: Seconds(between(random, 0.0, 0.5)),
-        },
+        }),
         2 => Step::Prompt(Prompt {
             message: "do something".into(),
             timeout: Seconds(between(random, 0.0, 1.0)),
@@ -66,26 +64,26 @@ fn any_step(random: &mut SplitMix) -> Step {
                 timeout: Seconds(0.5),
             },
         }),
-        4 => Step::CheckHome {
+        4 => Step::CheckHome(CheckHome {
             speed: MmPerS(9.0),
             touch_speed: MmPerS(0.9),
-        },
-        5 | 6 => Step::Ramp {
+        }),
+        5 | 6 => Step::Ramp(Ramp {
             speed: speed(random, 20.0),
             depth: Depth(between(random, 0.5, 30.0)),
-        },
-        7 => Step::Hold {
+        }),
+        7 => Step::Hold(Hold {
             duration: Seconds(between(random, 0.0, 1.0)),
             until: Some(HoldUntil::parse("tau=50%").unwrap()),
             rate: Some(HoldRate {
                 below_n_per_s: 1.0,
                 over: Seconds(0.3),
             }),
-        },
-        8 => Step::Unload {
+        }),
+        8 => Step::Unload(Unload {
             speed: speed(random, 10.0),
             clearance_mm: between(random, 0.0, 2.0),
-        },
+        }),
         9 | 10 => Step::LoadTo(LoadTo {
             speed: speed(random, 10.0),
             force: Newtons(between(random, 0.2, 3.0)),
@@ -110,25 +108,25 @@ fn any_step(random: &mut SplitMix) -> Step {
             speed: speed(random, 20.0),
             depth_max: Depth(between(random, 0.5, 40.0)),
         }),
-        _ => Step::Retract {
+        _ => Step::Retract(Retract {
             speed: speed(random, 20.0),
             clearance_mm: between(random, 0.0, 10.0),
-        },
+        }),
     }
 }
 
 fn any_plan(random: &mut SplitMix) -> Plan {
     let mut steps = vec![
-        Step::SelfTest {
+        Step::SelfTest(SelfTest {
             duration: Seconds(0.1),
-        },
-        Step::Home {
+        }),
+        Step::Home(Home {
             speed: MmPerS(9.0),
             touch_speed: MmPerS(0.9),
-        },
-        Step::Tare {
+        }),
+        Step::Tare(Tare {
             duration: Seconds(0.1),
-        },
+        }),
     ];
     if random.below(4) > 0 {
         let short = FindContact {

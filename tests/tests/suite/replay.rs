@@ -1,6 +1,4 @@
 //! Recorded sessions give the same decisions, and a difference is found where it is.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_model::Nanos;
 use palpate_protocols::replay::{Blessing, Player, blessings_of, replay};
 use palpate_protocols::runner::RunView;

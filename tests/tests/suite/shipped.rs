@@ -1,18 +1,17 @@
 //! The protocols that come with the program, and small variations, run on the simulated rig: what they measure against
 //! what the simulated body must answer, and what is said where it cannot be measured.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
+use palpate_analysis::cycles::{CycleSource, of_session};
+use palpate_analysis::fidelity;
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
-use palpate_model::cycles::{Sinusoid, analyse, sinusoid};
 use palpate_model::rig::Limits;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::cycles::{CycleSource, of_session};
 use palpate_protocols::engine::{EndingKind, Outcome};
-use palpate_protocols::fidelity::{self, first_verdict};
+use palpate_protocols::fidelity::first_verdict;
 use palpate_protocols::file::Protocol;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::preview;
+use palpate_rheology::cycles::{Sinusoid, analyse, sinusoid};
 use palpate_sessions::Session;
 use palpate_sessions::edits::Verdict;
 use palpate_tests::recorded::of_plan;

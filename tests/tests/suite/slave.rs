@@ -1,12 +1,10 @@
 //! What a simulated master tells of a slave, fed sample by sample with slaves of known lag and known feeling.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
-
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_haptics::Period;
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
-use palpate_model::haptics::Period;
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::simulation::SimulationSettings;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};

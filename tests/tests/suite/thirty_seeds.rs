@@ -5,15 +5,10 @@
 //! ones that follow from the protocol. The lab rig adds a nonlinear cell, a converter and drift;
 //! its bias and spread are printed (`cargo test -p palpate-tests --test thirty_seeds --
 //! --nocapture`) and stand in `docs/guide/accuracy.md`.
-#![expect(
-    clippy::print_stdout,
-    reason = "the figures of the guide are printed here"
-)]
-
 use palpate_drivers::sim::{SimClock, SimProfile, SimSettings};
-use palpate_model::fit::{FitOptions, FitReport, fit};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_protocols::plans::RampHold;
+use palpate_rheology::fit::{FitOptions, FitReport, fit};
 use palpate_tests::simulated::run;
 
 const NAMES: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];

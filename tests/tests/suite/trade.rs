@@ -1,7 +1,7 @@
 //! Recorded curves of the trade: their errors are found again, and a perturbed one is noticed.
 
-use palpate_app::trade::{Extent, errors};
-use palpate_model::trade::{TradeCurves, last_digits};
+use palpate_analysis::trade::{Extent, errors};
+use palpate_rheology::trade::{TradeCurves, last_digits};
 use palpate_sessions::trade::read_trade;
 use palpate_tests::workspace;
 use std::ops::ControlFlow;

@@ -1,18 +1,17 @@
 //! Unloading: what the fitted law says of tissue whose own law is another one, and of real tissue.
-#![expect(clippy::unwrap_used, reason = "a test whose set-up fails must fail")]
 
+use palpate_analysis::source::{Stretch, read_stretch, samples_of};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, SimSoftening};
-use palpate_model::families::{Model, by_key};
-use palpate_model::fit::{FamilyFit, FamilyOptions, FitSample, fit_family};
 use palpate_model::rig::Phase;
 use palpate_model::signal::work;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
-use palpate_protocols::analysis::{Stretch, read_stretch, samples_of};
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::replay::replay;
+use palpate_rheology::families::Model;
+use palpate_rheology::fit::{FitOptions, FitReport, FitSample, fit};
 use palpate_sessions::Session;
+use palpate_test_support::skip;
 use palpate_tests::{recorded, workspace};
-
 /// A load-hold-unload of the specimen of seed 7, which loses up to 40 % of its elastic force.
 fn run(speed: f64, depth: f64, unload: f64) -> Session {
     let rig = SimRig::new(SimSettings {
@@ -82,9 +81,8 @@ fn along(model: &Model, samples: &[FitSample]) -> Vec<f64> {
     model.along(path).unwrap()
 }
 
-fn fitted(key: &str, samples: &[FitSample]) -> FamilyFit {
-    let family = by_key(key).unwrap();
-    fit_family(&*family, &[("run", samples)], FamilyOptions::default()).unwrap()
+fn fitted(key: &str, samples: &[FitSample]) -> FitReport {
+    fit(samples, &FitOptions::by_key(key).unwrap()).unwrap()
 }
 
 #[test]
@@ -111,8 +109,8 @@ fn one_loop_predicts_another_depth_and_another_speed() {
             0.05,
         ),
     ] {
-        let one = agreement(&samples, &along(&soft.model, &samples), 50);
-        let other = agreement(&samples, &along(&hard.model, &samples), 50);
+        let one = agreement(&samples, &along(&soft.body, &samples), 50);
+        let other = agreement(&samples, &along(&hard.body, &samples), 50);
         println!("{what}: softening {one:?}, none {other:?}");
         assert!(one.unload_share < softening_at_most, "{what}: {one:?}");
         assert!(other.unload_share > none_at_least, "{what}: {other:?}");
@@ -156,25 +154,18 @@ fn unloading_is_recorded_until_the_force_is_gone_and_replays() {
 fn unloading_of_real_tissue_is_explained() {
     // SarahIaquinta/perineal_indentation, P002, load, hold and unload at 10 Hz.
     let path = workspace().join("../shared/data/perineal_P002_load_hold_unload.csv");
-    if !path.exists() {
-        println!("skipped: {} is not here", path.display());
+    if skip::lacks_file(&path) {
         return;
     }
     let samples = read_stretch(&path, None, Stretch::WithUnload)
         .unwrap()
         .samples;
     let held = &samples[..=turn(&samples)];
-    let forces = |fit: &FamilyFit| -> Vec<f64> {
-        let own = &fit.records[0];
-        let tau = fit.model.outer[0];
-        let faded = |one: &FitSample| own.initial * (-(one.t.0 - samples[0].t.0) / tau).exp();
-        let pairs = along(&fit.model, &samples).into_iter().zip(&samples);
-        pairs
-            .map(|(force, one)| force + own.offset + faded(one))
-            .collect()
+    let forces = |fit: &FitReport| -> Vec<f64> {
+        fit.predict(&samples).into_iter().map(|one| one.0).collect()
     };
     let soft = fitted("unloading-3", &samples);
-    let r2 = soft.records[0].r2(&samples);
+    let r2 = soft.r2;
     let [soft, all, load] = [soft, fitted("series-3", &samples), fitted("series-3", held)]
         .map(|fit| agreement(&samples, &forces(&fit), 1));
     println!(

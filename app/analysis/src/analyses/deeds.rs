@@ -1,13 +1,13 @@
 //! Records beside a session: each is added, none is ever written over.
 
 use super::super::edits::Subject;
-use super::super::task::Progress;
 use super::{Done, FitWanted, step};
+use crate::analysed::{self, record};
+use crate::edited;
+use crate::progress::Progress;
 use crate::report::kept;
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
-use palpate_protocols::analysed::{self, record};
-use palpate_protocols::edited;
 use palpate_sessions::analyses::{Analysed, Analyses, Input, add_analysis, inputs_of};
 use palpate_sessions::calibrations::read_calibration;
 use palpate_sessions::edits::{Change, Verdict};

@@ -5,13 +5,13 @@ mod fits;
 mod papers;
 
 pub use deeds::{Deed, Who};
-pub use fits::{FitWanted, OWN_MODEL, own};
+pub use fits::{FitWanted, own};
 pub use papers::{Paper, paper};
 
-use super::task::Progress;
+use crate::edited;
+use crate::progress::Progress;
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
-use palpate_protocols::edited;
 use palpate_sessions::analyses::Analyses;
 use palpate_sessions::edits::Verdict;
 use palpate_sessions::{Shelf, contacts};

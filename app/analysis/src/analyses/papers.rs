@@ -1,7 +1,7 @@
 //! Reports and figures of sessions as new files.
 
-use super::super::task::Progress;
 use super::{Done, step};
+use crate::progress::Progress;
 use crate::report::dossier::{self, Ending, Figure, Wanted};
 use crate::report::figures::{Align, Window};
 use palpate_protocols::runner::wall_now;

@@ -1,9 +1,9 @@
 //! The band that a calibration's uncertainty lays around a force, in every picture of one.
 
 use super::picture::RIGHT;
-use super::svg::{Ink, Panel, Svg};
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
+use ecolor::Color32;
+use palpate_figures::drawing::{Ink, Panel, Svg};
+use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
 use palpate_model::units::Newtons;
 

@@ -3,9 +3,9 @@
 
 use super::calibration::Told;
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, sentence_lines, title};
-use super::svg::{Drawing, Ink, Panel, Svg};
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
+use ecolor::Color32;
+use palpate_figures::drawing::{Drawing, Ink, Panel, Svg};
+use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::{Calibration, CalibrationError, Direction, Term};
 use palpate_model::units::{Newtons, Volts};
 

@@ -90,7 +90,7 @@ pub fn history(events: &[Event]) -> String {
 }
 
 /// A text without anything that would end its line or move the cursor.
-pub(crate) fn one_line(text: &str) -> String {
+pub fn one_line(text: &str) -> String {
     let plain = text
         .trim()
         .chars()

@@ -1,7 +1,7 @@
 //! The extremes as people read them: a summary by group, and the page with all tables.
 
 use super::text::capital;
-use palpate_model::extremes::{Row, Verdict};
+use palpate_rheology::extremes::{Row, Verdict};
 use std::collections::BTreeMap;
 
 /// All verdicts, in the order of [`GroupSummary::counts`].

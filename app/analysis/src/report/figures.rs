@@ -1,10 +1,10 @@
 //! The figures of a session: force over time and over depth, alone or several sessions over each other.
 
 use super::picture::{LEFT, RIGHT, WIDTH, look, title};
-use super::svg::{Anchor, Drawing, Ink, Panel, Svg};
-use super::thin::thin;
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
+use ecolor::Color32;
+use palpate_figures::drawing::{Anchor, Drawing, Ink, Panel, Svg};
+use palpate_figures::thin::thin;
+use palpate_figures::tokens::LIGHT;
 use palpate_model::rig::Phase;
 use palpate_model::signal::polyline::Reducer;
 use palpate_model::units::Newtons;

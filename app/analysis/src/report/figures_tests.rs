@@ -2,7 +2,7 @@ use super::*;
 use std::path::Path;
 
 fn recorded() -> Session {
-    let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+    let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
     Session::open(&sessions.join("ramp-hold-lab")).unwrap()
 }
 
@@ -81,7 +81,7 @@ fn sessions_over_each_other_begin_together() {
         .filter(|line| line.starts_with("<polyline"))
         .collect();
     let points = |ink: Color32| {
-        let ink = super::super::svg::hex(ink);
+        let ink = palpate_figures::drawing::hex(ink);
         let own = lines
             .iter()
             .filter(|line| line.contains(&ink) && line.len() > 200);

@@ -1,20 +1,20 @@
 //! What is said of a body on a device, and of a loop's time.
 
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
-use super::svg::{Anchor, Ink, Panel, Svg};
 use super::text::{ParameterText, in_columns};
-use super::thin::thin;
-use crate::theme::tokens::LIGHT;
-use crate::widgets::uncertain::plain;
-use crate::workers::haptics::{Checked, Followed, Paced, Tried};
-use palpate_model::fit::FitReport;
-use palpate_model::haptics::Flags;
-use palpate_model::haptics::check::CheckSample;
-use palpate_model::haptics::margin::Margin;
+use crate::haptics::{Checked, Followed, Paced, Tried};
+use palpate_figures::drawing::{Anchor, Ink, Panel, Svg};
+use palpate_figures::thin::thin;
+use palpate_figures::tokens::LIGHT;
+use palpate_figures::uncertain::plain;
+use palpate_haptics::Flags;
+use palpate_haptics::check::CheckSample;
+use palpate_haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
 use palpate_protocols::haptics::slave::{Difference, MasterLoop, Slaved};
 use palpate_protocols::haptics::timing::Spread;
+use palpate_rheology::fit::FitReport;
 
 /// A check in words.
 #[must_use]
@@ -334,7 +334,7 @@ pub fn follow_table(followed: &Followed) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::haptics::margin::Cause;
+    use palpate_haptics::margin::Cause;
     use palpate_model::units::{Depth, Newtons};
 
     #[test]

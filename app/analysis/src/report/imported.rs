@@ -3,7 +3,7 @@
 use palpate_sessions::Imported;
 
 /// One line for each thing that was taken for something, with the option that says it otherwise.
-pub(crate) fn lines(imported: &Imported, rows: &str) -> Vec<String> {
+pub fn lines(imported: &Imported, rows: &str) -> Vec<String> {
     let line = |what: &str, text: &str| format!("  {what:<13} {text}");
     let mut lines = vec![line(
         "file",

@@ -1,8 +1,8 @@
 //! What stands in an analysis that is kept beside a session, in words.
 
 use super::text::parameter_lines;
-use palpate_model::fit::Parameter;
-use palpate_protocols::analysed::ForceChange;
+use crate::analysed::ForceChange;
+use palpate_rheology::fit::Parameter;
 use palpate_sessions::analyses::{Analysed, Analyses, Analysis};
 use serde::Deserialize;
 use serde_json::Value;

@@ -2,12 +2,12 @@
 //! parameters and every sentence. A refused fit shows the path of the probe and the reason.
 
 use super::band::{self, Band};
-use super::svg::{Anchor, Drawing, FONT, Ink, Look, Panel, Svg};
 use super::text::{ParameterText, quality};
-use super::thin::thin;
-use crate::theme::tokens::LIGHT;
+use palpate_figures::drawing::{Anchor, Drawing, FONT, Ink, Look, Panel, Svg};
+use palpate_figures::thin::thin;
+use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
-use palpate_model::fit::{FitReport, FitSample};
+use palpate_rheology::fit::{FitReport, FitSample};
 
 /// Width of a picture in px.
 pub(super) const WIDTH: f64 = 960.0;
@@ -148,7 +148,7 @@ pub(super) fn legend(svg: &mut Svg) {
 }
 
 /// The parameters from `y` on; returns where what follows may begin.
-fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
+pub(super) fn table(svg: &mut Svg, report: &FitReport, mut y: f64) -> f64 {
     let places = [LEFT, 180.0, 420.0, 540.0];
     let quiet = Ink::plain(LIGHT.text_quiet);
     let heads = [
@@ -199,10 +199,10 @@ pub(super) fn wrap(text: &str, letters: usize) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::fit::{FitOptions, fit};
     use palpate_model::units::Newtons;
     use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
     use palpate_model::{Depth, Seconds};
+    use palpate_rheology::fit::{FitOptions, fit};
 
     fn record(force_of: impl Fn(usize, f64) -> f64) -> Vec<FitSample> {
         let mut state = KelvinState::at_rest();

@@ -2,8 +2,8 @@
 //! plan that presses on nothing, what it does when.
 
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
-use super::svg::{Anchor, Ink, Look, Panel, Svg};
-use crate::theme::tokens::LIGHT;
+use palpate_figures::drawing::{Anchor, Ink, Look, Panel, Svg};
+use palpate_figures::tokens::LIGHT;
 use palpate_protocols::preview::{OutlinePoint, StepPreview};
 
 /// Longest time shown in seconds; more is shown in minutes.

@@ -2,19 +2,19 @@
 
 use super::calibration::{Told, whole as calibration_text};
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
-use super::page::{Body, document};
 use super::picture;
 use super::text::{in_columns, parameter_lines};
-use crate::workers::fit::Fitted;
+use crate::cycles::of_session;
+use crate::edited::{self, Edited};
+use crate::fit::Fitted;
+use crate::source::{self, FitSource, SourceError, Stretch};
+use palpate_figures::page::{Body, document};
 use palpate_model::calibration::{Calibration, ForceUncertainty};
-use palpate_model::cycles::predict;
-use palpate_model::fit::{FitOptions, FitReport, Systematic};
 use palpate_model::units::Seconds;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::analysis::{self, FitSource, SourceError, Stretch};
-use palpate_protocols::cycles::of_session;
-use palpate_protocols::edited::{self, Edited};
 use palpate_protocols::programme::{FINISHED, Programme, Progress, REFUSED, Task, calibration_of};
+use palpate_rheology::cycles::predict;
+use palpate_rheology::fit::{FitOptions, FitReport, Systematic};
 use palpate_sessions::{Manifest, Session, Verdict};
 use serde::Serialize;
 use std::path::Path;
@@ -145,7 +145,7 @@ pub struct FitLine {
     /// Its folder.
     pub session: String,
     /// Names, values and standard errors.
-    pub parameters: Vec<palpate_model::fit::Parameter>,
+    pub parameters: Vec<palpate_rheology::fit::Parameter>,
     /// Root mean square of the residual in N.
     pub rmse_n: f64,
 }
@@ -375,7 +375,7 @@ impl TaskPart {
         if report.cycles.len() > 1 || !report.sines.is_empty() {
             self.line(&cycles_text(&report));
             self.figures.push(cycles_picture(&report));
-        } else if let Ok(samples) = analysis::samples_of(session, Stretch::RampHold)
+        } else if let Ok(samples) = source::samples_of(session, Stretch::RampHold)
             && report.cycles.len() == 1
         {
             let options = FitOptions::default();
@@ -385,7 +385,7 @@ impl TaskPart {
                 notes: Vec::new(),
                 specimen: None,
                 rig: None,
-                calibration: analysis::calibration_of(session).ok(),
+                calibration: source::calibration_of(session).ok(),
             };
             let fitted = Fitted::of(source, &options).with_systematic(&options);
             match &fitted.result {
@@ -463,7 +463,8 @@ impl TaskPart {
                 .push(picture::of_report(name, samples, report, band.as_ref()));
         }
         if !bodies.known.iter().any(|(known, _)| *known == task.name) {
-            bodies.known.push((task.name.clone(), report.body()));
+            let found = report.kelvin().map(|body| (task.name.clone(), body));
+            bodies.known.extend(found);
         }
     }
 }

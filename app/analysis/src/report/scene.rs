@@ -1,9 +1,9 @@
 //! What is said of a scene's run, its plan and its curves.
 
 use super::haptics::run_text;
-use crate::workers::scene::Played;
-use crate::workers::scene_bench::Bench;
-use palpate_model::surface::ScenePlan;
+use crate::scene::Played;
+use crate::scene_bench::Bench;
+use palpate_haptics::surface::ScenePlan;
 
 /// A run in words.
 #[must_use]

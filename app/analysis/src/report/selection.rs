@@ -1,7 +1,7 @@
 //! A selection in words: the table, the ladder and the verdict.
 
 use super::text::in_columns;
-use palpate_model::select::{Candidate, Outcome, Selection, Unseen};
+use palpate_rheology::select::{Candidate, Outcome, Selection, Unseen};
 
 /// Everything, the verdict last.
 #[must_use]

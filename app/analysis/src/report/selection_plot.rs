@@ -2,10 +2,10 @@
 
 use super::picture::{look, wrap};
 use super::selection::is_chosen;
-use super::svg::{FONT, Ink, Panel, Svg};
-use crate::theme::tokens::LIGHT;
-use palpate_model::select::{Candidate, Selection};
-use palpate_model::trade::front;
+use palpate_figures::drawing::{FONT, Ink, Panel, Svg};
+use palpate_figures::tokens::LIGHT;
+use palpate_rheology::select::{Candidate, Selection};
+use palpate_rheology::trade::front;
 
 const WIDTH: f64 = 860.0;
 const HEIGHT: f64 = 560.0;

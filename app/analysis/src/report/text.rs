@@ -1,8 +1,8 @@
 //! The strings of a fit. Window, command line and picture print these and no others, so that a
 //! number never reads differently in two places.
 
-use crate::widgets::uncertain::{error_alone, interval, plain, with_error, with_interval};
-use palpate_model::fit::{FitReport, Parameter};
+use palpate_figures::uncertain::{error_alone, interval, plain, with_error, with_interval};
+use palpate_rheology::fit::{FitReport, Parameter};
 
 /// One parameter in words.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -184,7 +184,7 @@ mod tests {
 
     #[test]
     fn every_unit_is_typeset() {
-        for unit in palpate_model::fit::PARAMETER_UNITS {
+        for unit in palpate_rheology::fit::PARAMETER_UNITS {
             assert!(!typeset(unit).contains(['^', '*']), "{unit}");
         }
     }
@@ -197,10 +197,9 @@ mod tests {
             r2: 0.999_123_4,
             rmse_n: 0.003_45,
             samples: 900,
-            censored: 0,
-            noise: None,
             warnings: vec!["beware".into()],
             findings: vec!["found".into()],
+            ..FitReport::default()
         };
         let lines = [
             "a model",

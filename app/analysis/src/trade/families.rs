@@ -3,10 +3,10 @@
 use super::paths::{Paths, difference, peak};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
-use palpate_model::families::{Model, by_key};
-use palpate_model::fit::{FamilyOptions, FitSample, fit_family};
-use palpate_model::trade::FamilyRow;
 use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_rheology::families::{Model, by_key};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_rheology::trade::FamilyRow;
 use std::hint::black_box;
 
 /// Steps of a timed run.
@@ -177,13 +177,13 @@ fn fitted(key: &str, path: &[(Seconds, Depth)], forces: &[f64]) -> Result<Model,
             sigma: Newtons(0.02),
         })
         .collect();
-    let options = FamilyOptions {
-        offset: false,
-        initial: false,
-    };
-    let family = by_key(key).map_err(|err| err.to_string())?;
-    fit_family(&*family, &[("target", &samples)], options)
-        .map(|fit| fit.model)
+    let options = FitOptions::by_key(key).map_err(|err| err.to_string())?;
+    let mut options = options.at_rest();
+    let found = options
+        .fix("f_offset", 0.0)
+        .and_then(|()| fit(&samples, &options));
+    found
+        .map(|report| report.body)
         .map_err(|err| format!("{key}: {err}"))
 }
 

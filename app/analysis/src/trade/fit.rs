@@ -3,12 +3,12 @@
 use super::paths::{Paths, TICKS, difference};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
-use palpate_model::fit::{FitOptions, FitSample, fit};
-use palpate_model::integrators::Scheme;
 use palpate_model::random::SplitMix;
-use palpate_model::trade::FitRow;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_rheology::integrators::Scheme;
+use palpate_rheology::trade::FitRow;
 use std::hint::black_box;
 
 /// White noise of the recording in N: that of the simulated rig's straight cell.
@@ -37,7 +37,7 @@ pub(super) fn rows(
         for recording in &recordings {
             let kept = thin(recording, keep);
             let found = fit(&kept, &FitOptions::default()).map_err(|err| err.to_string())?;
-            let body = found.body();
+            let body = found.kelvin().ok_or("the fit is of another family")?;
             tau_square += (body.tau_eps / ModifiedKelvin::THESIS.tau_eps - 1.0).powi(2);
             force_square += difference(&along(&body, paths), paths.ramp_hold.exact()).powi(2);
             samples = kept.len();

@@ -3,8 +3,8 @@
 use super::paths::{Path, Paths, TICKS, body};
 use super::timing::Job;
 use super::{Extent, UNMEASURED};
-use palpate_model::integrators::{IntegratorError, Precision, Real, Scheme};
-use palpate_model::trade::{ForceError, IntegratorRow};
+use palpate_rheology::integrators::{IntegratorError, Precision, Real, Scheme};
+use palpate_rheology::trade::{ForceError, IntegratorRow};
 use std::hint::black_box;
 
 /// Steps in ticks of 0.1 ms, up to where the conditionally stable ones have long stopped being so.

@@ -3,10 +3,10 @@
 use super::paths::Paths;
 use super::timing::Job;
 use super::{UNMEASURED, fit};
-use palpate_model::fit::{FitSample, LiveFit};
-use palpate_model::trade::LiveRow;
 use palpate_model::units::Depth;
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::fit::{FitSample, LiveFit};
+use palpate_rheology::trade::LiveRow;
 use std::hint::black_box;
 
 /// Relaxation times in the bank.

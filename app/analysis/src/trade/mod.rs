@@ -1,7 +1,7 @@
 //! The measured trade: error against time on this machine, one table to a file.
 //!
 //! Errors are computed, the same on every machine up to the last digits; times are measured. What
-//! follows from both is in [`palpate_model::trade`].
+//! follows from both is in [`palpate_rheology::trade`].
 
 mod families;
 mod fit;
@@ -11,7 +11,7 @@ mod machine;
 mod paths;
 mod picture;
 mod scene;
-pub(crate) mod text;
+pub mod text;
 mod timing;
 
 pub use machine::{age_days, this_machine, version};
@@ -20,8 +20,8 @@ pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 pub use text::text;
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_model::trade::{Cost, TRADE_FORMAT, TradeCurves};
 use palpate_protocols::runner::wall_now;
+use palpate_rheology::trade::{Cost, TRADE_FORMAT, TradeCurves};
 use std::ops::ControlFlow;
 use timing::Job;
 

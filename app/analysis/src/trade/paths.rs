@@ -3,11 +3,11 @@
 //! Time is counted in ticks of 0.1 ms, the shortest step, so that every step and every checkpoint is
 //! a whole number of them.
 
-use palpate_model::integrators::SeriesBody;
-use palpate_model::reference::Reference;
-use palpate_model::trade::ForceError;
 use palpate_model::units::{Depth, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::integrators::SeriesBody;
+use palpate_rheology::reference::Reference;
+use palpate_rheology::trade::ForceError;
 
 /// Ticks per second.
 pub(super) const TICKS: u64 = 10_000;

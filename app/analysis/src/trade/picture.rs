@@ -1,11 +1,11 @@
 //! The trade as a picture: error over time, both by powers of ten, a panel for each table.
 
 use super::text::plain;
-use crate::report::svg::{Anchor, FONT, Ink, Look, Panel, Svg};
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
-use palpate_model::integrators::{Precision, Scheme};
-use palpate_model::trade::{FamilyRow, FitRow, TradeCurves};
+use ecolor::Color32;
+use palpate_figures::drawing::{Anchor, FONT, Ink, Look, Panel, Svg};
+use palpate_figures::tokens::LIGHT;
+use palpate_rheology::integrators::{Precision, Scheme};
+use palpate_rheology::trade::{FamilyRow, FitRow, TradeCurves};
 
 /// Size of the picture and of the space around a panel, in px.
 const WIDTH: f64 = 1080.0;

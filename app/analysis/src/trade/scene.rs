@@ -2,14 +2,14 @@
 
 use super::timing::{self, Job};
 use super::{Extent, Progress, families, integrators, paths};
-use palpate_model::integrators::Scheme;
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Method, PokeScene, REFERENCE_NODES,
     Recovery, SceneCurves, Side, StepPoint, Surface,
 };
-use palpate_model::trade::Cost;
 use palpate_model::units::{Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::integrators::Scheme;
+use palpate_rheology::trade::Cost;
 use std::hint::black_box;
 
 /// Tick of the scene in s.
@@ -187,8 +187,8 @@ pub fn measure_scene(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::surface::{Needs, plan};
-    use palpate_model::tolerance::Tolerance;
+    use palpate_haptics::surface::{Needs, plan};
+    use palpate_rheology::tolerance::Tolerance;
     use std::ops::ControlFlow;
 
     #[test]

@@ -1,7 +1,7 @@
 //! The trade as text.
 
-use palpate_model::integrators::Scheme;
-use palpate_model::trade::{Advice, Cost, Recommendation, TradeCurves};
+use palpate_rheology::integrators::Scheme;
+use palpate_rheology::trade::{Advice, Cost, Recommendation, TradeCurves};
 use std::fmt::Write;
 
 /// Everything, in words and tables.
@@ -30,17 +30,17 @@ pub fn text(curves: &TradeCurves, recommendation: &Recommendation) -> String {
 }
 
 /// A share in percent.
-pub(crate) fn percent(share: f64) -> String {
+pub fn percent(share: f64) -> String {
     format!("{} %", digits(100.0 * share))
 }
 
 /// As short as it can be written to six decimals.
-pub(crate) fn plain(value: f64) -> String {
+pub fn plain(value: f64) -> String {
     format!("{}", (value * 1e6).round() / 1e6)
 }
 
 /// Two digits, in powers of ten where they are small or large.
-pub(crate) fn digits(value: f64) -> String {
+pub fn digits(value: f64) -> String {
     if value == 0.0 {
         "0".into()
     } else if (1e-3..1e4).contains(&value.abs()) {
@@ -52,7 +52,7 @@ pub(crate) fn digits(value: f64) -> String {
 }
 
 /// A time in the unit that suits it.
-pub(crate) fn time(ns: f64) -> String {
+pub fn time(ns: f64) -> String {
     match ns {
         ns if ns < 1e3 => format!("{ns:.1} ns"),
         ns if ns < 1e6 => format!("{:.2} us", ns * 1e-3),
@@ -64,7 +64,7 @@ fn cost(cost: &Cost) -> String {
     format!("{:>10}  {:>7}", time(cost.ns), percent(cost.spread))
 }
 
-pub(crate) fn star(front: bool) -> &'static str {
+pub fn star(front: bool) -> &'static str {
     if front { "*" } else { " " }
 }
 
@@ -174,7 +174,7 @@ fn recommended(out: &mut String, recommendation: &Recommendation) {
 }
 
 /// What was asked for.
-pub(crate) fn terms(recommendation: &Recommendation) -> String {
+pub fn terms(recommendation: &Recommendation) -> String {
     format!(
         "{} and {} updates a second, using at most {} of each period",
         recommendation.tolerance,
@@ -184,7 +184,7 @@ pub(crate) fn terms(recommendation: &Recommendation) -> String {
 }
 
 /// What each setting is for, and the setting or why there is none.
-pub(crate) fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
+pub fn advice(recommendation: &Recommendation) -> Vec<(String, String)> {
     let words = |advice: &Advice| match advice {
         Advice::Use(choice) => {
             let share = choice.share_of_period.map_or(String::new(), |share| {

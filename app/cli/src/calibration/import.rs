@@ -11,9 +11,9 @@ use palpate_model::units::Volts;
 use palpate_protocols::programme::calibration_of;
 use palpate_protocols::runner::wall_now;
 use palpate_sessions::Session;
-use palpate_sessions::import::read_weights;
 use palpate_sessions::library_folder;
 use palpate_sessions::{read_calibration, shelf};
+use palpate_tables::import::read_weights;
 use std::path::PathBuf;
 
 /// Arguments of `palpate calibration import`.

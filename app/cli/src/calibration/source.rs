@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 const THESIS: &str = "thesis";
 
 /// A calibration and where it is from.
-pub(in crate::cli) struct Source {
+pub(crate) struct Source {
     pub id: Option<String>,
     pub file: Option<PathBuf>,
     pub calibration: Calibration,

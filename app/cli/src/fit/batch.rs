@@ -2,11 +2,11 @@
 
 use super::super::{Failure, output::Output, source_failure};
 use super::Recipe;
-use crate::report::text;
-use crate::workers::pool::{News, NoAnswer, in_order};
-use palpate_model::fit::{FitReport, PARAMETER_NAMES, PARAMETER_UNITS};
-use palpate_protocols::analysis::SourceError;
-use palpate_protocols::compliance::Correction;
+use palpate_analysis::compliance::Correction;
+use palpate_analysis::pool::{News, NoAnswer, in_order};
+use palpate_analysis::report::text;
+use palpate_analysis::source::SourceError;
+use palpate_rheology::fit::{FitReport, Parameter};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -179,15 +179,17 @@ fn missing(none: NoAnswer) -> Answer {
 /// Parameters that were held everywhere have no column.
 fn table(sources: &[PathBuf], rows: &[Result<FitReport, NotFitted>]) -> String {
     let reports = || rows.iter().flatten();
-    let is_shown = |index: &usize| {
-        let one = |report: &FitReport| !report.parameters[*index].is_fixed;
-        reports().any(one)
+    let known = reports().next().map_or(&[][..], |first| &first.parameters);
+    let is_shown = |one: &&Parameter| {
+        let is_found =
+            |report: &FitReport| report.parameter(&one.name).is_some_and(|own| !own.is_fixed);
+        reports().any(is_found)
     };
-    let shown: Vec<usize> = (0..PARAMETER_NAMES.len()).filter(is_shown).collect();
+    let shown: Vec<&Parameter> = known.iter().filter(is_shown).collect();
     let mut head = vec!["source".to_owned()];
-    head.extend(shown.iter().map(|&index| {
-        let unit = text::typeset(PARAMETER_UNITS[index]);
-        format!("{} ({unit})", PARAMETER_NAMES[index])
+    head.extend(shown.iter().map(|one| match one.unit.as_str() {
+        "" => one.name.clone(),
+        unit => format!("{} ({})", one.name, text::typeset(unit)),
     }));
     head.extend(["R²", "rmse (mN)", "sentences"].map(String::from));
     let mut lines = vec![head];
@@ -195,7 +197,7 @@ fn table(sources: &[PathBuf], rows: &[Result<FitReport, NotFitted>]) -> String {
         let mut line = vec![source.display().to_string()];
         match row {
             Ok(report) => {
-                let cells = shown.iter().map(|&index| &report.parameters[index]);
+                let cells = shown.iter().filter_map(|one| report.parameter(&one.name));
                 line.extend(cells.map(text::cell));
                 line.push(format!("{:.6}", report.r2));
                 line.push(format!("{:.3}", report.rmse_n * 1e3));

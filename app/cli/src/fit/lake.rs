@@ -3,15 +3,16 @@
 use super::super::{Failure, export, output::Output, source_failure};
 use super::sources::tell_copied;
 use super::{FitArgs, Recipe, batch};
-use crate::workers::pool::{News, NoAnswer, in_order};
-use palpate_model::fit::{FitReport, Systematic};
-use palpate_protocols::analysis;
-use palpate_protocols::compliance::Correction;
-use palpate_sessions::lake::{
-    FitFile, FitState, InLake, LakeError, Shard, keep_fit, read_session, sessions, state_of_fit,
-};
+use palpate_analysis::compliance::Correction;
+use palpate_analysis::exports::sweep_lake;
+use palpate_analysis::pool::{News, NoAnswer, in_order};
+use palpate_analysis::source;
+use palpate_rheology::fit::{FitReport, Systematic};
 use palpate_sessions::recover::recovered_id;
 use palpate_sessions::text::sha256_of_file;
+use palpate_tables::lake::{
+    FitFile, FitState, InLake, LakeError, Shard, keep_fit, read_session, sessions, state_of_fit,
+};
 use serde::Serialize;
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
@@ -20,7 +21,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// The body of `palpate fit` without `--family`.
+/// The folder of fits of the body of `palpate fit` without `--family`.
 const MODEL: &str = "modified-kelvin";
 
 /// What came of one session.
@@ -50,9 +51,16 @@ pub(super) fn run(
     output: &Output,
 ) -> Result<(), Failure> {
     check(args)?;
-    let settings = settings(args)?;
+    // Named or not, it is one body, whose fits are kept in one folder.
+    let key = recipe.options.family().key();
+    let model = match key.as_str() {
+        "series-3" => MODEL,
+        key => key,
+    };
+    let settings = settings(args, model)?;
     let shard = args.shard.unwrap_or(Shard::WHOLE);
     let mut found = sessions(lake).map_err(failure)?;
+    sweep_lake(lake);
     // Before the shards are made, so that all leave out the same.
     let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
     let is_copied = |one: &InLake| ids.contains(&recovered_id(&one.id));
@@ -66,7 +74,7 @@ pub(super) fn run(
     let bar = output.count_bar(found.len() as u64);
     let (mut told, mut made, mut there, mut rejected) = (0, 0, 0, 0);
     let mut failed = Vec::new();
-    let work = |one: &InLake| fit_one(lake, one, recipe, &settings);
+    let work = |one: &InLake| fit_one((lake, model), one, recipe, &settings);
     in_order(jobs, &found, &is_ending, work, |news| match news {
         News::Done(count) => bar.set_position(count as u64),
         News::Next(answer) => {
@@ -89,7 +97,7 @@ pub(super) fn run(
     .map_err(|err| Failure::failed(format!("no thread can be started ({err}); try again")))?;
     bar.finish_and_clear();
     let object = json!({
-        "command": "fit", "lake": lake, "model": MODEL, "sessions": found.len(), "made": made,
+        "command": "fit", "lake": lake, "model": model, "sessions": found.len(), "made": made,
         "were_there": there, "rejected": rejected, "failed": failed,
     });
     output.result(&object, || {
@@ -110,19 +118,19 @@ pub(super) fn run(
     }))
 }
 
-fn fit_one(lake: &Path, one: &InLake, recipe: &Recipe, settings: &Value) -> Outcome {
+fn fit_one(lake: (&Path, &str), one: &InLake, recipe: &Recipe, settings: &Value) -> Outcome {
     fit_kept(lake, one, recipe, settings).unwrap_or_else(Outcome::Failed)
 }
 
 fn fit_kept(
-    lake: &Path,
+    (lake, model): (&Path, &str),
     one: &InLake,
     recipe: &Recipe,
     settings: &Value,
 ) -> Result<Outcome, Failure> {
     let file = FitFile {
         lake,
-        model: MODEL,
+        model,
         session_id: &one.id,
         settings,
     };
@@ -133,7 +141,7 @@ fn fit_kept(
     if rejection.is_some() && !recipe.wanted.is_rejected_included {
         return Ok(Outcome::Rejected);
     }
-    let source = analysis::of_session(session, recipe.wanted.stretch, &[]);
+    let source = source::of_session(session, recipe.wanted.stretch, &[]);
     let fitted = source.and_then(|source| recipe.finish(source));
     let fitted = fitted.map_err(source_failure)?;
     let report = fitted.result.map_err(Failure::failed)?;
@@ -167,7 +175,7 @@ fn check(args: &FitArgs) -> Result<(), Failure> {
 }
 
 /// All that decides about a fit beside its session.
-fn settings(args: &FitArgs) -> Result<Value, Failure> {
+fn settings(args: &FitArgs, model: &str) -> Result<Value, Failure> {
     let sorted = |words: &[String]| {
         let mut words: Vec<String> = words.iter().map(|word| word.trim().to_owned()).collect();
         words.sort();
@@ -181,11 +189,15 @@ fn settings(args: &FitArgs) -> Result<Value, Failure> {
             ))
         })
     });
-    Ok(json!({
-        "software_version": env!("CARGO_PKG_VERSION"), "model": MODEL,
+    let mut settings = json!({
+        "software_version": env!("CARGO_PKG_VERSION"), "model": model,
         "fixed": sorted(&args.fixed), "free": sorted(&args.free),
         "systematic": !args.no_systematic, "compliance_sha256": compliance.transpose()?,
-    }))
+    });
+    if args.unload {
+        settings["unload"] = json!(true);
+    }
+    Ok(settings)
 }
 
 fn failure(err: LakeError) -> Failure {

@@ -1,7 +1,6 @@
 //! `palpate fit`: the force model fitted to a session or a table, or to folders full of them.
 
 mod batch;
-mod family;
 mod intervals;
 mod joint;
 mod lake;
@@ -12,17 +11,17 @@ use super::Failure;
 use super::analysis::Who;
 use super::output::Output;
 use super::{compliance, new_file};
-use crate::report::{picture, text};
-use crate::workers::fit::Fitted;
 use clap::Args;
-use intervals::Intervals;
+use palpate_analysis::compliance::{Correction, Corrections};
+use palpate_analysis::fit::Fitted;
+use palpate_analysis::report::family;
+use palpate_analysis::report::fit_json::{Beside, FitObject, Overlay};
+use palpate_analysis::report::{picture, text};
+use palpate_analysis::source::{self, FitSource, SourceError, Stretch, Wanted};
 use palpate_model::calibration::ForceUncertainty;
-use palpate_model::fit::{FitOptions, FitReport, Systematic};
-use palpate_protocols::analysis::{self, FitSource, SourceError, Stretch, Wanted};
-use palpate_protocols::compliance::{Correction, Corrections};
-use palpate_sessions::import::ColumnNames;
-use palpate_sessions::lake::{Shard, is_lake};
-use serde::Serialize;
+use palpate_rheology::fit::{self, FitOptions};
+use palpate_tables::import::ColumnNames;
+use palpate_tables::lake::{Shard, is_lake};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
@@ -47,11 +46,15 @@ pub struct FitArgs {
     picture: Option<PathBuf>,
     /// Fit all sources together with these parameters the same in all, as in tau_eps,mu1;
     /// body stands for the five of the tissue
-    #[arg(long, value_name = "NAMES", conflicts_with_all = ["picture", "profile", "bootstrap"])]
+    #[arg(long, value_name = "NAMES", conflicts_with = "picture")]
     share: Option<String>,
-    /// Fit another model family, such as maxwell, prony-2 or unloading-3: one body for all sources
-    #[arg(long, value_name = "KEY", conflicts_with_all = ["share", "profile", "bootstrap", "fixed", "free", "jobs"])]
+    /// Fit another model family, such as maxwell, prony-2 or unloading-3: one body for all sources, if neither --share
+    /// nor --each says otherwise
+    #[arg(long, value_name = "KEY")]
     family: Option<String>,
+    /// With --family: fit every source by itself
+    #[arg(long, requires = "family", conflicts_with = "share")]
+    each: bool,
     /// With --family: take the recorded unloading of sessions as well
     #[arg(long)]
     unload: bool,
@@ -71,10 +74,10 @@ pub struct FitArgs {
     #[arg(long)]
     include_rejected: bool,
     /// Read a session as this analysis of it does: with another calibration, or with stretches left out
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["share", "family"])]
+    #[arg(long, value_name = "NAME", conflicts_with = "share")]
     analysis: Option<String>,
     /// Keep the fit as an analysis of this name beside its session
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["share", "family"])]
+    #[arg(long, value_name = "NAME", conflicts_with = "share")]
     save: Option<String>,
     #[command(flatten)]
     who: Who,
@@ -83,7 +86,7 @@ pub struct FitArgs {
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
     /// Fit only the i-th of n parts of a lake, as in 2/8; which part a session is in depends on its name alone
-    #[arg(long, value_name = "I/N", conflicts_with_all = ["share", "family"])]
+    #[arg(long, value_name = "I/N", conflicts_with = "share")]
     shard: Option<Shard>,
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
@@ -115,6 +118,8 @@ impl FitArgs {
 /// How every source is fitted.
 struct Recipe {
     options: FitOptions,
+    /// Whether the family was named, so that what it is and cannot represent is told too.
+    is_named: bool,
     columns: Option<ColumnNames>,
     is_systematic: bool,
     wanted: Wanted,
@@ -129,7 +134,7 @@ impl Recipe {
 
     fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
         let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
-        self.finish(analysis::read_analysed(path, columns, self.wanted, name)?)
+        self.finish(source::read_analysed(path, columns, self.wanted, name)?)
     }
 
     /// Fits what was read.
@@ -146,36 +151,18 @@ impl Recipe {
     }
 }
 
-#[derive(Serialize)]
-struct FitOutput<'a> {
-    #[serde(flatten)]
-    report: &'a FitReport,
-    #[serde(flatten)]
-    intervals: &'a Intervals,
-    /// What the calibration adds; absent for tables and with `--no-systematic`.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    systematic: Option<Systematic>,
-    /// What the rig's compliance did to the depths, or would; absent where none is known.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    compliance: Option<Correction>,
-    /// The fit alone, without reading.
-    seconds: f64,
-}
-
 pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
     intervals::check(args)?;
-    if let Some(key) = &args.family {
-        return family::run(key, args, columns.as_ref(), output);
-    }
-    if args.unload {
+    if args.unload && args.family.is_none() {
         return Err(Failure::usage(
             "--unload is for --family: this force model knows no unloading; add --family unloading-3",
         ));
     }
     let recipe = Recipe {
         options: options(args)?,
+        is_named: args.family.is_some(),
         columns,
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
@@ -191,16 +178,24 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         return Err(Failure::usage("--shard is for a lake; name one lake"));
     }
     if let Some(shared) = &args.share {
-        return joint::run(&args.sources, shared, &recipe, output);
+        return joint::run(args, Some(shared), &recipe, output);
     }
     if let [source] = args.sources.as_slice()
         && !sources::is_collection(source)
     {
         return one(source, &recipe, args, output);
     }
-    if args.picture.is_some() || args.profile || args.bootstrap.is_some() || args.save.is_some() {
+    if args.picture.is_some() || args.save.is_some() || args.analysis.is_some() {
         return Err(Failure::usage(
-            "--picture, --profile, --bootstrap and --save are for one fit; name a single session or table",
+            "--picture, --save and --analysis are for one record; name a single session or table",
+        ));
+    }
+    if recipe.is_named && !args.each {
+        return joint::run(args, None, &recipe, output);
+    }
+    if args.profile || args.bootstrap.is_some() {
+        return Err(Failure::usage(
+            "--profile and --bootstrap are for one fit; name a single session or table, or share parameters",
         ));
     }
     let found = sources::find(&args.sources, output)?;
@@ -215,38 +210,56 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     let fitted = recipe.fit(source)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
-    if let Some(to) = to {
-        // Its own name only: a picture travels, and folders are nobody else's business.
-        let short = source
-            .file_name()
-            .map_or(name.clone(), |name| name.to_string_lossy().into());
-        let picture = match &fitted.result {
-            Ok(report) => {
-                let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
-                let uncertainty = uncertainty.and_then(Result::ok);
-                picture::of_report(&short, &fitted.samples, report, uncertainty.as_ref())
-            }
-            Err(refusal) => picture::of_refusal(&short, &fitted.samples, &refusal.to_string()),
-        };
-        new_file::write("picture", Some(to), || picture)?;
-    }
-    let report = fitted
-        .result
-        .map_err(|err| Failure::failed(format!("{err}, in {name}")))?;
-    super::last_fit::remember(&report, source, output);
-    let intervals = Intervals::of(args, &fitted.samples, &recipe.options, output)?;
-    let object = FitOutput {
-        report: &report,
-        intervals: &intervals,
-        systematic: fitted.systematic,
-        compliance: fitted.compliance,
-        seconds: fitted.seconds,
+    // Its own name only: a picture travels, and folders are nobody else's business.
+    let short = source
+        .file_name()
+        .map_or(name.clone(), |name| name.to_string_lossy().into());
+    let report = match &fitted.result {
+        Ok(report) => report,
+        Err(refusal) => {
+            let sentence = refusal.to_string();
+            let picture = || picture::of_refusal(&short, &fitted.samples, &sentence);
+            new_file::write("picture", to, picture)?;
+            return Err(Failure::failed(format!("{refusal}, in {name}")));
+        }
     };
+    let family = recipe.options.family();
+    let overlay = Overlay::of(report, &fitted.samples);
+    new_file::write("picture", to, || {
+        let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
+        let band = uncertainty.and_then(Result::ok);
+        let (samples, band) = (fitted.samples.as_slice(), band.as_ref());
+        match recipe.is_named {
+            true => family::picture(&short, family, (samples, &overlay), report, band),
+            false => picture::of_report(&short, samples, report, band),
+        }
+    })?;
+    super::last_fit::remember(report, source, output);
+    let intervals = intervals::wanted(args)
+        .then(|| fit::Fitted::of(&fitted.samples, &recipe.options))
+        .transpose();
+    let intervals = intervals.map_err(Failure::failed)?;
+    let intervals = intervals
+        .map(|exact| intervals::find(args, &exact, 0, output))
+        .transpose()?
+        .unwrap_or_default();
+    let beside = Beside {
+        overlay: &overlay,
+        intervals: &intervals,
+        systematic: fitted.systematic.as_ref(),
+        compliance: fitted.compliance.as_ref(),
+    };
+    let object = FitObject::of(family, report, beside, fitted.seconds);
     saved::keep(args, source, &object)?;
     output.result(&object, || {
-        let mut lines = vec![text::whole(&report)];
-        lines.extend(object.compliance.as_ref().map(Correction::sentence));
-        lines.extend(intervals.lines(&report));
+        let mut lines = vec![text::whole(report)];
+        if recipe.is_named {
+            lines[0] = family::with_equation(family, &lines[0]);
+            lines.push(format!("- {}", family::energy(&overlay)));
+            lines.extend(family::limits(family).map(|sentence| format!("- {sentence}")));
+        }
+        lines.extend(fitted.compliance.as_ref().map(Correction::sentence));
+        lines.extend(intervals::lines(&intervals, report));
         let kept = args.save.iter();
         lines.extend(kept.map(|name| format!("kept as analysis '{name}'")));
         lines.join("\n")
@@ -254,9 +267,12 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
     Ok(())
 }
 
-/// A picture is a new file.
+/// The family asked for, and which of its parameters are found.
 fn options(args: &FitArgs) -> Result<FitOptions, Failure> {
-    let mut options = FitOptions::default();
+    let mut options = match &args.family {
+        Some(key) => FitOptions::by_key(key).map_err(Failure::usage)?,
+        None => FitOptions::default(),
+    };
     let names = args.free.iter().map(|name| name.trim());
     let held = args
         .fixed

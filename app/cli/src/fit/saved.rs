@@ -2,7 +2,7 @@
 
 use super::super::{Failure, analysis, verdict::author};
 use super::FitArgs;
-use palpate_protocols::analysed::{self, record};
+use palpate_analysis::analysed::{self, record};
 use palpate_sessions::analyses::Analysed;
 use serde::Serialize;
 use serde_json::json;
@@ -30,6 +30,8 @@ pub(super) fn keep(args: &FitArgs, source: &Path, results: &impl Serialize) -> R
     let what = Analysed::Fit {
         based_on: args.analysis.clone(),
         settings: json!({
+            "family": args.family,
+            "unload": args.unload,
             "fixed": args.fixed,
             "free": args.free,
             "systematic": !args.no_systematic,

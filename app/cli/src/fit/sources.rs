@@ -3,18 +3,18 @@
 use super::super::output::Output;
 use super::super::source_failure;
 use super::Failure;
-use crate::workers::exports::without_copied;
-use crate::workers::fit::no_systematic;
+use palpate_analysis::compliance::{Correction, Corrections};
+use palpate_analysis::exports::without_copied;
+use palpate_analysis::fit::no_systematic;
+use palpate_analysis::origin::Origin;
+use palpate_analysis::source::{self, SourceError, Wanted};
 use palpate_model::calibration::{Calibration, CalibrationError};
-use palpate_model::fit::{FitError, FitSample, Traced};
-use palpate_protocols::analysis::{self, SourceError, Wanted};
-use palpate_protocols::compliance::{Correction, Corrections};
-use palpate_protocols::origin::Origin;
-use palpate_sessions::import::ColumnNames;
+use palpate_rheology::fit::{FitError, FitSample, Traced};
 use palpate_sessions::log::ReadError;
+use palpate_tables::import::ColumnNames;
 use std::fs;
-use std::io;
 use std::path::{Path, PathBuf};
+use walkdir::WalkDir;
 
 /// Endings of file names that are taken for tables.
 const TABLES: [&str; 2] = ["csv", "tsv"];
@@ -53,7 +53,7 @@ fn has_ending(path: &Path, endings: &[&str]) -> bool {
 
 /// Every source named, and every one in the folders named: folder by folder, by name. A session whose
 /// recovered copy is among them is left out, so that its samples count once.
-pub(in crate::cli) fn find(paths: &[PathBuf], output: &Output) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn find(paths: &[PathBuf], output: &Output) -> Result<Vec<PathBuf>, Failure> {
     let is_log = |path: &Path| path.is_dir() || has_ending(path, &[LOG]);
     let (rest, originals) = without_copied(all(paths)?, is_log);
     let names = originals.iter().map(|path| path.display().to_string());
@@ -83,10 +83,11 @@ fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
             continue;
         }
         let before = found.len();
-        below(path, &mut found).map_err(|(folder, err)| {
+        below(path, &mut found).map_err(|err| {
+            let reason = err.io_error().map_or(err.to_string(), ToString::to_string);
             Failure::failed(format!(
-                "cannot look into {} ({err}); check its permissions",
-                folder.display()
+                "cannot look into {} ({reason}); check its permissions",
+                err.path().unwrap_or(path).display()
             ))
         })?;
         if found.len() == before {
@@ -100,10 +101,7 @@ fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, Failure> {
 }
 
 /// Every session named, and every one in the folders named; tables are none.
-pub(in crate::cli) fn find_sessions(
-    paths: &[PathBuf],
-    output: &Output,
-) -> Result<Vec<PathBuf>, Failure> {
+pub(crate) fn find_sessions(paths: &[PathBuf], output: &Output) -> Result<Vec<PathBuf>, Failure> {
     let is_table = |path: &PathBuf| path.is_file() && !has_ending(path, &[LOG]);
     if let Some(table) = paths.iter().find(|path| is_table(path)) {
         return Err(Failure::usage(format!(
@@ -117,7 +115,7 @@ pub(in crate::cli) fn find_sessions(
 }
 
 /// A source that is looked at together with others.
-pub(in crate::cli) struct Recording {
+pub(crate) struct Recording {
     /// Its path, as given.
     pub name: String,
     /// What is fitted.
@@ -165,7 +163,7 @@ impl Recording {
 }
 
 /// Reads sources that are looked at together, each once. Rejected sessions are left out and counted.
-pub(in crate::cli) fn read(
+pub(crate) fn read(
     found: &[PathBuf],
     columns: Option<&ColumnNames>,
     wanted: Wanted,
@@ -185,7 +183,7 @@ pub(in crate::cli) fn read(
     }
     let one = |path: &PathBuf| {
         let name = path.display().to_string();
-        let mut source = match analysis::read_stretch(path, columns, wanted) {
+        let mut source = match source::read_stretch(path, columns, wanted) {
             Err(SourceError::Rejected { reason }) => {
                 output.note(&format!("{name}: rejected, left out: {reason}"));
                 return Ok(None);
@@ -224,26 +222,19 @@ pub(in crate::cli) fn read(
 
 /// Sources below a folder. Links to folders are not followed, so no walk is endless and nothing
 /// counts twice; hidden names are left alone.
-fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), (PathBuf, io::Error)> {
-    let failed = |err| (folder.to_owned(), err);
-    let mut entries = fs::read_dir(folder)
-        .and_then(Iterator::collect::<io::Result<Vec<_>>>)
-        .map_err(failed)?;
-    entries.sort_by_key(fs::DirEntry::file_name);
-    for entry in entries {
-        let path = entry.path();
-        let is_hidden = entry.file_name().to_string_lossy().starts_with('.');
-        if is_hidden {
-            continue;
+fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), walkdir::Error> {
+    let mut entries = WalkDir::new(folder).sort_by_file_name().into_iter();
+    while let Some(entry) = entries.next() {
+        let entry = entry?;
+        let (path, is_folder) = (entry.path(), entry.file_type().is_dir());
+        let is_hidden = entry.depth() > 0 && entry.file_name().to_string_lossy().starts_with('.');
+        let is_session = is_folder && entry.depth() > 0 && is_session(path);
+        if is_folder && (is_hidden || is_session) {
+            entries.skip_current_dir();
         }
-        if entry.file_type().map_err(failed)?.is_dir() {
-            if is_session(&path) {
-                found.push(path);
-            } else {
-                below(&path, found)?;
-            }
-        } else if path.is_file() && (has_ending(&path, &TABLES) || has_ending(&path, &[LOG])) {
-            found.push(path);
+        let is_table = || path.is_file() && (has_ending(path, &TABLES) || has_ending(path, &[LOG]));
+        if !is_hidden && (is_session || (!is_folder && is_table())) {
+            found.push(entry.into_path());
         }
     }
     Ok(())

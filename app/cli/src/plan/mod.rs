@@ -8,15 +8,15 @@ use super::last_fit::{self, KnownFit};
 use super::output::Output;
 use super::rig::{OpenRig, RigArgs};
 use clap::Args;
-use palpate_model::expected::{
-    Curves, ExpectedError, Family, Memory, Noise, Proposal, Rig, Target, Unknowns, curves, shortest,
-};
-use palpate_model::fit::{FitOptions, fit};
+use palpate_analysis::source;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::analysis;
 use palpate_protocols::plans::RampHold;
 use palpate_protocols::preview::{Preview, preview};
+use palpate_rheology::expected::{
+    Curves, ExpectedError, Family, Memory, Noise, Proposal, Rig, Target, Unknowns, curves, shortest,
+};
+use palpate_rheology::fit::{FitOptions, fit};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
@@ -264,7 +264,7 @@ fn assumed(like: Option<&Path>, output: &Output) -> Result<Assumed, Failure> {
     {
         return from_fit(&last_fit::read(like)?, source);
     }
-    let record = analysis::read(like).map_err(super::source_failure)?;
+    let record = source::read(like).map_err(super::source_failure)?;
     record.notes.iter().for_each(|note| output.note(note));
     let report = fit(&record.samples, &FitOptions::default())
         .map_err(|err| Failure::failed(format!("{err}, in {source}")))?;
@@ -272,7 +272,9 @@ fn assumed(like: Option<&Path>, output: &Output) -> Result<Assumed, Failure> {
         .iter()
         .for_each(|doubt| output.note(doubt));
     Ok(Assumed {
-        body: report.body(),
+        body: report
+            .kelvin()
+            .ok_or_else(|| Failure::failed("the fit is of another body"))?,
         noise: Newtons(report.rmse_n),
         source,
     })

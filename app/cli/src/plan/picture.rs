@@ -2,9 +2,9 @@
 
 use super::PlanReport;
 use super::text::{digits, plain};
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
-use palpate_model::expected::{Curve, Family, PARAMETER_NAMES};
+use ecolor::Color32;
+use palpate_figures::tokens::LIGHT;
+use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES};
 use std::fmt::Write;
 
 /// Pixels of a panel's plot area, of the picture and of the space around panels.

@@ -1,7 +1,7 @@
 //! The plan as people read it.
 
 use super::{Offer, PlanReport};
-use palpate_model::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
+use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
 
 /// Of ten points a decade, 1, 2 and 5.
 const SHOWN: [usize; 3] = [0, 3, 7];

@@ -1,10 +1,10 @@
 //! What is said of a programme before it runs: its mistakes, what is asked and told, what it will do.
 
-use crate::cli::Failure;
-use crate::cli::protocol::FileReport;
-use crate::cli::rig::{OpenRig, RigArgs};
-use crate::cli::run::{HowArgs, USUAL_INDENTER};
-use crate::report::text::in_columns;
+use crate::Failure;
+use crate::protocol::FileReport;
+use crate::rig::{OpenRig, RigArgs};
+use crate::run::{HowArgs, USUAL_INDENTER};
+use palpate_analysis::report::text::in_columns;
 use palpate_protocols::file::Problem;
 use palpate_protocols::programme::{Foreseen, Programme, ProgrammeError, foresee};
 use palpate_sessions::about::pair_of;
@@ -90,7 +90,7 @@ pub(super) fn ask(file: &Path, programme: &Programme) -> Result<(), Failure> {
 }
 
 /// Everything that can be said of a programme file before it runs, in order of lines.
-pub(in crate::cli) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> {
+pub(crate) fn check(file: &str, bench: &OpenRig) -> Result<FileReport, Failure> {
     let text = read(Path::new(file)).map_err(Failure::usage)?;
     let mut report = FileReport {
         file: file.to_owned(),

@@ -8,8 +8,8 @@ use super::Failure;
 use super::asking::Asking;
 use super::output::Output;
 use super::run::HowArgs;
-use crate::report::programme::Page;
 use before::{Ahead, ask, contents, look_ahead, parse, refusal, refuse, tell, with_settings};
+use palpate_analysis::report::programme::Page;
 use palpate_protocols::file::Problem;
 use palpate_protocols::plans::Plan;
 use palpate_protocols::programme::{

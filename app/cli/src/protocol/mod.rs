@@ -5,8 +5,8 @@ mod text;
 use super::output::Output;
 use super::rig::{OpenRig, RigArgs};
 use super::{Failure, new_file, programme};
-use crate::report::plan_picture;
 use clap::{Args, Subcommand};
+use palpate_analysis::report::plan_picture;
 use palpate_protocols::file::{
     BUILT_IN, Checked, Parameter, Problem, Protocol, check, nearest_built_in, reference,
 };

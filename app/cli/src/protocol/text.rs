@@ -1,8 +1,8 @@
 //! Protocols as people read them.
 
 use super::FileReport;
-use crate::widgets::uncertain::clock;
-use palpate_protocols::file::{Parameter, Problem, Protocol, Written, word};
+use palpate_figures::uncertain::clock;
+use palpate_protocols::file::{Parameter, Problem, Protocol, Written};
 use palpate_protocols::preview::Preview;
 
 /// Steps printed one by one; the totals follow in any case.
@@ -42,7 +42,7 @@ pub(super) fn steps(written: &Written) -> String {
         let row = format!(
             "{:>5} {line:>5}  {:<13} {:>5}  {}",
             index + 1,
-            word(&planned.step),
+            planned.step.word(),
             cycle(planned.cycle),
             planned.checkpoint.as_deref().unwrap_or_default()
         );
@@ -83,7 +83,7 @@ pub(super) fn preview(protocol: &Protocol, written: &Written, preview: &Preview)
         let row = format!(
             "{:>5}  {:<13} {time:>12} {longest:>12}  {:>5}  {}",
             index + 1,
-            word(&planned.step),
+            planned.step.word(),
             cycle(planned.cycle),
             planned.checkpoint.as_deref().unwrap_or_default()
         );

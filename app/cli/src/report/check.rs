@@ -3,8 +3,8 @@
 use super::super::Failure;
 use super::super::output::Output;
 use super::counted;
-use crate::report::dossier::{Claim, claims, compare};
-use palpate_protocols::analysis::SourceError;
+use palpate_analysis::report::dossier::{Claim, claims, compare};
+use palpate_analysis::source::SourceError;
 use palpate_sessions::Summary;
 use serde::Serialize;
 use std::collections::BTreeMap;

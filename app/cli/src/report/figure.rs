@@ -3,8 +3,8 @@
 use super::super::output::Output;
 use super::super::{Failure, new_file};
 use super::{FigureArg, ReportArgs};
-use crate::report::dossier::{self, Wanted};
-use crate::report::figures::Window;
+use palpate_analysis::report::dossier::{self, Wanted};
+use palpate_analysis::report::figures::Window;
 use std::path::Path;
 
 pub(super) fn run(

@@ -19,11 +19,10 @@ use crate::workers::player::PlayerThread;
 use eframe::egui::{
     Align, CentralPanel, Context, Label, Layout, Panel, RichText, ScrollArea, Ui, vec2,
 };
+use palpate_analysis::opening::PlaybackRequest;
 use palpate_model::Nanos;
-use palpate_model::calibration::Calibration;
 use palpate_model::units::{Newtons, Seconds};
-use palpate_protocols::replay::Player;
-use palpate_protocols::runner::{Snapshot, TimeScale};
+use palpate_protocols::runner::Snapshot;
 use std::sync::Arc;
 use std::time::Duration;
 use transport::Transport;
@@ -34,22 +33,8 @@ const LOG_HEIGHT: f32 = 134.0;
 /// Between two frames while it plays: 30 a second is what an eye needs on a chart.
 const FRAME_PLAYING: Duration = Duration::from_millis(33);
 
-/// What is played and how.
-pub struct PlaybackOptions {
-    /// The session, at its beginning.
-    pub player: Player,
-    /// What its forces were read with.
-    pub calibration: Calibration,
-    /// The force at which its interlock trips.
-    pub force_max: Newtons,
-    /// What it is called in the head of the window.
-    pub name: String,
-    /// Pace at which it begins.
-    pub scale: TimeScale,
-}
-
 /// Opens the window and returns when it has closed.
-pub fn run_playback(options: PlaybackOptions) -> Result<(), String> {
+pub fn run_playback(options: PlaybackRequest) -> Result<(), String> {
     open_window(move |ctx| PlaybackApp::new(options, ctx))
 }
 
@@ -69,7 +54,7 @@ pub struct PlaybackApp {
 
 impl PlaybackApp {
     /// Stands at the beginning of the session and plays.
-    pub fn new(options: PlaybackOptions, ctx: &Context) -> Result<Self, String> {
+    pub fn new(options: PlaybackRequest, ctx: &Context) -> Result<Self, String> {
         theme::apply(ctx);
         let transport = Transport::new(options.player.end().seconds().0, options.scale);
         let (end, is_same_engine) = (options.player.end(), options.player.is_same_engine());

@@ -1,8 +1,8 @@
 //! Play, pause, speed and place, as on any recorder.
 
 use crate::theme::Tokens;
-use crate::widgets::uncertain::clock;
 use eframe::egui::{Button, Context, Key, RichText, Slider, Ui, vec2};
+use palpate_figures::uncertain::clock;
 use palpate_protocols::runner::TimeScale;
 
 /// Speeds to choose from: slow motion for a trigger, a day's rest in minutes, and as fast as it goes.

@@ -6,7 +6,7 @@ use eframe::egui::{Ui, vec2};
 use egui_plot::{
     GridInput, GridMark, HLine, HoverPosition, Line, Plot, PlotPoint, PlotPoints, Points,
 };
-use palpate_model::trade::front;
+use palpate_rheology::trade::front;
 
 /// One point.
 #[derive(Clone, Debug)]

@@ -3,10 +3,10 @@
 use super::strip::legend_ui;
 use super::style::quiet;
 use crate::theme::Tokens;
-use crate::workers::margin::MarginPoint;
 use eframe::egui::{Color32, Ui, vec2};
 use egui_plot::{FilledArea, HLine, HoverPosition, Line, Plot, PlotPoints, Span, VLine};
-use palpate_model::haptics::margin::DepthBand;
+use palpate_analysis::margin::MarginPoint;
+use palpate_haptics::margin::DepthBand;
 use std::ops::RangeInclusive;
 
 /// Opacity of a part: the grid shows through, and its edge is drawn in full.

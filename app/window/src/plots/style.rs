@@ -3,6 +3,7 @@
 use crate::theme::Tokens;
 use eframe::egui::{Color32, Rangef, Ui, Vec2, vec2};
 use egui_plot::{GridInput, GridMark, HoverPosition, Plot};
+use palpate_figures::drawing::round_up;
 
 /// Labelled steps across the width and up the height of a plot, at most.
 const STEPS_ACROSS: f64 = 9.0;
@@ -77,16 +78,6 @@ pub(crate) fn round_marks(input: GridInput, steps_max: f64) -> Vec<GridMark> {
 fn mark_text(mark: GridMark) -> String {
     let decimals = (-mark.step_size.log10().floor()).clamp(0.0, 9.0) as usize;
     format!("{:.decimals$}", mark.value)
-}
-
-/// The smallest of 1, 2 and 5 times a power of ten that is not below `least`.
-pub(crate) fn round_up(least: f64) -> f64 {
-    let power = 10f64.powf(least.log10().floor());
-    // 1e-9 forgives the rounding of the logarithm.
-    let round = [1.0, 2.0, 5.0]
-        .into_iter()
-        .find(|factor| factor * power >= least * (1.0 - 1e-9));
-    round.unwrap_or(10.0) * power
 }
 
 #[cfg(test)]

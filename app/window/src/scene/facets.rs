@@ -1,10 +1,10 @@
 //! A surface as triangles: which nodes are drawn, in which order, and how light each is.
 
 use super::camera::{Lens, Seen, Vec3, dot};
-use crate::theme::tokens::{dimmed, viridis};
 use eframe::egui::epaint::{Mesh, Vertex, WHITE_UV};
 use eframe::egui::{Color32, Pos2};
-use palpate_model::surface::{Grid, Heights, Node};
+use palpate_figures::tokens::{dimmed, viridis};
+use palpate_haptics::surface::{Grid, Heights, Node};
 
 /// Most cells along a side of the drawn surface; one with its lines drawn has half as many.
 pub const CELLS_MAX: usize = 128;
@@ -36,7 +36,7 @@ pub fn lightness(normal: Vec3) -> f64 {
 /// that colours stand while the tool moves a little.
 #[must_use]
 pub fn colour_depth(deepest: f64) -> f64 {
-    crate::plots::style::round_up(deepest.clamp(1.0, 1e6))
+    palpate_figures::drawing::round_up(deepest.clamp(1.0, 1e6))
 }
 
 /// Which of so many nodes in a row are drawn: all, or the first, the last, and every so manieth such that `keep`, where

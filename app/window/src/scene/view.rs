@@ -4,14 +4,14 @@ use super::camera::{Camera, Lens, Vec3, along};
 use super::facets::{Look, colour_depth, facets};
 use super::hand::{Hand, stylus};
 use crate::theme::Tokens;
-use crate::theme::tokens::viridis;
 use crate::widgets::places::Place;
 use eframe::egui::epaint::Mesh;
 use eframe::egui::{
     Align2, Event, EventFilter, FontId, Key, Painter, PointerButton, Pos2, Rect, Response, Role,
     Sense, Shape, Stroke, TextStyle, Ui, WidgetInfo, pos2, vec2,
 };
-use palpate_model::surface::Heights;
+use palpate_figures::tokens::viridis;
+use palpate_haptics::surface::Heights;
 
 /// Name of the picture, for the palette and for who reads the screen aloud.
 pub const NAME: &str = "scene picture";
@@ -326,7 +326,7 @@ fn bar_shape(painter: &Painter, rect: Rect, deepest: f64, tokens: &Tokens, font:
 mod tests {
     use super::*;
     use eframe::egui::{CentralPanel, Context, Modifiers, RawInput};
-    use palpate_model::surface::Grid;
+    use palpate_haptics::surface::Grid;
 
     /// One frame of a picture of 800 by 600 points.
     fn frame(ctx: &Context, view: &mut SceneView, time: f64, events: Vec<Event>) -> Response {

@@ -60,7 +60,10 @@ fn outcome_ui(ui: &mut Ui, outcome: &Outcome) {
 fn log_ui(ui: &mut Ui, run: &RunView) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let alarm = match (&run.log_error, &run.verdict_error) {
-        (Some(reason), _) => Some(format!("The session could not be closed: {reason}")),
+        (Some(reason), _) => Some(format!(
+            "The session was not kept as it was recorded: {reason}; 'palpate doctor {}' tells what is missing",
+            run.folder.display()
+        )),
         (None, Some(reason)) => Some(format!(
             "The recording is whole, but the verdict could not be written beside it: {reason}"
         )),

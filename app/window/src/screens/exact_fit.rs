@@ -1,11 +1,11 @@
 //! The exact fit after a run: the words of `palpate fit`, from the same formatter.
 
 use super::parameters::{cell, tight};
-use crate::report::text::{ParameterText, quality};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use eframe::egui::{Label, RichText, Ui};
-use palpate_model::fit::FitReport;
+use palpate_analysis::report::text::{ParameterText, quality};
+use palpate_rheology::fit::FitReport;
 
 /// Draws the report: parameters with their intervals, quality, every sentence.
 pub fn exact_ui(ui: &mut Ui, report: &FitReport) {

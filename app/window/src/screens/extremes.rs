@@ -1,17 +1,17 @@
 //! What is right and what is refused at the ends of every range.
 
 use crate::command::{Command, Commands};
-use crate::report::extremes::{GroupSummary, VERDICTS, summary};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
-use crate::workers::extremes::survey;
 use crate::workers::task::Task;
 use eframe::egui::{ComboBox, Context, Label, RichText, Ui};
-use palpate_model::extremes::{Extent, Row, Verdict};
+use palpate_analysis::extremes::survey;
+use palpate_analysis::report::extremes::{GroupSummary, VERDICTS, summary};
+use palpate_rheology::extremes::{Extent, Row, Verdict};
 
 /// How much is run, in words.
 const EXTENTS: [(Extent, &str); 2] = [

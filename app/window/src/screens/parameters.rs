@@ -1,9 +1,9 @@
 //! The force model's parameters as they become known, each with its uncertainty.
 
-use crate::report::text::{ParameterText, typeset};
 use crate::theme::Tokens;
 use eframe::egui::{Align, Layout, RichText, Ui, vec2};
-use palpate_model::fit::{LiveEstimate, Parameter};
+use palpate_analysis::report::text::{ParameterText, typeset};
+use palpate_model::estimate::{LiveEstimate, Parameter};
 use palpate_model::rig::Phase;
 use palpate_protocols::runner::RunView;
 

@@ -4,8 +4,8 @@ use super::form::ProtocolForm;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
 use crate::widgets::tick_box::tick_box;
-use crate::widgets::uncertain::clock;
 use eframe::egui::{RichText, Ui};
+use palpate_figures::uncertain::clock;
 use palpate_protocols::preview::Preview;
 
 /// Draws durations, forces and storage, then refusals and notes.

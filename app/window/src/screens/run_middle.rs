@@ -79,7 +79,7 @@ pub fn first_view(plan: &Plan) -> Middle {
     if has(|step| matches!(step, Step::Weigh(_))) {
         Middle::Weighing
     } else if has(|step| matches!(step, Step::FindContact(_) | Step::FindBase(_)))
-        && !has(|step| matches!(step, Step::Ramp { .. } | Step::LoadTo(_) | Step::Sine(_)))
+        && !has(|step| matches!(step, Step::Ramp(_) | Step::LoadTo(_) | Step::Sine(_)))
     {
         // It looks for the surface and no more.
         Middle::Approach

@@ -6,9 +6,9 @@ use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::path_dialog::FolderDialog;
-use crate::workers::recorded::{Ended, Replayed, ended_words};
 use crate::workers::task::Task;
 use eframe::egui::{Context, Ui};
+use palpate_analysis::recorded::{Ended, Replayed, ended_words};
 use std::path::{Path, PathBuf};
 
 /// How a recording is computed again.

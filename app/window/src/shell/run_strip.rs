@@ -4,10 +4,10 @@
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
-use crate::widgets::uncertain::clock;
 use eframe::egui::{
     Align, Button, Frame, Key, Label, Layout, Margin, RichText, Stroke, TextEdit, Ui, vec2,
 };
+use palpate_figures::uncertain::clock;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{Operator, PauseView};
 use palpate_protocols::runner::{PromptView, RunView};

@@ -4,8 +4,8 @@ use super::activity::{Activity, is_motion_possible, run_in_progress};
 use crate::command::{Command, Commands};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::state_badge::badge_ui;
-use crate::widgets::uncertain::clock;
 use eframe::egui::{Align, Button, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2};
+use palpate_figures::uncertain::clock;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_protocols::runner::{RunView, Snapshot};
 

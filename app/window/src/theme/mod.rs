@@ -1,12 +1,10 @@
 //! How the window looks: colour tokens and the type scale, applied once at the start.
 
-pub mod tokens;
-
 use eframe::egui::{
     Context, CornerRadius, FontFamily, FontId, Stroke, Style, TextStyle, Theme, ThemePreference,
     Visuals, vec2,
 };
-pub use tokens::Tokens;
+pub use palpate_figures::tokens::Tokens;
 
 /// Text style of the numbers read from across the room.
 #[must_use]

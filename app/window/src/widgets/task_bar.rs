@@ -1,10 +1,10 @@
 //! Start of a longer piece of work, how far it is, and its end.
 
 use super::reason_button::reason_button;
-use super::uncertain::clock;
 use crate::theme::Tokens;
 use crate::workers::task::{Standing, Task};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
+use palpate_figures::uncertain::clock;
 
 /// What was pressed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

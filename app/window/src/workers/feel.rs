@@ -1,8 +1,8 @@
 //! The haptic loop as the window runs it: a thread of its own that ticks, and what was seen of it so far.
 
 use super::trail::{LOOK_S, forget_old};
-use palpate_model::haptics::Flags;
-use palpate_model::haptics::simulation::{SimulationSettings, SimulationTick};
+use palpate_haptics::Flags;
+use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
 use palpate_protocols::haptics::taped::{LedRecorder, TapedLed};
 use palpate_protocols::haptics::timing::Kept;

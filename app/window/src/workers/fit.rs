@@ -1,101 +1,15 @@
-//! From a source on disk to a fit, as the command line and the window both make it; and the
-//! window's refit of a run that has ended, on a thread of its own.
+//! The refit of a run that has ended, on a thread of its own.
 
 use super::Job;
-use crate::report::thin::thin;
 use eframe::egui::Context;
 use egui_plot::PlotPoint;
-use palpate_model::calibration::Calibration;
-use palpate_model::fit::{FitError, FitOptions, FitReport, FitSample, Systematic, fit, systematic};
+use palpate_analysis::fit::fit_source;
+use palpate_analysis::source::Wanted;
+use palpate_figures::thin::thin;
 use palpate_model::rig::Phase;
-use palpate_model::units::Seconds;
-use palpate_protocols::analysis::{self, FitSource, SourceError, Wanted};
-use palpate_protocols::compliance::Correction;
-use palpate_protocols::origin::Origin;
 use palpate_protocols::runner::{RunView, Stopwatch};
-use palpate_sessions::import::ColumnNames;
+use palpate_rheology::fit::{FitOptions, FitReport};
 use std::path::{Path, PathBuf};
-
-/// What came of a source that could be read.
-#[derive(Clone, Debug)]
-pub struct Fitted {
-    /// The samples fitted.
-    pub samples: Vec<FitSample>,
-    /// Session time of the first sample.
-    pub start: Seconds,
-    /// What the reader of the source remarked.
-    pub notes: Vec<String>,
-    /// The fit, or why there is none.
-    pub result: Result<FitReport, FitError>,
-    /// Wall seconds of the fit alone.
-    pub seconds: f64,
-    /// The calibration its forces were read with; `None` for a table.
-    pub calibration: Option<Calibration>,
-    /// What the calibration adds to the uncertainty, once asked for.
-    pub systematic: Option<Systematic>,
-    /// What the rig's compliance does to the depths, or would, once asked for.
-    pub compliance: Option<Correction>,
-}
-
-impl Fitted {
-    /// Fits what was read.
-    #[must_use]
-    pub fn of(source: FitSource, options: &FitOptions) -> Self {
-        let watch = Stopwatch::start();
-        let result = fit(&source.samples, options);
-        Self {
-            seconds: watch.seconds(),
-            samples: source.samples,
-            start: source.start,
-            notes: source.notes,
-            calibration: source.calibration,
-            systematic: None,
-            compliance: None,
-            result,
-        }
-    }
-
-    /// Adds what the errors of calibration and compliance do to the parameters; a table has none, and a refusal is
-    /// a note. `options` are those of the fit.
-    #[must_use]
-    pub fn with_systematic(mut self, options: &FitOptions) -> Self {
-        let Ok(report) = &self.result else {
-            return self;
-        };
-        let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
-        let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
-            let record = origin.traced("", &self.samples);
-            let found = origin.is_known().then(|| systematic(record, options));
-            found.transpose().map_err(|err| err.to_string())
-        });
-        match found {
-            Ok(Some(found)) => {
-                self.result = Ok(report.clone().with_systematic(&found));
-                self.systematic = Some(found);
-            }
-            Ok(None) => {}
-            Err(reason) => self.notes.push(no_systematic(&reason)),
-        }
-        self
-    }
-}
-
-/// That systematic errors are not told, and why.
-#[must_use]
-pub fn no_systematic(reason: &str) -> String {
-    format!("what calibration and compliance add to the uncertainty cannot be told: {reason}")
-}
-
-/// Reads what is wanted of a session or a table and fits it. `columns` names the columns of a table without header.
-pub fn fit_source(
-    path: &Path,
-    columns: Option<&ColumnNames>,
-    wanted: Wanted,
-    options: &FitOptions,
-) -> Result<Fitted, SourceError> {
-    let source = analysis::read_stretch(path, columns, wanted)?;
-    Ok(Fitted::of(source, options))
-}
 
 /// Columns for which the curves of a plot are thinned: more than a screen is wide.
 const COLUMNS: usize = 2000;

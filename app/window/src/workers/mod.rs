@@ -1,29 +1,13 @@
 //! Work that may take its time, each on a named thread of its own: the window never waits.
 
-pub mod analyses;
-pub mod calibrations;
-pub mod edits;
-pub mod exports;
-pub mod extremes;
 pub mod feel;
-pub mod find;
 pub mod fit;
-pub mod follow_session;
-pub mod haptics;
-pub mod haptics_tape;
-pub mod imports;
 pub mod latest;
-pub mod margin;
 pub mod path_dialog;
 pub mod player;
-pub mod pool;
 pub mod ports;
-pub mod recorded;
 pub mod recovery;
 pub mod review;
-pub mod scene;
-pub mod scene_bench;
-pub mod select;
 pub mod task;
 pub mod touch;
 pub mod trail;

@@ -2,35 +2,9 @@
 
 use super::Job;
 use eframe::egui::Context;
+use palpate_analysis::progress::Progress;
 use palpate_protocols::runner::Stopwatch;
-use std::ops::ControlFlow;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
-use std::sync::{Arc, Mutex, PoisonError};
-
-/// What a worker tells while it works.
-#[derive(Debug, Default)]
-pub struct Progress {
-    done: AtomicUsize,
-    of: AtomicUsize,
-    what: Mutex<String>,
-    is_cancelled: AtomicBool,
-}
-
-impl Progress {
-    /// `done` of `of` pieces of like length are done and `what` comes next. Break: nobody wants the rest.
-    pub fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
-        self.done.store(done, Ordering::Relaxed);
-        self.of.store(of, Ordering::Relaxed);
-        let mut text = self.what.lock().unwrap_or_else(PoisonError::into_inner);
-        text.clear();
-        text.push_str(what);
-        if self.is_cancelled.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    }
-}
+use std::sync::Arc;
 
 /// How far a task is, for drawing.
 #[derive(Clone, Debug, PartialEq)]
@@ -98,7 +72,7 @@ impl<T: Send + 'static> Task<T> {
             return;
         }
         self.since = None;
-        let is_cancelled = self.progress.is_cancelled.load(Ordering::Relaxed);
+        let is_cancelled = self.progress.is_cancelled();
         match answer {
             // A cancelled task has no answer; what was known before stays.
             Some(Err(_)) if is_cancelled => {}
@@ -112,13 +86,13 @@ impl<T: Send + 'static> Task<T> {
 
     /// Asks the work to end at its next piece.
     pub fn cancel(&self) {
-        self.progress.is_cancelled.store(true, Ordering::Relaxed);
+        self.progress.cancel();
     }
 
     /// Whether it was asked to end and has not yet.
     #[must_use]
     pub fn is_ending(&self) -> bool {
-        self.job.is_busy() && self.progress.is_cancelled.load(Ordering::Relaxed)
+        self.job.is_busy() && self.progress.is_cancelled()
     }
 
     /// The last answer.
@@ -131,12 +105,11 @@ impl<T: Send + 'static> Task<T> {
     #[must_use]
     pub fn standing(&self) -> Option<Standing> {
         let seconds = self.since.as_ref()?.seconds();
-        let done = self.progress.done.load(Ordering::Relaxed) as f64;
-        let of = self.progress.of.load(Ordering::Relaxed) as f64;
-        let what = self.progress.what.lock();
+        let (done, of, what) = self.progress.read();
+        let (done, of) = (done as f64, of as f64);
         Some(Standing {
             fraction: if of > 0.0 { (done / of).min(1.0) } else { 0.0 },
-            what: what.unwrap_or_else(PoisonError::into_inner).clone(),
+            what,
             seconds,
             seconds_left: (done > 0.0).then(|| seconds * (of - done).max(0.0) / done),
         })

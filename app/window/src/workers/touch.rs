@@ -1,10 +1,10 @@
 //! The scene as the window has it: computed ahead along a path, or in a loop of its own, and what was seen of it.
 
 use super::trail::{LOOK_S, forget_old};
-use palpate_model::haptics::LawSettings;
-use palpate_model::haptics::margin::{Device, Margin, Watch};
-use palpate_model::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
-use palpate_model::surface::{Grid, Heights, MeshError};
+use palpate_haptics::LawSettings;
+use palpate_haptics::margin::{Device, Margin, Watch};
+use palpate_haptics::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
+use palpate_haptics::surface::{Grid, Heights, MeshError};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_protocols::haptics::SceneLoop;
 use palpate_protocols::haptics::scene::SceneRecorder;

@@ -36,7 +36,6 @@ pub use model::{GalilModel, GalilModelError};
 use super::Device;
 use super::faults::DeviceFault;
 use super::plant::{CellFault, Plant};
-use crate::sim::SimSettings;
 use analog::Analog;
 use axis::{Axis, Polarity};
 use client::Client;
@@ -45,6 +44,7 @@ use contour::Contour;
 use errors::ErrorCode;
 use format::Format;
 use memory::Memory;
+use palpate_drivers::sim::SimSettings;
 use palpate_model::rig::HandAction;
 use palpate_model::{Nanos, Position, Seconds};
 use program::{Program, Thread};
@@ -198,7 +198,8 @@ impl GalilEmulator {
     /// All that a reset forgets. The slide stays where it stands, at zero counts.
     fn initialise(&mut self) {
         if let Some(slide) = self.axes.first() {
-            self.plant.shift(slide.filtered * crate::sim::MM_PER_PULSE);
+            self.plant
+                .shift(slide.filtered * palpate_drivers::sim::MM_PER_PULSE);
         }
         let axes = self.settings.model.axes();
         self.clock = SampleClock::new(self.now, self.settings.clock_ppm);

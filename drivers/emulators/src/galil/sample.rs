@@ -6,7 +6,7 @@ use super::data_record::{General, record};
 use super::record::Source;
 use super::settings::Setting;
 use super::{Answer, GalilEmulator};
-use crate::sim::MM_PER_PULSE;
+use palpate_drivers::sim::MM_PER_PULSE;
 use palpate_model::Nanos;
 
 impl GalilEmulator {

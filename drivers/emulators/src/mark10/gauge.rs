@@ -1,10 +1,10 @@
 //! A Mark-10 gauge of Series 5 as it answers (Series 5 user's guide, pages 17 to 19; Model 7i user's guide, pages 29 to 31).
 
-use crate::emulate::DeviceFault;
-use crate::emulate::cell::{EmulatedCell, Felt};
-use crate::mark10::gauge::{FILTER_MAX, RATES};
-use crate::mark10::protocol::ForceUnit;
-use crate::sim::{Cause, Random};
+use crate::DeviceFault;
+use crate::cell::{EmulatedCell, Felt};
+use palpate_drivers::mark10::gauge::{FILTER_MAX, RATES};
+use palpate_drivers::mark10::protocol::ForceUnit;
+use palpate_drivers::sim::{Cause, Random};
 use palpate_model::Nanos;
 use std::collections::VecDeque;
 

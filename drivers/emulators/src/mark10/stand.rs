@@ -6,9 +6,9 @@
 //! unknown letters are passed over.
 
 use super::gauge::{EmulatedGauge, EmulatedGaugeSettings};
-use crate::emulate::cell::{EmulatedCell, Felt};
-use crate::emulate::{Device, DeviceFault, Plant};
-use crate::sim::SimSettings;
+use crate::cell::{EmulatedCell, Felt};
+use crate::{Device, DeviceFault, Plant};
+use palpate_drivers::sim::SimSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;

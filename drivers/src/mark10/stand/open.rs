@@ -253,6 +253,7 @@ fn describe(settings: &StandSettings, scale: GaugeScale, pace: Pace, told: &str)
         cell_delay: palpate_model::units::Seconds(0.0),
         ticks_per_sample: ticks.max(1.0) * BETWEEN,
         unseen_max: settings.unseen,
+        sensors: Default::default(),
     }
 }
 

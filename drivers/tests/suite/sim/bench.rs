@@ -1,8 +1,6 @@
 //! What stands before the probe, what a person does there, and how far the rig gives way.
 
-mod common;
-
-use common::{answer_to, move_to, next_reading, run_move};
+use super::host::{answer_to, move_to, next_reading, run_move};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::{HandAction, RigCommand};

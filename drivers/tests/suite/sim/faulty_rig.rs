@@ -1,8 +1,6 @@
 //! The faulty stand-in fails as told, when told, and otherwise is the rig inside.
 
-mod common;
-
-use common::{FOREVER, answer_to, events_with, move_to, settings};
+use super::host::{self, FOREVER, answer_to, events_with, move_to, settings};
 use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
 use palpate_drivers::{Rig, RigEvent, RigEventBody, open};
@@ -262,7 +260,7 @@ fn a_restarted_controller_has_lost_everything() {
         // It can be used again like one just powered up.
         assert!(answer_to(&mut rig, move_to(100, 3.0)).is_err());
         let mut tracker = PathTracker::new(rig.description());
-        for reading in common::run_move(&mut rig, 100, 3.0) {
+        for reading in host::run_move(&mut rig, 100, 3.0) {
             if reading.status.has(AxisStatus::MOVING) && tracker.is_at_rest() {
                 let RigCommand::MoveTo(command) = move_to(100, 3.0) else {
                     panic!("not a move");

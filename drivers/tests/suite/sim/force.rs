@@ -1,8 +1,6 @@
 //! What the load cell says about the specimen, read through the laboratory's calibration.
 
-mod common;
-
-use common::{move_to, next_reading, settings};
+use super::host::{self, move_to, next_reading, settings};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
 use palpate_model::rig::RigCommand;
@@ -13,7 +11,7 @@ use palpate_model::{MmPerS, Newtons, Position, Seconds};
 fn indented(rig: &mut SimRig, depth_mm: f64, speed: f64) -> i64 {
     let target = ((rig.truth().surface_counted().0 + depth_mm) / 0.015).round() as i64;
     assert!(rig.description().check_speed(MmPerS(speed)).is_ok());
-    common::run_move(rig, target, speed);
+    host::run_move(rig, target, speed);
     target
 }
 
@@ -57,7 +55,7 @@ fn force_is_that_of_the_body_along_the_true_path() {
         let (surface, body) = (rig.truth().surface, rig.truth().body);
         let tick = Seconds(clock.tick_nanos() as f64 * 1e-9);
         let mut state = KelvinState::at_rest_from(Position(0.0).depth_from(surface));
-        common::answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
+        host::answer_to(&mut rig, RigCommand::EnableMotor).unwrap();
         // Ahead of the tissue by a margin, then into it, slowly, and out of it, fast.
         let target = ((rig.truth().surface_counted().0 + 8.0) / 0.015) as i64;
         let mut largest: f64 = 0.0;

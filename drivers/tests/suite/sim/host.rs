@@ -1,7 +1,4 @@
-//! What the tests of this crate share: a host that drives a rig the way a runner does.
-
-#![expect(clippy::unwrap_used, reason = "a helper of tests panics as they do")]
-#![allow(dead_code, reason = "every test file uses its own part of this")]
+//! A host that drives a rig the way a runner does.
 
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};

@@ -1,8 +1,6 @@
 //! What a host reconstructs from commands and samples is where the probe really is.
 
-mod common;
-
-use common::{answer_to, ideal, move_to, next_reading, oscillate, run_move, settings};
+use super::host::{self, answer_to, ideal, move_to, next_reading, oscillate, run_move, settings};
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};
@@ -40,7 +38,7 @@ fn wander(seed: u64, clock: SimClock) -> Seen {
     rig.send(RigCommand::EnableMotor);
     let mut pause = 5;
     while seen.samples < 60_000 {
-        let Some(event) = rig.next_event(common::FOREVER) else {
+        let Some(event) = rig.next_event(host::FOREVER) else {
             panic!("the rig fell silent");
         };
         match event.body {
@@ -168,7 +166,7 @@ fn a_stop_decelerates_and_rests_on_the_pulse_it_reports() {
     }
     let before = rig.truth().position;
     rig.send(RigCommand::Stop);
-    let samples = common::samples_to_rest(&mut rig);
+    let samples = host::samples_to_rest(&mut rig);
     let stopping = samples
         .iter()
         .filter(|sample| sample.status.has(AxisStatus::STOPPING))
@@ -250,7 +248,7 @@ fn a_sine_is_stopped_by_braking_and_halted_at_once() {
         }
         let (before, speed) = (rig.truth().position, 0.015 * 100.0 * std::f64::consts::PI);
         rig.send(command);
-        let last = *common::samples_to_rest(&mut rig).last().unwrap();
+        let last = *host::samples_to_rest(&mut rig).last().unwrap();
         assert!(!last.status.has(AxisStatus::MOVING));
         let truth = rig.truth();
         assert!((truth.position_counted().0 - last.pulses as f64 * 0.015).abs() < 1e-12);
@@ -267,7 +265,7 @@ fn a_sine_is_stopped_by_braking_and_halted_at_once() {
         );
         // The axis takes the next motion from there.
         answer_to(&mut rig, move_to(0, 3.0)).unwrap();
-        assert_eq!(common::samples_to_rest(&mut rig).last().unwrap().pulses, 0);
+        assert_eq!(host::samples_to_rest(&mut rig).last().unwrap().pulses, 0);
     }
 }
 
@@ -286,7 +284,7 @@ fn settings_are_rounded_down_and_read_back() {
     assert!((made.speed.0 - 0.75).abs() < 1e-12);
     assert!((made.acceleration.0 - 30.72).abs() < 1e-12);
     // What the rig offers passes through unchanged but for the last digit.
-    common::samples_to_rest(&mut rig);
+    host::samples_to_rest(&mut rig);
     for quanta in 1..=666 {
         let speed = f64::from(quanta) * 0.03;
         rig.description().check_speed(MmPerS(speed)).unwrap();
@@ -297,7 +295,7 @@ fn settings_are_rounded_down_and_read_back() {
         assert!(
             (made.speed.0 - speed).abs() < 1e-12 && (made.acceleration.0 - 61.44).abs() < 1e-12
         );
-        common::samples_to_rest(&mut rig);
+        host::samples_to_rest(&mut rig);
     }
 }
 
@@ -335,7 +333,7 @@ fn refusals_say_why() {
     assert!(why(&mut rig, oscillate(20, 1000, 1)).contains("while the axis moves"));
     let define = RigCommand::DefinePosition { pulses: 0 };
     assert!(why(&mut rig, define).contains("while the axis moves"));
-    let last = *common::samples_to_rest(&mut rig).last().unwrap();
+    let last = *host::samples_to_rest(&mut rig).last().unwrap();
     assert_eq!(last.pulses, 100);
 }
 
@@ -345,7 +343,7 @@ fn a_flood_of_commands_is_refused_not_stored() {
     for _ in 0..1000 {
         rig.send(RigCommand::EnableMotor);
     }
-    let events = common::events_with(&mut rig, &[], palpate_model::Nanos::from_millis(50));
+    let events = host::events_with(&mut rig, &[], palpate_model::Nanos::from_millis(50));
     let acks = events
         .iter()
         .filter(|event| matches!(event.body, RigEventBody::Ack(_)))

@@ -1,8 +1,6 @@
 //! Home and limit switches, and where the slider stands at power-on.
 
-mod common;
-
-use common::{answer_to, ideal, move_to, next_reading, run_move};
+use super::host::{answer_to, ideal, move_to, next_reading, run_move};
 use palpate_drivers::Rig;
 use palpate_model::rig::{AxisStatus, RigCommand};
 

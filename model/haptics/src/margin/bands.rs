@@ -1,9 +1,9 @@
 //! Bands of depth in which something is so, for bodies of any number of terms.
 
 use super::linear::Linear;
-use crate::families::POWER_MAX;
-use crate::integrators::SeriesBody;
-use crate::units::Depth;
+use palpate_model::units::Depth;
+use palpate_rheology::families::POWER_MAX;
+use palpate_rheology::integrators::SeriesBody;
 use serde::{Deserialize, Serialize};
 
 /// From a depth to a deeper one.
@@ -19,7 +19,7 @@ pub struct DepthBand {
 const DEPTHS: u32 = 4000;
 
 /// Depths around which small slow cycles return energy: `tau_sig x < tau_eps g'(x)`. Of three terms the same as
-/// [`crate::viscoelastic::admissibility::active_cycles`], within the stroke.
+/// [`palpate_model::viscoelastic::admissibility::active_cycles`], within the stroke.
 #[must_use]
 pub fn active_cycles(body: &SeriesBody<POWER_MAX>, deepest: Depth) -> Vec<DepthBand> {
     where_above(deepest, DEPTHS, |depth| Linear::of(body, depth).lag())

@@ -1,8 +1,8 @@
 //! The body about a depth, and what a sampled step makes of it.
 
-use crate::families::POWER_MAX;
-use crate::integrators::{Scheme, SeriesBody, Weights};
-use crate::units::Depth;
+use palpate_model::units::Depth;
+use palpate_rheology::families::POWER_MAX;
+use palpate_rheology::integrators::{Scheme, SeriesBody, Weights};
 
 /// The body for small motions about a depth: `tau F' + F = stiffness x + damping x'`.
 #[derive(Clone, Copy, Debug, PartialEq)]

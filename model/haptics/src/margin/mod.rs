@@ -17,9 +17,9 @@ pub use bands::{DepthBand, active_cycles, active_pokes};
 pub use linear::{Linear, Sampled};
 
 use super::Period;
-use crate::families::POWER_MAX;
-use crate::integrators::{Scheme, SeriesBody};
-use crate::units::{Depth, MmPerS, Newtons};
+use palpate_model::units::{Depth, MmPerS, Newtons};
+use palpate_rheology::families::POWER_MAX;
+use palpate_rheology::integrators::{Scheme, SeriesBody};
 use serde::{Deserialize, Serialize};
 
 /// What a device brings to the loop.

@@ -1,7 +1,7 @@
 //! The master's encoder: lines, edges and how fast they can be counted.
 
 use super::rack::Pinion;
-use crate::haptics::{Flags, Period};
+use crate::{Flags, Period};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 

@@ -1,7 +1,7 @@
 //! From master counts to slave pulses, without drift.
 
 use super::{Encoder, Pinion};
-use crate::haptics::{Flags, Period};
+use crate::{Flags, Period};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -134,7 +134,7 @@ impl Gear {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::haptics::rig::Quadrature;
+    use crate::rig::Quadrature;
 
     #[test]
     fn the_ratio_is_the_source_s() {

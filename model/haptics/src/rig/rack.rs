@@ -1,7 +1,7 @@
 //! The rack on its slide, with the motor's rotor and whoever holds it, as one moving mass.
 
 use super::hand::Hand;
-use crate::haptics::inertia;
+use crate::inertia;
 use serde::{Deserialize, Serialize};
 
 /// The pinion.
@@ -149,7 +149,7 @@ impl Rack {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::haptics::rig::HandPath;
+    use crate::rig::HandPath;
 
     #[test]
     fn a_free_swing_keeps_its_energy_and_period() {

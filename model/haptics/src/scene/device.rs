@@ -5,8 +5,8 @@
 //! the sensor.
 
 use super::{LED_MAX, SceneError, SceneSettings};
-use crate::haptics::Period;
-use crate::haptics::rig::{Hand, HandPath, Rack, RackEnergies, RackForces};
+use crate::Period;
+use crate::rig::{Hand, HandPath, Rack, RackEnergies, RackForces};
 use serde::{Deserialize, Serialize};
 
 /// Parts of a tick in which the device moves: a quarter of a millisecond, a 30th of the period in which a firm hand's spring

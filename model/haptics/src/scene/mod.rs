@@ -1,5 +1,5 @@
 //! A piece of tissue that is seen and felt: the [surface](crate::surface) that follows a stylus, the
-//! [force law](crate::haptics::ForceLaw) that answers it, and the device between them and a hand.
+//! [force law](crate::ForceLaw) that answers it, and the device between them and a hand.
 //!
 //! One [`LedScene::tick`] is: the device moves under the force held; then [`Scene::feel`]: the contact point follows it on the
 //! surface at rest, so that the force does not see its own deformation; the law makes a force of depth; guards bound it along the
@@ -18,15 +18,15 @@ pub use path::ScenePath;
 pub use settings::{START_HEIGHT_MM, SceneError, SceneSettings};
 pub use why::WhyNoForce;
 
-use crate::haptics::{
-    BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
-    PassivityObserver,
-};
 use crate::surface::{
     Contact, HeightField, Proxy, Recovery, Rect, Side, Surface, Touch, TouchState,
 };
-use crate::units::{Depth, Newtons, Seconds};
+use crate::{
+    BuzzDetector, BuzzSettings, Flags, ForceGuard, ForceLaw, LawSettings, PassivityController,
+    PassivityObserver,
+};
 use device::length;
+use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// Ticks of a stall that device and law are led through; after longer ones they stand where they were.
 const LED_MAX: u64 = 1000;

@@ -1,12 +1,12 @@
 //! What a scene is made of.
 
 use super::device::DeviceSettings;
-use crate::haptics::{ControllerSettings, GuardSettings, LawError, Period};
-use crate::integrators::Scheme;
 use crate::surface::{Cut, Grid, HeightField, MeshError, Method, MethodError, RecoveryError};
 use crate::surface::{ProxyError, Shear};
-use crate::units::Newtons;
-use crate::viscoelastic::ModifiedKelvin;
+use crate::{ControllerSettings, GuardSettings, LawError, Period};
+use palpate_model::units::Newtons;
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_rheology::integrators::Scheme;
 use thiserror::Error;
 
 /// Height above the surface at rest at which a scene begins, over the middle of the mesh, in mm.

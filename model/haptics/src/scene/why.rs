@@ -1,7 +1,7 @@
 //! Why a hand feels nothing, or less than the model says.
 
 use super::device::DeviceSettings;
-use crate::haptics::Flags;
+use crate::Flags;
 use crate::surface::TouchState;
 use serde::Serialize;
 

@@ -1,6 +1,6 @@
 //! What was measured of a scene: points of error and cost.
 
-use crate::integrators::Scheme;
+use palpate_rheology::integrators::Scheme;
 use serde::{Deserialize, Serialize};
 
 /// A measured mesh.

@@ -15,7 +15,7 @@ use super::contact::{Cut, Moved, Poke, Side};
 use super::grid::{Grid, Node, Rect};
 use super::mesh::{HeightField, Pins};
 use super::recover::{Recovery, trimmed};
-use crate::vectors::wide;
+use palpate_rheology::vectors::wide;
 
 /// Contacts that are worked through together.
 pub(super) const TOGETHER: usize = 8;

@@ -2,7 +2,7 @@
 
 use super::grid::{Grid, Rect};
 use super::heights::{Heights, face, unit};
-use crate::vectors::wide;
+use palpate_rheology::vectors::wide;
 
 /// Unit normals of all nodes, row by row.
 #[derive(Clone, Debug)]

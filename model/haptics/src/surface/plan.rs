@@ -7,15 +7,15 @@
 
 use super::curves::{CutPoint, FamilyPoint, MeshPoint, Pair, SceneCurves, StepPoint};
 use super::mesh::INERT;
-use crate::tolerance::Tolerance;
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
+use palpate_rheology::tolerance::Tolerance;
 use serde::Serialize;
 
 /// What a scene tolerates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Needs {
     /// Error of force, such as so many percent of what a hand notices
-    /// ([`THRESHOLD_SHARE`](crate::tolerance::THRESHOLD_SHARE)).
+    /// ([`THRESHOLD_SHARE`](palpate_rheology::tolerance::THRESHOLD_SHARE)).
     pub force: Tolerance,
     /// The force at which that is meant.
     pub peak: Newtons,

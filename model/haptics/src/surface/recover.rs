@@ -9,8 +9,8 @@
 //! the second the lower or upper envelope of two fields that are.
 
 use super::mesh::HeightField;
-use crate::units::Seconds;
-use crate::vectors::wide;
+use palpate_model::units::Seconds;
+use palpate_rheology::vectors::wide;
 use thiserror::Error;
 
 /// How far beyond rest a recovering node aims, in mm: a nanometre, a ten-thousandth of what any

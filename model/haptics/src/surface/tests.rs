@@ -2,8 +2,8 @@ use super::chain::Chain;
 use super::contact::Poke;
 use super::sorted::Sorted;
 use super::*;
-use crate::random::SplitMix;
-use crate::units::Seconds;
+use palpate_model::random::SplitMix;
+use palpate_model::units::Seconds;
 
 fn field(n: usize) -> HeightField {
     HeightField::flat(Grid::new(n, n, 1.0).expect("a grid"), 0.25).expect("a field")

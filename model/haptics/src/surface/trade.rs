@@ -8,7 +8,7 @@ use super::grid::Grid;
 use super::mesh::{HeightField, Shear};
 use super::mesh_error::MeshError;
 use super::recover::Recovery;
-use crate::integrators::{IntegratorError, Scheme, SeriesBody};
+use palpate_rheology::integrators::{IntegratorError, Scheme, SeriesBody};
 use serde::{Deserialize, Serialize};
 
 /// Nodes along a side of the mesh that stands for the truth.

@@ -1,8 +1,8 @@
-//! Master to slave: rows G1 to G4. The ratio itself (G1) is tested in `model/src/haptics/rig/gear.rs`.
+//! Master to slave: rows G1 to G4. The ratio itself (G1) is tested in `model/haptics/src/rig/gear.rs`.
 
-use palpate_model::haptics::Flags;
-use palpate_model::haptics::Period;
-use palpate_model::haptics::rig::{
+use palpate_haptics::Flags;
+use palpate_haptics::Period;
+use palpate_haptics::rig::{
     Encoder, EncoderCounter, Gear, GearRatio, Pinion, Quadrature, SlaveDrive,
 };
 use palpate_model::random::SplitMix;

@@ -1,16 +1,16 @@
 //! Device, hand and loop together: rows L1 to L7, L10 and L11. Figures are printed; run with `--nocapture` to read them.
 
-use palpate_model::haptics::closed_loop::{
+use palpate_haptics::closed_loop::{
     Command, Plant, PlantSettings, Rendered, Renderer, RunTick, run,
 };
-use palpate_model::haptics::margin::{Device, Watch};
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::{
+use palpate_haptics::margin::{Device, Watch};
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::{
     ControllerSettings, Flags, ForceLaw, GuardSettings, LawSettings, Period, inertia,
 };
-use palpate_model::integrators::{Scheme, SeriesBody};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons, Seconds};
+use palpate_rheology::integrators::{Scheme, SeriesBody};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 /// A count of 1024 lines times four at the rack, in mm, and of the lines alone.
@@ -275,7 +275,7 @@ fn swing_about(
         ..PlantSettings::bare(period)
     };
     let law = LawSettings {
-        pull: palpate_model::haptics::Pull::AsModel,
+        pull: palpate_haptics::Pull::AsModel,
         ..LawSettings::of::<3>(THESIS, period)
     };
     let law = ForceLaw::new(law, Depth(depth)).expect("a law");

@@ -1,13 +1,13 @@
 //! The margin: closed forms beside the criterion at every frequency, bands of the thesis body, sentences.
 
-use palpate_model::haptics::Period;
-use palpate_model::haptics::margin::{
+use palpate_haptics::Period;
+use palpate_haptics::margin::{
     Cause, Device, Linear, Sampled, Watch, active_cycles, active_pokes, criterion,
 };
-use palpate_model::integrators::{Scheme, SeriesBody};
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::{ModifiedKelvin, admissibility};
 use palpate_model::{Depth, MmPerS, Newtons};
+use palpate_rheology::integrators::{Scheme, SeriesBody};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 

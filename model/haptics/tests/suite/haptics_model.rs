@@ -1,17 +1,15 @@
 //! The force law against closed forms: rows M1 to M8. Orders of convergence, limits of stability, the textbook step and
-//! the step across the surface are tested beside the integrators (`model/src/integrators/tests.rs`), extremes of every
-//! number in `model/src/extremes/`; here is what the law adds and what only it can show.
+//! the step across the surface are tested beside the integrators (`model/rheology/src/integrators/tests.rs`), extremes of every
+//! number in `model/rheology/src/extremes/`; here is what the law adds and what only it can show.
 
-use palpate_model::haptics::{
-    Flags, ForceLaw, LawError, LawSettings, PassivityObserver, Period, Pull,
-};
-use palpate_model::integrators::{
-    Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
-    Precision, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
-};
+use palpate_haptics::{Flags, ForceLaw, LawError, LawSettings, PassivityObserver, Period, Pull};
 use palpate_model::random::SplitMix;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, MmPerS, Newtons};
+use palpate_rheology::integrators::{
+    Exact, ExplicitEuler, ExponentialFirstOrder, ExponentialLeft, ImplicitEuler, Integrator,
+    Precision, RungeKutta, Scheme, SeriesBody, Start, Stepped, Trapezoid,
+};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 

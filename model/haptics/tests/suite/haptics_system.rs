@@ -1,10 +1,10 @@
 //! The whole tick: contact (L8), calibration (L9), transparency (G4), replay, snapshots, allocations, and the two
 //! demonstrations.
 
-use palpate_model::haptics::check::{CheckSettings, calibration_points, check};
-use palpate_model::haptics::rig::{Hand, HandPath};
-use palpate_model::haptics::simulation::{Simulation, SimulationSettings};
-use palpate_model::haptics::{
+use palpate_haptics::check::{CheckSettings, calibration_points, check};
+use palpate_haptics::rig::{Hand, HandPath};
+use palpate_haptics::simulation::{Simulation, SimulationSettings};
+use palpate_haptics::{
     BiasCalibration, BiasError, BiasPoint, ContactDetector, ContactSettings, DriveKind, Flags,
     ForceGuard, GuardSettings, Input, LawSettings, MasterSlave, MasterSlaveSettings, Period,
 };
@@ -603,11 +603,9 @@ fn states_are_plain_numbers() {
     let system = MasterSlave::new(&settings).expect("a system");
     is_copy(&system);
     is_copy(&system.snapshot());
-    println!(
-        "a system is {} bytes, a snapshot {}",
-        size_of_val(&system),
-        size_of_val(&system.snapshot())
-    );
+    // A page at most, and a snapshot, which is handed over every tick, a quarter of one.
+    let sizes = [size_of_val(&system), size_of_val(&system.snapshot())];
+    assert!(sizes[0] <= 4096 && sizes[1] <= 1024, "{sizes:?}");
 }
 
 /// T4: the same inputs give the same bits, from the start and from a copy in the middle; wild ones are survived, and the
@@ -693,7 +691,7 @@ fn replay_is_equal_to_the_bit_and_wild_input_is_survived() {
         }
     }
     let whole = again.snapshot();
-    let torn = palpate_model::haptics::Snapshot {
+    let torn = palpate_haptics::Snapshot {
         tick: whole.tick ^ 1,
         ..whole
     };

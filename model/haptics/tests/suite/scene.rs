@@ -1,11 +1,11 @@
 //! The virtual scene: its device against closed forms, its tick against its parts, and the same hands give the same bits.
 
-use palpate_model::haptics::{Flags, Period};
-use palpate_model::random::SplitMix;
-use palpate_model::scene::{
+use palpate_haptics::scene::{
     DeviceSettings, Hand6, LedScene, Pose, Scene, SceneError, ScenePath, SceneSettings, SceneTick,
     SimulatedDevice, WhyNoForce,
 };
+use palpate_haptics::{Flags, Period};
+use palpate_model::random::SplitMix;
 use palpate_model::units::Depth;
 
 fn run(settings: SceneSettings, path: ScenePath, mut seen: impl FnMut(&Scene, SceneTick)) -> Scene {

@@ -1,16 +1,14 @@
 //! What meshes, cuts and steps cost in exactness, and the planner against trying everything.
 
-mod support;
-
-use palpate_model::Newtons;
-use palpate_model::integrators::{Scheme, SeriesBody};
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Needs, PokeScene, SceneCurves, ScenePlan,
     StepPoint, plan, slower,
 };
-use palpate_model::tolerance::Tolerance;
+use palpate_model::Newtons;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use support::Noise;
+use palpate_rheology::integrators::{Scheme, SeriesBody};
+use palpate_rheology::tolerance::Tolerance;
+use palpate_test_support::record::Noise;
 
 const SLOPE: f64 = 0.4;
 
@@ -43,7 +41,7 @@ fn the_error_of_a_mesh_falls_with_its_spacing() {
             );
             assert!(error.l2_mm < error.linf_mm && error.l2_mm > 0.0);
         }
-        let order = |pick: fn(&palpate_model::surface::ShapeError) -> f64| {
+        let order = |pick: fn(&palpate_haptics::surface::ShapeError) -> f64| {
             (pick(&errors[0].1) / pick(&errors[3].1)).log2() / 3.0
         };
         for order in [order(|e| e.l2_mm), order(|e| e.linf_mm)] {

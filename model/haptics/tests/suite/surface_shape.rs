@@ -1,15 +1,11 @@
 //! The shape of a poked surface against its closed form, and what must hold of it whatever touches it.
 
-#[path = "support/naive_surface.rs"]
-mod naive;
-mod support;
-
-use naive::Order;
-use palpate_model::Seconds;
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Node, Pins, Recovery, Shear, Side, Surface,
 };
-use support::Noise;
+use palpate_model::Seconds;
+use palpate_test_support::naive_surface::{self as naive, Order};
+use palpate_test_support::record::Noise;
 
 /// Exact in binary, so that sums of limits have no rounding and two orders of adding agree.
 const S: f64 = 0.25;

@@ -1,12 +1,10 @@
 //! Recovery of a poked surface, what a tick says has changed, and that it repeats to the bit.
 
-mod support;
-
-use palpate_model::Seconds;
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Node, Recovery, SETTLED_MM, Side, Surface,
 };
-use support::Noise;
+use palpate_model::Seconds;
+use palpate_test_support::record::Noise;
 
 const S: f64 = 0.25;
 

@@ -1,14 +1,11 @@
 //! Normals and the contact point against planes and paraboloids.
 
-#[path = "support/naive_surface.rs"]
-mod naive;
-mod support;
-
-use palpate_model::surface::{
+use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Heights, Method, Node, Normals, Proxy, Recovery, Rect, Shear,
     Side, Surface, Touch, TouchState,
 };
-use support::Noise;
+use palpate_test_support::naive_surface as naive;
+use palpate_test_support::record::Noise;
 
 fn heights(grid: &Grid, of: impl Fn(f64, f64) -> f64) -> Vec<f64> {
     let h = grid.spacing();

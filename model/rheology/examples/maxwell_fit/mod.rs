@@ -4,9 +4,14 @@
 //! one-dimensional and needs no guess: a scan finds the deepest valley of the sum of squares, and
 //! the root of its slope in it is bisected to the last digit.
 
-use super::sample::FitError;
-use crate::units::Seconds;
-use crate::viscoelastic::{Integrator, Maxwell, MaxwellStep};
+#![allow(
+    dead_code,
+    reason = "the example and its test each take their own part"
+)]
+
+use palpate_model::units::Seconds;
+use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellStep};
+use palpate_rheology::fit::FitError;
 
 /// Relaxation times tried by the scan.
 const NODES: usize = 96;

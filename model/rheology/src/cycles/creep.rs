@@ -2,7 +2,7 @@
 
 use super::local::{line, mean};
 use super::{CycleSample, Estimate};
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// What one hold of a force shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -67,7 +67,7 @@ pub fn creep(hold: &[CycleSample], pulse: Option<Depth>) -> Option<Creep> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rig::Phase;
+    use palpate_model::rig::Phase;
 
     #[test]
     fn a_kelvin_voigt_body_creeps_by_its_formula() {

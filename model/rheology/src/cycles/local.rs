@@ -1,6 +1,6 @@
 //! Small fits to a stretch of a record: means, polynomials, and the depth of a force.
 
-use crate::linalg::Triangle;
+use palpate_model::linalg::Triangle;
 
 /// Value and standard error of a mean; `None` for fewer than two numbers.
 pub(super) fn mean(values: impl Iterator<Item = f64> + Clone) -> Option<[f64; 2]> {
@@ -117,7 +117,7 @@ pub(super) fn last_rise(bins: &[[f64; 3]], level: f64) -> Option<[f64; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use palpate_model::random::SplitMix;
 
     #[test]
     fn a_parabola_is_read_exactly_and_its_errors_are_those_of_the_textbook() {

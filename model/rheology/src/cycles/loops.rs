@@ -4,9 +4,9 @@ use super::creep::{Creep, creep};
 use super::local::{bins, last_rise, mean, parabola};
 use super::relaxation::{Relaxation, relaxation};
 use super::{CycleSample, Estimate};
-use crate::rig::Phase;
-use crate::signal::work;
-use crate::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::rig::Phase;
+use palpate_model::signal::work;
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 
 /// Forces at which the place of a loop is told, as shares of the first cycle's peak above its start: where the probe
 /// begins to feel tissue, at the foot of the loop, and halfway up.

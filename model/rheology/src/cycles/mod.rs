@@ -21,8 +21,8 @@ pub use sine::{Sinusoid, SinusoidError, sinusoid};
 pub use split::by_depth;
 pub use steady::{Change, Steadiness, SteadyRule};
 
-use crate::rig::Phase;
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// One sample of a record in cycles.
 #[derive(Clone, Copy, Debug, PartialEq)]

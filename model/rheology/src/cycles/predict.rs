@@ -3,8 +3,8 @@
 use super::Estimate;
 use super::local::line;
 use crate::fit::FitSample;
-use crate::units::{Depth, Newtons, Seconds};
-use crate::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use thiserror::Error;
 
 /// Last part of the way in and of the rest from which errors at the turning point and at the end are read.

@@ -2,7 +2,7 @@
 
 use super::Estimate;
 use super::local::{bins, last_rise, line, mean};
-use crate::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Seconds};
 
 /// What one hold shows.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -110,7 +110,7 @@ fn equilibrium(hold: &[[f64; 2]], from: f64, span: f64) -> Option<Estimate<Newto
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
+    use palpate_model::random::SplitMix;
 
     /// 5 + 2 exp(-t / tau) N at 1 kHz.
     fn hold(tau: f64, seconds: f64, noise: f64, seed: u64) -> Vec<[f64; 2]> {

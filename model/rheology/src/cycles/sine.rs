@@ -1,8 +1,8 @@
 //! The force that answers a sine of depth: in phase, out of phase, and how much of it is no sine.
 
 use super::{CycleSample, Estimate};
-use crate::linalg::Triangle;
-use crate::units::{Depth, Newtons};
+use palpate_model::linalg::Triangle;
+use palpate_model::units::{Depth, Newtons};
 use std::f64::consts::TAU;
 use thiserror::Error;
 
@@ -250,9 +250,9 @@ fn fit(points: impl Iterator<Item = (f64, f64)>, frequency: f64, span: f64) -> O
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::random::SplitMix;
-    use crate::rig::Phase;
-    use crate::units::Seconds;
+    use palpate_model::random::SplitMix;
+    use palpate_model::rig::Phase;
+    use palpate_model::units::Seconds;
 
     /// A sine of depth about 10 mm from its turning point, and a force of it.
     fn record(f: f64, seconds: f64, force: impl Fn(f64) -> f64) -> Vec<CycleSample> {

@@ -1,8 +1,8 @@
 //! Cycles and phases of a record that names none, from its depth alone.
 
 use super::CycleSample;
-use crate::rig::Phase;
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// The depth has to come below and above these shares of its range for a cycle to count.
 const LOW: f64 = 0.3;

@@ -1,7 +1,7 @@
 //! When cycles have stopped changing.
 
 use super::loops::CycleAnalysis;
-use crate::units::Depth;
+use palpate_model::units::Depth;
 
 /// When cycles count as steady: peak and place of the loop both change by less than so much, so many times in a row.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,8 +4,8 @@ use super::information::{ExpectedError, intervals};
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
 use super::rig::{Rig, allowed_speeds, shallowest_turn};
-use crate::units::{Depth, MmPerS, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
 
 /// Ten numbers a decade that are easy to read (Renard's series R10, ISO 3).

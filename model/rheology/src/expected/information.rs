@@ -7,9 +7,10 @@
 use super::noise::{Noise, Unknowns};
 use super::protocol::{Protocol, duration_of};
 use super::response::{COLUMNS, DIRECT_MAX, NUISANCES, Press, STEPS_PER_TAU_MIN};
-use crate::linalg::Triangle;
-use crate::units::{Newtons, Seconds};
-use crate::viscoelastic::{BodyError, ModifiedKelvin};
+use super::triangle;
+use palpate_model::linalg::Triangle;
+use palpate_model::units::{Newtons, Seconds};
+use palpate_model::viscoelastic::{BodyError, ModifiedKelvin};
 use serde::Serialize;
 use thiserror::Error;
 
@@ -177,8 +178,7 @@ pub fn intervals(
         }
         sums.add_slow(&mut slow);
     }
-    let inverse = shared
-        .inverse(&lengths.map(f64::sqrt))
+    let inverse = triangle::inverse(&shared, &lengths.map(f64::sqrt))
         .map_err(|names| ExpectedError::Inseparable { names })?;
     let variances = variances(&inverse, &slow, noise);
     let values = [

@@ -10,7 +10,7 @@
 //! Start at [`intervals`] for one protocol and at [`shortest`] for the search.
 //!
 //! ```
-//! use palpate_model::expected::{Noise, Protocol, Unknowns, intervals};
+//! use palpate_rheology::expected::{Noise, Protocol, Unknowns, intervals};
 //! use palpate_model::viscoelastic::ModifiedKelvin;
 //! use palpate_model::{Depth, MmPerS, Newtons, Seconds};
 //!
@@ -21,7 +21,7 @@
 //! assert_eq!(tau.name, "tau_eps");
 //! // 1.96 standard deviations of 0.166 %.
 //! assert!((tau.percent.unwrap() - 0.325).abs() < 0.002);
-//! # Ok::<(), palpate_model::expected::ExpectedError>(())
+//! # Ok::<(), crate::expected::ExpectedError>(())
 //! ```
 
 mod curves;

@@ -1,7 +1,7 @@
 //! What disturbs a measurement, and what else a fit of it does not know.
 
 use super::ExpectedError;
-use crate::units::{Newtons, Seconds};
+use palpate_model::units::{Newtons, Seconds};
 use serde::Serialize;
 
 /// Force noise expected of every sample.

@@ -1,7 +1,7 @@
 //! Protocols as commanded paths: straight pieces of depth over time.
 
 use super::ExpectedError;
-use crate::units::{Depth, MmPerS, Seconds};
+use palpate_model::units::{Depth, MmPerS, Seconds};
 use serde::Serialize;
 
 /// A stretch in which the depth changes at constant speed, or not at all.

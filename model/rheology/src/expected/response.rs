@@ -11,7 +11,7 @@
 
 use super::noise::{Noise, Unknowns};
 use super::protocol::{Piece, duration_of};
-use crate::viscoelastic::{ModifiedKelvin, StepWeights, forcing, psi_derivatives};
+use palpate_model::viscoelastic::{ModifiedKelvin, StepWeights, forcing, psi_derivatives};
 
 /// Initial force, offset, `log tau`, `mu1`, `mu2`, `mu3`, `tau_sig`.
 pub(super) const COLUMNS: usize = 7;

@@ -2,8 +2,8 @@
 
 use super::information::ExpectedError;
 use super::protocol::Protocol;
-use crate::units::{Depth, MmPerS, Newtons, Seconds};
-use crate::viscoelastic::{KelvinState, ModifiedKelvin};
+use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
+use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use serde::Serialize;
 
 /// From one speed to the next.

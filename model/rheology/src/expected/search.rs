@@ -8,8 +8,8 @@ use super::information::{Expected, ExpectedError, PARAMETER_NAMES, check_resolve
 use super::noise::{Noise, Unknowns};
 use super::protocol::Protocol;
 use super::rig::{Rig, TURNS, allowed_speeds, pulls};
-use crate::units::{Depth, MmPerS, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, MmPerS, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
 use serde::Serialize;
 
 /// Rest between presses in relaxation times: what is left of the first press is `e^-10`.

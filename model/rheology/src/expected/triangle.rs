@@ -1,7 +1,7 @@
 //! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
 
 use super::information::{BODY, PARAMETER_NAMES};
-use crate::linalg::Triangle;
+use palpate_model::linalg::Triangle;
 
 /// A design with columns of unit length and a smallest singular value below the inverse of this
 /// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
@@ -11,41 +11,35 @@ const CONDITION_MAX: f64 = 1e6;
 /// Parameters with at least this share of the largest entry belong to the blind combination.
 const NAMED_SHARE: f64 = 0.2;
 
-impl<const N: usize> Triangle<N> {
-    /// Squared length of one column.
-    pub fn length_squared(&self, column: usize) -> f64 {
-        self.r.iter().map(|row| row[column].powi(2)).sum()
-    }
-}
-
-impl Triangle<BODY> {
-    /// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
-    pub fn inverse(&self, lengths: &[f64; BODY]) -> Result<[[f64; BODY]; BODY], String> {
-        let mut unit = self.r;
-        for row in &mut unit {
-            for (value, length) in row.iter_mut().zip(lengths) {
-                *value /= length;
-            }
+/// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
+pub fn inverse(
+    triangle: &Triangle<BODY>,
+    lengths: &[f64; BODY],
+) -> Result<[[f64; BODY]; BODY], String> {
+    let mut unit = triangle.r;
+    for row in &mut unit {
+        for (value, length) in row.iter_mut().zip(lengths) {
+            *value /= length;
         }
-        let columns: [[f64; BODY]; BODY] = std::array::from_fn(|column| {
-            let mut solution = [0.0; BODY];
-            for i in (0..=column).rev() {
-                let known: f64 = (i + 1..=column).map(|j| unit[i][j] * solution[j]).sum();
-                // A pivot smaller than its own rounding is that rounding.
-                let pivot = unit[i][i].max(f64::EPSILON);
-                solution[i] = (f64::from(u8::from(i == column)) - known) / pivot;
-            }
-            solution
-        });
-        let inverse = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
-        let (condition, blind) = largest_singular(&inverse);
-        if condition.is_nan() || condition > CONDITION_MAX {
-            return Err(named(&blind));
-        }
-        Ok(std::array::from_fn(|i| {
-            inverse[i].map(|value| value / lengths[i])
-        }))
     }
+    let columns: [[f64; BODY]; BODY] = std::array::from_fn(|column| {
+        let mut solution = [0.0; BODY];
+        for i in (0..=column).rev() {
+            let known: f64 = (i + 1..=column).map(|j| unit[i][j] * solution[j]).sum();
+            // A pivot smaller than its own rounding is that rounding.
+            let pivot = unit[i][i].max(f64::EPSILON);
+            solution[i] = (f64::from(u8::from(i == column)) - known) / pivot;
+        }
+        solution
+    });
+    let inverse = std::array::from_fn(|i| std::array::from_fn(|j| columns[j][i]));
+    let (condition, blind) = largest_singular(&inverse);
+    if condition.is_nan() || condition > CONDITION_MAX {
+        return Err(named(&blind));
+    }
+    Ok(std::array::from_fn(|i| {
+        inverse[i].map(|value| value / lengths[i])
+    }))
 }
 
 /// Largest singular value of a matrix and its left vector, by power iteration: what the inverse of a
@@ -98,10 +92,10 @@ mod tests {
         }
         let lengths =
             |triangle: &Triangle<BODY>| std::array::from_fn(|k| triangle.length_squared(k).sqrt());
-        let inverse = triangle.inverse(&lengths(&triangle)).unwrap();
+        let product = inverse(&triangle, &lengths(&triangle)).unwrap();
         for (i, row) in triangle.r.iter().enumerate() {
             let mut products = [0.0; BODY];
-            for (share, line) in row.iter().zip(&inverse) {
+            for (share, line) in row.iter().zip(&product) {
                 for (product, value) in products.iter_mut().zip(line) {
                     *product += share * value;
                 }
@@ -111,7 +105,7 @@ mod tests {
                 assert!((product - one).abs() < 1e-11, "{i} {j} {product}");
             }
         }
-        let blind = alike.inverse(&lengths(&alike)).unwrap_err();
+        let blind = inverse(&alike, &lengths(&alike)).unwrap_err();
         assert_eq!(blind, "mu1 from tau_sig");
     }
 }

@@ -1,14 +1,15 @@
 //! What is no number, and time that stands still or runs backwards.
 
-use super::fits::{ThesisFit, family_fit};
+use super::fits::{DEFAULT_FIT, fitted};
 use super::judge::{Answer, Expected, PathCase, Row, judge};
 use super::members::member;
 use super::records::ramp_hold;
 use super::subjects::FamilyBody;
 use super::{Extent, Part};
-use crate::families::{Family, by_key};
+use crate::families::{Family, PowerSeries, by_key};
 use crate::fit::FitSample;
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
+use std::sync::Arc;
 
 /// Name of the group.
 pub(super) const GROUP: &str = "input";
@@ -16,12 +17,12 @@ pub(super) const GROUP: &str = "input";
 pub(super) fn parts(_extent: Extent, key: &str) -> Vec<Part> {
     let key = key.to_owned();
     vec![Part::new(GROUP, key.clone(), move |_| {
-        by_key(&key).map_or_else(|_| Vec::new(), |family| rows(&*family))
+        by_key(&key).map_or_else(|_| Vec::new(), |family| rows(&family))
     })]
 }
 
-fn rows(family: &dyn Family) -> Vec<Row> {
-    let usual = || member(family, 1.0, 20.0, 2.0);
+fn rows(family: &Arc<dyn Family>) -> Vec<Row> {
+    let usual = || member(&**family, 1.0, 20.0, 2.0);
     let mut rows = Vec::new();
     for (case, start, step) in [
         ("NaN depth at the start", f64::NAN, (0.1, 1.0)),
@@ -45,7 +46,7 @@ fn rows(family: &dyn Family) -> Vec<Row> {
         };
         rows.push(path.put_to(&FamilyBody(usual())));
     }
-    rows.push(after_bad_steps(family));
+    rows.push(after_bad_steps(&**family));
     let plain = |case: &str| PathCase {
         group: GROUP,
         case: case.to_owned(),
@@ -76,7 +77,7 @@ fn rows(family: &dyn Family) -> Vec<Row> {
         }
     }
     rows.extend(
-        bad_records(|samples| family_fit(family, samples, None)).map(|(case, answer)| {
+        bad_records(|samples| fitted(Arc::clone(family), samples, None)).map(|(case, answer)| {
             let subject = format!("fit of {}", family.key());
             judge([GROUP, case], &subject, Expected::Refusal, 0.0, answer)
         }),
@@ -169,17 +170,9 @@ fn bad_records(
 
 /// The same records put to the fit of the thesis body.
 pub(super) fn thesis_parts() -> Vec<Part> {
-    vec![Part::new(GROUP, ThesisFit::NAME.to_owned(), |_| {
-        let rows = bad_records(|samples| ThesisFit::of(samples, None));
-        rows.map(|(case, answer)| {
-            judge(
-                [GROUP, case],
-                ThesisFit::NAME,
-                Expected::Refusal,
-                0.0,
-                answer,
-            )
-        })
-        .collect()
+    vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), |_| {
+        let rows = bad_records(|samples| fitted(Arc::new(PowerSeries::THESIS), samples, None));
+        rows.map(|(case, answer)| judge([GROUP, case], DEFAULT_FIT, Expected::Refusal, 0.0, answer))
+            .collect()
     })]
 }

@@ -5,7 +5,7 @@ use super::subjects::SchemeBody;
 use super::tau_step::decades;
 use super::{Extent, Part};
 use crate::integrators::{Precision, Scheme, SeriesBody};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::viscoelastic::ModifiedKelvin;
 
 /// Name of the group of relaxation times against steps.
 const GROUP: &str = "integrators, relaxation time and step";

@@ -2,7 +2,7 @@
 
 use crate::families::{Relaxation, StepError};
 use crate::reference::{REFERENCE_DIGITS, Reference, RuleReference};
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
 use serde::Serialize;
 
 /// Largest error of an exact step, relative to the peak force of the path.

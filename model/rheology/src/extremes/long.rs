@@ -6,8 +6,8 @@ use super::{Extent, Part};
 use crate::families::{Relaxation, StepError, by_key};
 use crate::integrators::{Exact, Integrator, Scheme, SeriesBody, Start};
 use crate::reference::Reference;
-use crate::units::{Depth, Newtons, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
 
 /// Name of the group.
 pub(super) const GROUP: &str = "long records";

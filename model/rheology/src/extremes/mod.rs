@@ -24,6 +24,7 @@ pub use members::member;
 pub use subjects::{FamilyBody, SchemeBody};
 
 use crate::families::{Family, UnknownFamily, all, by_key};
+use std::sync::Arc;
 
 /// How much to run.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +70,7 @@ impl Part {
 
 /// Everything there is to run, or what concerns one family.
 pub fn parts(extent: Extent, family: Option<&str>) -> Result<Vec<Part>, UnknownFamily> {
-    let families: Vec<Box<dyn Family>> = match family {
+    let families: Vec<Arc<dyn Family>> = match family {
         Some(key) => vec![by_key(key)?],
         None => all(),
     };

@@ -1,13 +1,14 @@
 //! Records of few samples, of too little movement, of odd sizes.
 
-use super::fits::{ThesisFit, family_fit};
+use super::fits::{DEFAULT_FIT, fitted};
 use super::judge::{Answer, Expected, Row, judge};
 use super::members::member;
 use super::{Extent, Part};
-use crate::families::{Family, Model, Outer, OuterRange, by_key};
+use crate::families::{Family, Model, Outer, OuterRange, PowerSeries, by_key};
 use crate::fit::FitSample;
-use crate::units::{Depth, Newtons, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
+use std::sync::Arc;
 
 /// Name of the group.
 pub(super) const GROUP: &str = "records";
@@ -210,22 +211,22 @@ pub(super) fn parts(extent: Extent, key: &str) -> Vec<Part> {
             }
         }
         rows(plans, &subject, progress, |plan| {
-            family_answer(&*family, plan)
+            family_answer(&family, plan)
         })
     })]
 }
 
-fn family_answer(family: &dyn Family, plan: &Plan) -> Answer {
+fn family_answer(family: &Arc<dyn Family>, plan: &Plan) -> Answer {
     // Relaxation times around a second on the record's scale.
-    let first = if times(family) > 1 { 0.2 } else { 1.0 };
+    let first = if times(&**family) > 1 { 0.2 } else { 1.0 };
     let body = member(
-        family,
+        &**family,
         first * plan.time,
         20.0 * plan.depth,
         2.0 * plan.force,
     );
     let samples = plan.samples(|path| body.along(path.iter().copied()).ok());
-    family_fit(family, &samples, Some(&body))
+    fitted(Arc::clone(family), &samples, Some(&body))
 }
 
 fn times(family: &dyn Family) -> usize {
@@ -239,24 +240,20 @@ const TIMES_SHOWN: usize = 2;
 
 /// The same records put to the fit of the thesis body.
 pub(super) fn thesis_parts(extent: Extent) -> Vec<Part> {
-    vec![Part::new(
-        GROUP,
-        ThesisFit::NAME.to_owned(),
-        move |progress| {
-            rows(plans(extent), ThesisFit::NAME, progress, |plan| {
-                let known = ModifiedKelvin::THESIS;
-                let scale = |power: i32| plan.force / plan.depth.powi(power);
-                let body = ModifiedKelvin {
-                    tau_eps: known.tau_eps * plan.time,
-                    mu: [1, 2, 3].map(|power| known.mu[power as usize - 1] * scale(power)),
-                    tau_sig: known.tau_sig * scale(2) * plan.time,
-                };
-                let model = thesis(body);
-                let samples = plan.samples(|path| model.along(path.iter().copied()).ok());
-                ThesisFit::of(&samples, Some(&body))
-            })
-        },
-    )]
+    vec![Part::new(GROUP, DEFAULT_FIT.to_owned(), move |progress| {
+        rows(plans(extent), DEFAULT_FIT, progress, |plan| {
+            let known = ModifiedKelvin::THESIS;
+            let scale = |power: i32| plan.force / plan.depth.powi(power);
+            let body = ModifiedKelvin {
+                tau_eps: known.tau_eps * plan.time,
+                mu: [1, 2, 3].map(|power| known.mu[power as usize - 1] * scale(power)),
+                tau_sig: known.tau_sig * scale(2) * plan.time,
+            };
+            let model = thesis(body);
+            let samples = plan.samples(|path| model.along(path.iter().copied()).ok());
+            fitted(Arc::new(PowerSeries::THESIS), &samples, Some(&model))
+        })
+    })]
 }
 
 fn rows(

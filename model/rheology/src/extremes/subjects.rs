@@ -4,7 +4,7 @@ use super::judge::{Oracle, PathCase, Subject, TOLERANCE};
 use crate::families::{Model, Relaxation};
 use crate::integrators::{Precision, Real, Scheme, SeriesBody};
 use crate::reference::{Reference, RuleReference};
-use crate::units::{Depth, Seconds};
+use palpate_model::units::{Depth, Seconds};
 
 /// A member of a family, stepped by its own exact step.
 #[derive(Clone, Debug)]

@@ -10,7 +10,7 @@
 //! are to `e^(B x)` what the psi functions are to the powers of `x`. `omega` is formed without the
 //! difference, which for slow movement would leave no digit of it.
 
-use crate::viscoelastic::psi;
+use palpate_model::viscoelastic::psi;
 
 /// Below this size of both arguments the series is short and the closed form would cancel.
 const SMALL: f64 = 1.0;

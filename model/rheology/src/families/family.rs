@@ -3,6 +3,7 @@
 use super::model::ModelParameter;
 use super::relaxation::Relaxation;
 use std::fmt::Debug;
+use std::sync::Arc;
 
 /// A family of force models: an equation whose parameters are not known yet.
 ///
@@ -40,7 +41,7 @@ pub trait Family: Debug + Send + Sync {
 
     /// The same parameters with a coarser and cheaper response, to search with; `None` where the
     /// response is cheap already.
-    fn coarse(&self) -> Option<Box<dyn Family>> {
+    fn coarse(&self) -> Option<Arc<dyn Family>> {
         None
     }
 
@@ -55,10 +56,24 @@ pub trait Family: Debug + Send + Sync {
         None
     }
 
+    /// Where a fit takes its columns from.
+    fn kernel(&self) -> Kernel {
+        Kernel::Terms
+    }
+
     /// The parameters as its literature writes them, where these are not the coefficients themselves.
     fn derived(&self, _outer: &[f64], _linear: &[f64]) -> Vec<ModelParameter> {
         Vec::new()
     }
+}
+
+/// Where a fit takes the columns of a family from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kernel {
+    /// From the exact responses of its relaxation terms.
+    Terms,
+    /// From recursions over 64 samples at a time that are made for the modified Kelvin body of third order.
+    ThirdOrder,
 }
 
 /// Whether a family can be fitted during a run.

@@ -4,6 +4,7 @@ use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::relaxation::{Drive, Relaxation};
 use std::f64::consts::PI;
+use std::sync::Arc;
 
 /// Relaxation modulus `k0 + k1 E_alpha(-(t / tau)^alpha)`, with the Mittag-Leffler function; as an
 /// equation `F + tau^alpha D^alpha F = k0 x + (k0 + k1) tau^alpha D^alpha x`.
@@ -117,11 +118,11 @@ impl Family for FractionalZener {
         vec![vec![Relaxation::spring(spring)], relaxing.collect()]
     }
 
-    fn coarse(&self) -> Option<Box<dyn Family>> {
+    fn coarse(&self) -> Option<Arc<dyn Family>> {
         (self.digits > COARSE_DIGITS).then(|| {
-            Box::new(Self {
+            Arc::new(Self {
                 digits: COARSE_DIGITS,
-            }) as Box<dyn Family>
+            }) as Arc<dyn Family>
         })
     }
 

@@ -24,7 +24,7 @@ mod unloading;
 mod voigt;
 
 pub use exponential::ExponentialKelvin;
-pub use family::{Family, Live, Outer, OuterRange};
+pub use family::{Family, Kernel, Live, Outer, OuterRange};
 pub use fractional::{FRACTIONAL_DIGITS, FractionalZener};
 pub use kelvin::Kelvin;
 pub use maxwell::Maxwell;
@@ -38,6 +38,7 @@ pub use response::{Response, StepError};
 pub use unloading::Unloading;
 pub use voigt::Voigt;
 
+use std::sync::Arc;
 use thiserror::Error;
 
 /// No family has this key.
@@ -53,46 +54,46 @@ pub struct UnknownFamily {
 /// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body;
 /// unloading of other orders than the third is there by its key.
 #[must_use]
-pub fn all() -> Vec<Box<dyn Family>> {
-    let mut all: Vec<Box<dyn Family>> = vec![Box::new(Voigt), Box::new(Maxwell), Box::new(Kelvin)];
+pub fn all() -> Vec<Arc<dyn Family>> {
+    let mut all: Vec<Arc<dyn Family>> = vec![Arc::new(Voigt), Arc::new(Maxwell), Arc::new(Kelvin)];
     for order in 1..=POWER_MAX {
-        all.extend(PowerSeries::of_order(order).map(|family| Box::new(family) as Box<dyn Family>));
+        all.extend(PowerSeries::of_order(order).map(|family| Arc::new(family) as Arc<dyn Family>));
     }
-    all.push(Box::new(ExponentialKelvin));
+    all.push(Arc::new(ExponentialKelvin));
     for terms in 2..=TERMS_COMPARED {
-        all.extend(Prony::of_terms(terms).map(|family| Box::new(family) as Box<dyn Family>));
+        all.extend(Prony::of_terms(terms).map(|family| Arc::new(family) as Arc<dyn Family>));
     }
-    all.push(Box::new(FractionalZener::default()));
-    all.push(Box::new(QuasiLinear::default()));
-    all.extend(Unloading::of_order(3).map(|family| Box::new(family) as Box<dyn Family>));
+    all.push(Arc::new(FractionalZener::default()));
+    all.push(Arc::new(QuasiLinear::default()));
+    all.extend(Unloading::of_order(3).map(|family| Arc::new(family) as Arc<dyn Family>));
     all
 }
 
 /// The family of a key such as `series-3`, `unloading-3` or `fung-8`.
-pub fn by_key(key: &str) -> Result<Box<dyn Family>, UnknownFamily> {
-    let boxed: Option<Box<dyn Family>> = match key {
-        "voigt" => Some(Box::new(Voigt)),
-        "maxwell" => Some(Box::new(Maxwell)),
-        "kelvin" => Some(Box::new(Kelvin)),
-        "exponential" => Some(Box::new(ExponentialKelvin)),
-        "fung" => Some(Box::new(QuasiLinear::default())),
-        "fractional" => Some(Box::new(FractionalZener::default())),
+pub fn by_key(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
+    let found: Option<Arc<dyn Family>> = match key {
+        "voigt" => Some(Arc::new(Voigt)),
+        "maxwell" => Some(Arc::new(Maxwell)),
+        "kelvin" => Some(Arc::new(Kelvin)),
+        "exponential" => Some(Arc::new(ExponentialKelvin)),
+        "fung" => Some(Arc::new(QuasiLinear::default())),
+        "fractional" => Some(Arc::new(FractionalZener::default())),
         _ => key.split_once('-').and_then(|(kind, number)| {
             let number: usize = number.parse().ok()?;
             match kind {
-                "series" => PowerSeries::of_order(number).map(|one| Box::new(one) as _),
-                "unloading" => Unloading::of_order(number).map(|one| Box::new(one) as _),
-                "prony" => Prony::of_terms(number).map(|one| Box::new(one) as _),
-                "fung" => QuasiLinear::of_nodes(number).map(|one| Box::new(one) as _),
+                "series" => PowerSeries::of_order(number).map(|one| Arc::new(one) as _),
+                "unloading" => Unloading::of_order(number).map(|one| Arc::new(one) as _),
+                "prony" => Prony::of_terms(number).map(|one| Arc::new(one) as _),
+                "fung" => QuasiLinear::of_nodes(number).map(|one| Arc::new(one) as _),
                 "fractional" => u32::try_from(number)
                     .ok()
                     .and_then(FractionalZener::of_digits)
-                    .map(|one| Box::new(one) as _),
+                    .map(|one| Arc::new(one) as _),
                 _ => None,
             }
         }),
     };
-    boxed.ok_or_else(|| UnknownFamily {
+    found.ok_or_else(|| UnknownFamily {
         key: key.to_owned(),
         known: all()
             .iter()

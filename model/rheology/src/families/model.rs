@@ -4,7 +4,7 @@ use super::family::Family;
 use super::relaxation::Relaxation;
 use super::response::{Response, StepError, plain};
 use super::{UnknownFamily, by_key};
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
 use serde::{Deserialize, Serialize};
 use thiserror::Error;
 
@@ -20,7 +20,7 @@ pub struct ModelParameter {
 }
 
 /// A model of one family with all its parameters.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
     /// Key of the family.
     pub family: String,

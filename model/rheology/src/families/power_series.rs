@@ -1,6 +1,6 @@
 //! Power series in the modified Kelvin body: the elastic part cut off after one to five terms.
 
-use super::family::{Family, Live, Outer, OuterRange};
+use super::family::{Family, Kernel, Live, Outer, OuterRange};
 use super::relaxation::{Drive, POWER_MAX, Relaxation};
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x'`.
@@ -14,7 +14,12 @@ pub struct PowerSeries {
 /// Units of `mu1 ..= mu5`.
 const UNITS: [&str; POWER_MAX] = ["N/mm", "N/mm^2", "N/mm^3", "N/mm^4", "N/mm^5"];
 
+const ORDINALS: [&str; POWER_MAX] = ["first", "second", "third", "fourth", "fifth"];
+
 impl PowerSeries {
+    /// The order of the thesis.
+    pub const THESIS: Self = Self { order: 3 };
+
     /// The series cut off after `order` terms; `None` unless that is one to five.
     #[must_use]
     pub fn of_order(order: usize) -> Option<Self> {
@@ -28,7 +33,7 @@ impl Family for PowerSeries {
     }
 
     fn name(&self) -> String {
-        format!("modified Kelvin, order {}", self.order)
+        format!("modified Kelvin, {} order", ORDINALS[self.order - 1])
     }
 
     fn equation(&self) -> &'static str {
@@ -79,6 +84,13 @@ impl Family for PowerSeries {
             rate: Drive::power(2, 0.5),
         };
         elastic.chain([viscous]).map(|term| vec![term]).collect()
+    }
+
+    fn kernel(&self) -> Kernel {
+        match *self == Self::THESIS {
+            true => Kernel::ThirdOrder,
+            false => Kernel::Terms,
+        }
     }
 
     fn fading(&self, outer: &[f64]) -> Option<f64> {

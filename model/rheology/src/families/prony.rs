@@ -27,6 +27,11 @@ impl Prony {
     pub fn of_terms(terms: usize) -> Option<Self> {
         (1..=TERMS_MAX).contains(&terms).then_some(Self { terms })
     }
+
+    /// A series to search with: as many relaxation times as it takes to miss none.
+    pub(crate) fn dense(terms: usize) -> Self {
+        Self { terms }
+    }
 }
 
 impl Family for Prony {

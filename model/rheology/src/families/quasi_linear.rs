@@ -5,6 +5,7 @@ use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::quadrature::gauss_legendre;
 use super::relaxation::{Drive, Relaxation};
+use std::sync::Arc;
 
 /// `F = int_0^t G(t - s) dT/ds ds` with the elastic response `T = A (e^(B x) - 1)` and the reduced
 /// relaxation function of a box spectrum,
@@ -97,11 +98,11 @@ impl Family for QuasiLinear {
         vec![vec![Relaxation::spring(spring)], spectrum.collect()]
     }
 
-    fn coarse(&self) -> Option<Box<dyn Family>> {
+    fn coarse(&self) -> Option<Arc<dyn Family>> {
         (self.nodes > COARSE_NODES).then(|| {
-            Box::new(Self {
+            Arc::new(Self {
                 nodes: COARSE_NODES,
-            }) as Box<dyn Family>
+            }) as Arc<dyn Family>
         })
     }
 

@@ -8,7 +8,7 @@
 //! * `tau = 0` is a term without memory: a spring `p`, a dashpot `q`.
 
 use super::exponential_step::chi_omega;
-use crate::viscoelastic::{Compensated, psi, psi_first};
+use palpate_model::viscoelastic::{Compensated, psi, psi_first};
 
 /// Highest power of depth a drive may have.
 pub const POWER_MAX: usize = 5;

@@ -1,8 +1,8 @@
 //! The response of a sum of relaxation terms to any depth history.
 
 use super::relaxation::{Piece, Relaxation, Relaxing};
-use crate::units::{Depth, Seconds};
-use crate::viscoelastic::Pieces;
+use palpate_model::units::{Depth, Seconds};
+use palpate_model::viscoelastic::Pieces;
 use thiserror::Error;
 
 /// A number as people write it, by powers of ten where it would be a row of zeros.

@@ -52,7 +52,7 @@ impl Family for Voigt {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Depth, Seconds};
+    use palpate_model::units::{Depth, Seconds};
 
     #[test]
     fn spring_and_dashpot_have_no_memory_at_any_step() {

@@ -2,14 +2,14 @@
 
 use super::design::{LANES, Lane};
 use super::sample::FitSample;
-use super::system::WIDTH_MAX;
 
 /// Blocks of residuals kept for judging their memory, at most about.
 const NOISE_BLOCKS: usize = 400;
+
 /// Sums over one block of samples of all columns of a record's triangle, times their weights.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub(super) struct NoiseBlock {
-    pub sums: [f64; WIDTH_MAX],
+    pub sums: Vec<f64>,
     /// Samples whose force counts.
     pub count: usize,
     /// Position among all blocks of the record, those with too few such samples included.
@@ -20,7 +20,7 @@ pub(super) struct NoiseBlock {
 pub(super) struct NoiseSums {
     blocks: Vec<NoiseBlock>,
     length: usize,
-    sums: [f64; WIDTH_MAX],
+    sums: Vec<f64>,
     /// Samples in the present block, and those of them whose force counts.
     taken: usize,
     count: usize,
@@ -28,7 +28,7 @@ pub(super) struct NoiseSums {
 }
 
 impl NoiseSums {
-    pub fn new(samples: usize) -> Self {
+    pub fn new(samples: usize, width: usize) -> Self {
         let wanted = samples.div_ceil(NOISE_BLOCKS);
         let length = if wanted <= LANES {
             wanted.next_power_of_two()
@@ -38,7 +38,7 @@ impl NoiseSums {
         Self {
             blocks: Vec::with_capacity(samples / length + 1),
             length,
-            sums: [0.0; WIDTH_MAX],
+            sums: vec![0.0; width],
             taken: 0,
             count: 0,
             place: 0,
@@ -74,13 +74,14 @@ impl NoiseSums {
     fn close(&mut self) {
         if 2 * self.count >= self.length {
             self.blocks.push(NoiseBlock {
-                sums: self.sums,
+                sums: self.sums.clone(),
                 count: self.count,
                 place: self.place,
             });
         }
         self.place += 1;
-        (self.sums, self.taken, self.count) = ([0.0; WIDTH_MAX], 0, 0);
+        self.sums.fill(0.0);
+        (self.taken, self.count) = (0, 0);
     }
 
     pub fn finish(mut self) -> Vec<NoiseBlock> {

@@ -4,16 +4,14 @@
 //! Stat. 17 (1989) 1217-1241). It assumes neither a shape of the noise nor a parabola of the sum of
 //! squares, and takes hundreds of fits.
 
-use super::design::walk;
-use super::options::{CONTACT, PARAMETER_NAMES};
 use super::record::Record;
-use super::refine::refine;
-use super::report::scaled_powers;
+use super::refine::{Settle, refine};
 use super::sample::{FitError, FitSample};
 use super::solve::Fitted;
+use super::system::Rows;
 use super::uncertainty::Uncertainty;
-use crate::random::SplitMix;
-use crate::units::Newtons;
+use palpate_model::random::SplitMix;
+use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 
 /// Correlation times in a block; beyond three the ends of blocks hardly matter.
@@ -64,8 +62,8 @@ impl Fitted<'_> {
                 needed: BLOCKS_MIN,
             });
         }
-        let free: Vec<usize> = (0..=CONTACT)
-            .filter(|&k| self.system.fixed(k).is_none())
+        let free: Vec<usize> = (0..self.system.layout().count())
+            .filter(|&k| self.system.fixed(record, k).is_none())
             .collect();
         let mut random = SplitMix::seeded(choice.seed);
         let mut found: Vec<Vec<f64>> = vec![Vec::with_capacity(choice.repeats); free.len()];
@@ -75,19 +73,10 @@ impl Fitted<'_> {
                 .zip(&self.system.records)
                 .map(|(source, record)| source.shuffled(record.samples, &mut random))
                 .collect();
-            let mut system = self.system.clone();
-            system.records = self
-                .system
-                .records
-                .iter()
-                .zip(&shuffled)
-                .map(|(record, samples)| Record {
-                    samples,
-                    ..record.clone()
-                })
-                .collect();
-            let refined = refine(&system, &self.refined.points, &self.ranges);
-            let values = system.physical(&refined.points[record]);
+            let system = self.system.with_samples(&shuffled);
+            let refined = refine(&system, &self.refined.points, Rows::All, Settle::Noise);
+            let refined = refined.ok_or(FitError::Overflow)?;
+            let values = system.physical(record, &refined.points[record]);
             for (list, &parameter) in found.iter_mut().zip(&free) {
                 list.push(values[parameter]);
             }
@@ -103,7 +92,7 @@ impl Fitted<'_> {
                 let mean = list.iter().sum::<f64>() / count;
                 let square: f64 = list.iter().map(|value| (value - mean).powi(2)).sum();
                 BootstrapInterval {
-                    name: PARAMETER_NAMES[parameter].to_owned(),
+                    name: self.system.known()[parameter].name.clone(),
                     std_dev: (square / (count - 1.0)).sqrt(),
                     ci95: [0.025, 0.975].map(|share| quantile(&list, share)),
                 }
@@ -116,23 +105,16 @@ impl Fitted<'_> {
     fn residual_source(&self, uncertainty: &Uncertainty, record: usize) -> Residuals {
         let Record {
             samples, measured, ..
-        } = self.system.records[record].clone();
+        } = self.system.records[record];
         let point = &self.refined.points[record];
-        let scaled = scaled_powers(point);
-        let (mut model, mut residuals) = (Vec::with_capacity(samples.len()), Vec::new());
-        walk::<false>(
-            samples,
-            self.system.scale(point.outer),
-            point.outer.tau,
-            |block, rows| {
-                for (sample, force) in block.iter().zip(rows.force(&scaled)) {
-                    model.push(force);
-                    if sample.is_measured() {
-                        residuals.push((sample.force.0 - force) / sample.sigma.0);
-                    }
-                }
-            },
-        );
+        let scale = self.system.scale(&point.outer);
+        let model = self.system.source.forces(samples, scale, point);
+        let model = model.unwrap_or_else(|| vec![f64::NAN; samples.len()]);
+        let known = samples.iter().zip(&model);
+        let mut residuals: Vec<f64> = known
+            .filter(|(sample, _)| sample.is_measured())
+            .map(|(sample, force)| (sample.force.0 - force) / sample.sigma.0)
+            .collect();
         let block = uncertainty.block_length(record);
         let memory = uncertainty.memory(record);
         let remembered = memory

@@ -6,10 +6,10 @@
 //! polynomials on 0..1, nearly orthogonal over the depths passed where bare powers are nearly
 //! parallel. The others are the viscous drive, the decay of the initial force, and one.
 
-use super::options::LINEAR_COUNT;
+pub(super) use super::options::LINEAR_COUNT;
 use super::sample::FitSample;
 use crate::vectors::wide;
-use crate::viscoelastic::{
+use palpate_model::viscoelastic::{
     Compensated, NEGLIGIBLE, PSI_COUNT, Pieces, StepWeights, forcing, psi_derivatives,
 };
 
@@ -182,6 +182,18 @@ impl Rows {
             -elastic - at[3] * self.speed[i]
         })
     }
+}
+
+/// The six coefficients of a record.
+#[inline(always)]
+pub(super) fn six(at: &[f64]) -> Coefficients {
+    std::array::from_fn(|k| at[k])
+}
+
+/// What to divide scaled coefficients of powers by for N/mm, N/mm^2, N/mm^3, N*s/mm^2, N, N.
+pub(super) fn linear_units(depth_mm: f64) -> Coefficients {
+    let x = depth_mm;
+    [x, x * x, x * x * x, x * x, 1.0, 1.0]
 }
 
 /// Coefficients of the bare powers `u, u^2, u^3` of Legendre depth terms.
@@ -494,7 +506,12 @@ pub(super) struct Scale {
 impl Scale {
     #[inline]
     pub fn depth(self, sample: &FitSample) -> f64 {
-        sample.depth.0 / self.depth_mm - self.contact
+        self.of(sample.depth.0)
+    }
+
+    #[inline]
+    pub fn of(self, depth: f64) -> f64 {
+        depth / self.depth_mm - self.contact
     }
 }
 
@@ -523,7 +540,7 @@ pub(super) fn walk<const SLOPES: bool>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Depth, Newtons, Seconds};
+    use palpate_model::units::{Depth, Newtons, Seconds};
 
     const AT: Coefficients = [0.7, -0.4, 0.3, 1.1, 0.2, 0.1];
 

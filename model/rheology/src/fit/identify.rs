@@ -7,10 +7,9 @@
 //! pieces as stay within a tolerance (`thin::redraw`), which removes stairs and noise and keeps
 //! ramps and holds.
 
-use super::design::Columns;
-use super::options::{CONTACT, LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
+use super::columns::{Point, Slope};
 use super::sample::FitError;
-use super::system::{Point, System, Unknown};
+use super::system::{System, Unknown};
 use super::triangle::Triangle;
 
 /// A scaled design worse than this does not separate its parameters. Real protocols lie between
@@ -19,31 +18,31 @@ const CONDITION_MAX: f64 = 1e6;
 /// Parameters with at least this share of the largest entry belong to the blind combination.
 const NAMED_SHARE: f64 = 0.2;
 
-/// Whether the derivative by the relaxation time belongs to the design that is judged.
+/// Whether the derivatives by the outer parameters belong to the design that is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Judged {
     /// Only the parameters in which the model is linear: no coefficients are known yet.
     Linear,
-    /// These and `tau_eps`.
-    WithTau,
+    /// These and the outer ones.
+    WithOuter,
 }
 
 /// Refuses if the parameters cannot be told apart on the redrawn path.
 pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Result<(), FitError> {
+    let layout = system.layout();
     let unknowns: Vec<Unknown> = system
         .unknowns
         .iter()
         .copied()
         .filter(|unknown| match unknown.parameter {
-            CONTACT => false,
-            TAU => judged == Judged::WithTau,
-            _ => true,
+            k if k == layout.contact() => false,
+            k => judged == Judged::WithOuter || layout.linear().contains(&k),
         })
         .collect();
     let width = unknowns.len();
     let mut triangle = Triangle::new(width + 1);
     for (record, point) in points.iter().enumerate() {
-        push_rows(system, record, point, &unknowns, &mut triangle);
+        push_rows(system, record, point, &unknowns, &mut triangle)?;
     }
     let (condition, blind) = triangle.finish().condition(width);
     if condition < CONDITION_MAX {
@@ -80,41 +79,47 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
 }
 
 fn name(system: &System<'_>, unknown: &Unknown) -> String {
-    let name = PARAMETER_NAMES[unknown.parameter];
+    let name = &system.known()[unknown.parameter].name;
     match unknown.record {
         Some(record) => format!("{name} of {}", system.records[record].name),
-        None => name.to_owned(),
+        None => name.clone(),
     }
 }
 
-/// Bare powers of scaled depth, so that every column is one parameter.
+/// Bare columns, so that every one is one parameter.
 fn push_rows(
     system: &System<'_>,
     record: usize,
     point: &Point,
     unknowns: &[Unknown],
     triangle: &mut Triangle,
-) {
-    let blocks = &system.records[record].thin.blocks;
-    let Some(first) = blocks.first() else { return };
-    let scaled = |depth: f64| depth / system.depth_mm - point.outer.contact;
-    let mut columns = Columns::<true>::new(point.outer.tau, scaled(first.redrawn));
-    let mut row = vec![0.0; unknowns.len() + 1];
-    for block in blocks {
-        if block.dt > 0.0 {
-            columns.advance(scaled(block.redrawn), block.dt);
-        }
-        let values = columns.row();
-        for (slot, unknown) in row.iter_mut().zip(unknowns) {
-            *slot = match unknown.parameter {
-                _ if unknown.record.is_some_and(|own| own != record) => 0.0,
-                TAU => columns.tau_slope(&point.at),
-                parameter => {
-                    debug_assert!((LINEAR..LINEAR + LINEAR_COUNT).contains(&parameter));
-                    values[parameter - LINEAR]
-                }
+) -> Result<(), FitError> {
+    let layout = system.layout();
+    let is_judged = |k: &usize| unknowns.iter().any(|one| one.parameter == *k);
+    let outers: Vec<usize> = (0..layout.outers).filter(is_judged).collect();
+    let slopes: Vec<Slope> = outers.iter().map(|&k| Slope::Outer(k)).collect();
+    // Where each unknown stands in a row.
+    let places: Vec<Option<usize>> = unknowns
+        .iter()
+        .map(|unknown| {
+            let slope = outers.iter().position(|&k| k == unknown.parameter);
+            let place = match slope {
+                Some(k) => layout.linear_count() + k,
+                None => unknown.parameter - layout.outers,
             };
-        }
-        triangle.push(&row, block.weight);
-    }
+            unknown.is_of(record).then_some(place)
+        })
+        .collect();
+    let mut row = vec![0.0; unknowns.len() + 1];
+    let blocks = &system.records[record].thin.blocks;
+    let scale = system.scale(&point.outer);
+    let walked = system
+        .source
+        .redrawn(blocks, scale, point, &slopes, |block, values| {
+            for (slot, place) in row.iter_mut().zip(&places) {
+                *slot = place.map_or(0.0, |k| values[k]);
+            }
+            triangle.push(&row, block.weight);
+        });
+    walked.ok_or(FitError::Overflow)
 }

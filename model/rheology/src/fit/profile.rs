@@ -6,13 +6,18 @@
 //! values within a rise `T` of the smallest sum reach up to
 //! `max over tau of b + d sqrt(T - (S - S_min))`. Between the relaxation times (Chebyshev points) the
 //! three functions are polynomials.
+//!
+//! Over several outer parameters the sum has no such shape: there a parameter is kept at one value after another, and
+//! all others found anew, until the sum has risen by `T`.
 
-use super::options::{CONTACT, PARAMETER_NAMES, TAU};
+use super::columns::{Outer, Point};
+use super::refine::{GAIN_THIN, Settle, refine};
 use super::report::student_t975;
 use super::sample::FitError;
 use super::solve::Fitted;
-use super::system::{Outer, Point};
+use super::system::Rows;
 use super::uncertainty::{Error, Uncertainty};
+use crate::families::OuterRange;
 use serde::{Deserialize, Serialize};
 
 /// Relaxation times evaluated over a range of `ln tau` up to `NARROW`: polynomials of degree six, which
@@ -27,6 +32,13 @@ const REACH: f64 = 1.3;
 const WIDENINGS: usize = 6;
 /// Relaxation times at which the maximum is looked for before it is refined.
 const LOOKS: usize = 400;
+
+/// Values tried for one end where a parameter is kept at one after another.
+const PINS: usize = 14;
+/// The root of the rise is wanted to this share: a hundredth of the interval's half-width.
+const PIN_TOLERANCE: f64 = 0.01;
+/// An end farther than so many half-widths of the symmetric interval is open.
+const REACH_MAX: f64 = 50.0;
 
 /// A 95 % interval from the profile likelihood; an end is missing where it is open.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -54,21 +66,15 @@ struct Profile {
 impl Fitted<'_> {
     /// Profile-likelihood 95 % intervals of the free parameters of one record, the memory of the
     /// residuals allowed for as in the standard errors.
-    ///
-    /// Refused with a free contact or several relaxation times: the profile would have more than
-    /// one dimension.
     pub fn profile(&self, record: usize) -> Result<Vec<ProfileInterval>, FitError> {
         if record >= self.system.records.len() {
             return Ok(Vec::new());
         }
-        let outer = &self.system.unknowns[self.system.linear..];
-        if outer.len() > 1 || outer.iter().any(|unknown| unknown.parameter == CONTACT) {
-            return Err(FitError::ProfileTooWide);
-        }
-        let uncertainty = Uncertainty::of(&self.system, &self.refined);
+        let system = &self.system;
+        let uncertainty = Uncertainty::of(system, &self.refined);
         let errors = self.errors(&uncertainty, record);
-        let asked: Vec<usize> = (0..CONTACT)
-            .filter(|&k| self.system.fixed(k).is_none())
+        let asked: Vec<usize> = (0..system.layout().count())
+            .filter(|&k| system.fixed(record, k).is_none())
             .collect();
         let scatter = uncertainty.scatter.unwrap_or(0.0);
         // Without an error of its own (at an edge) a parameter is judged as under white noise.
@@ -77,52 +83,127 @@ impl Fitted<'_> {
                 .map_or((1e9, 1.0), |error: Error| (error.freedom, error.inflation));
             (student_t975(freedom) * scatter).powi(2) * inflation
         };
+        let named = |parameter: usize, [low, high]: [Option<f64>; 2]| ProfileInterval {
+            name: system.known()[parameter].name.clone(),
+            low,
+            high,
+        };
+        let outer = &system.unknowns[system.linear..];
+        let is_time =
+            |k: usize| k < system.layout().outers && system.source.kind(k) == OuterRange::Time;
+        let has_bounds = system.bounds().contains(&true);
+        if outer.len() > 1 || has_bounds || outer.iter().any(|one| !is_time(one.parameter)) {
+            let each = asked.iter().map(|&parameter| {
+                let error = errors[parameter].map(|error| error.std_error);
+                let ends = [-1.0, 1.0]
+                    .map(|side| self.pinned_end(record, parameter, side, error, rise(parameter)));
+                named(parameter, ends)
+            });
+            return Ok(each.collect());
+        }
         let highest = asked.iter().map(|&k| rise(k)).fold(0.0, f64::max);
-        let profile = self.walk_profile(record, &asked, highest, !outer.is_empty());
-        Ok(asked
-            .iter()
-            .enumerate()
-            .map(|(index, &parameter)| {
-                let tau = self.refined.points[record].outer.tau;
-                let [low, high] = if parameter == TAU {
-                    profile
-                        .reach(rise(TAU))
-                        .map(|end| end.map(|offset| tau * offset.exp()))
-                } else {
-                    [-1.0, 1.0].map(|side| profile.end(index, rise(parameter), side))
-                };
-                ProfileInterval {
-                    name: PARAMETER_NAMES[parameter].to_owned(),
-                    low,
-                    high,
+        let time = outer.first().map(|one| one.parameter);
+        let profile = self.walk_profile(record, &asked, highest, time)?;
+        let each = asked.iter().enumerate().map(|(index, &parameter)| {
+            let ends = if Some(parameter) == time {
+                let tau = self.refined.points[record].outer.values[parameter];
+                profile
+                    .reach(rise(parameter))
+                    .map(|end| end.map(|offset| tau * offset.exp()))
+            } else {
+                [-1.0, 1.0].map(|side| profile.end(index, rise(parameter), side))
+            };
+            named(parameter, ends)
+        });
+        Ok(each.collect())
+    }
+
+    /// How far a parameter can go to one side before the sum of squares has risen so far, all others making up for it;
+    /// open where it does not rise within the searched range or [`REACH_MAX`] standard errors.
+    fn pinned_end(
+        &self,
+        record: usize,
+        parameter: usize,
+        side: f64,
+        error: Option<f64>,
+        rise: f64,
+    ) -> Option<f64> {
+        let system = &self.system;
+        let rows = system.thinned();
+        let settle = Settle::Gain(GAIN_THIN);
+        let centre = refine(system, &self.refined.points, rows, settle)?;
+        let (lowest, mut points) = (centre.sum, centre.points);
+        let value = system.physical(record, &points[record])[parameter];
+        let first = student_t975(1e9) * error?;
+        let (floor, ceiling) = system.limits(record, parameter);
+        // The rise at a value, from where the search before it ended.
+        let risen = |value: f64, points: &mut Vec<Point>| -> Option<f64> {
+            let pinned = system.pinned(record, parameter, value);
+            pinned.pin(points, record, parameter, value);
+            let found = refine(&pinned, points, rows, settle)?;
+            *points = found.points;
+            Some((found.sum - lowest).max(0.0))
+        };
+        // In standard errors from the value; the root of the rise is close to a straight line over them.
+        let (mut near, mut far) = ((0.0, 0.0), None);
+        let mut at = 1.0;
+        for _ in 0..PINS {
+            let wanted = value + side * at * first;
+            let target = wanted.clamp(floor, ceiling);
+            let root = (risen(target, &mut points)? / rise).sqrt();
+            if (root - 1.0).abs() < PIN_TOLERANCE {
+                return Some(target);
+            }
+            if root > 1.0 {
+                far = Some((at, root));
+            } else if target != wanted {
+                return None;
+            } else {
+                near = (at, root);
+            }
+            at = match far {
+                Some((end, high)) => {
+                    let share = (1.0 - near.1) / (high - near.1);
+                    near.0 + share.clamp(0.1, 0.9) * (end - near.0)
                 }
-            })
-            .collect())
+                None => at * (1.2 / root.max(0.1)).clamp(1.3, 3.0),
+            };
+            if at > REACH_MAX {
+                return None;
+            }
+        }
+        Some((value + side * at * first).clamp(floor, ceiling))
     }
 
     /// The profile over relaxation times wide enough for a rise of the sum.
-    fn walk_profile(&self, record: usize, asked: &[usize], rise: f64, is_free: bool) -> Profile {
+    fn walk_profile(
+        &self,
+        record: usize,
+        asked: &[usize],
+        rise: f64,
+        time: Option<usize>,
+    ) -> Result<Profile, FitError> {
         let (all, linear) = (self.system.unknowns.len(), self.system.linear);
-        let centre = self.refined.points[record].outer.tau;
-        if !is_free {
-            return self.nodes(record, asked, &[0.0], [true; 2]);
-        }
+        let Some(time) = time else {
+            return self.nodes(record, asked, &[0.0], ([true; 2], 0));
+        };
+        let centre = self.refined.points[record].outer.values[time];
         let mut outer = vec![0.0; all];
         outer[linear] = 1.0;
         let unit = self.refined.pass.joint.deviation(&outer);
-        let (low, high) = self.ranges[record].log_tau;
+        let (low, high) = self.system.ranges[record].outers[time];
         let limits = (low - centre.ln(), high - centre.ln());
         let first = REACH * rise.sqrt() * unit;
         let mut reach = [-first, first];
         for _ in 0..WIDENINGS {
             let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
             let is_limit = [reach[0] <= limits.0, reach[1] >= limits.1];
-            let profile = self.nodes(record, asked, &chebyshev(ends), is_limit);
+            let profile = self.nodes(record, asked, &chebyshev(ends), (is_limit, time))?;
             let allowed = profile.lowest() + rise;
             let is_high =
                 [profile.sums[0], profile.sums[profile.sums.len() - 1]].map(|sum| sum > allowed);
             if (0..2).all(|side| is_high[side] || is_limit[side]) {
-                return profile;
+                return Ok(profile);
             }
             for side in 0..2 {
                 if !is_high[side] {
@@ -131,7 +212,7 @@ impl Fitted<'_> {
             }
         }
         let ends = [reach[0].max(limits.0), reach[1].min(limits.1)];
-        self.nodes(record, asked, &chebyshev(ends), [true; 2])
+        self.nodes(record, asked, &chebyshev(ends), ([true; 2], time))
     }
 
     fn nodes(
@@ -139,8 +220,8 @@ impl Fitted<'_> {
         record: usize,
         asked: &[usize],
         offsets: &[f64],
-        is_limit: [bool; 2],
-    ) -> Profile {
+        (is_limit, time): ([bool; 2], usize),
+    ) -> Result<Profile, FitError> {
         let linear = self.system.linear;
         let mut profile = Profile {
             offsets: offsets.to_vec(),
@@ -150,30 +231,29 @@ impl Fitted<'_> {
             is_limit,
         };
         for offset in offsets {
-            let outers: Vec<Outer> = self
-                .refined
-                .points
-                .iter()
-                .map(|point| Outer {
-                    tau: point.outer.tau * offset.exp(),
-                    ..point.outer
+            let points = self.refined.points.iter();
+            let outers: Vec<Outer> = points
+                .map(|point| {
+                    let mut outer = point.outer.clone();
+                    if let Some(tau) = outer.values.get_mut(time).filter(|_| *offset != 0.0) {
+                        *tau *= offset.exp();
+                    }
+                    outer
                 })
                 .collect();
-            let factor = self.system.values_pass(&outers);
+            let factor = self.system.values_pass(&outers, Rows::All);
+            let factor = factor.ok_or(FitError::Overflow)?;
             let solution = factor.solve(linear);
-            let point = Point {
-                outer: outers[record],
-                at: self.system.coefficients(record, &solution),
-            };
-            let values = self.system.physical(&point);
+            let point = &self.system.points(&outers, &solution)[record];
+            let values = self.system.physical(record, point);
             profile.sums.push(factor.residual_sum(linear));
             for (index, &parameter) in asked.iter().enumerate() {
-                let combination = self.system.combination(record, parameter, &point);
+                let combination = self.system.combination(record, parameter, point);
                 profile.values[index].push(values[parameter]);
                 profile.deviations[index].push(factor.deviation(&combination[..linear]));
             }
         }
-        profile
+        Ok(profile)
     }
 }
 

@@ -1,6 +1,6 @@
 //! What a fit is given, and the words in which it refuses.
 
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
 use thiserror::Error;
 
 /// A record's name and its samples.
@@ -112,12 +112,12 @@ pub enum FitError {
         reason: Box<FitError>,
     },
     /// A parameter that records cannot share.
-    #[error(
-        "{name} belongs to one recording and cannot be shared; share any of tau_eps, mu1, mu2, mu3, tau_sig"
-    )]
+    #[error("{name} belongs to one recording and cannot be shared; share any of {known}")]
     NotShareable {
         /// The parameter.
         name: String,
+        /// Those that can be.
+        known: String,
     },
     /// Residuals that remember too long for a bootstrap.
     #[error(
@@ -145,11 +145,6 @@ pub enum FitError {
         /// The depth in mm.
         depth: f64,
     },
-    /// A profile over more than one dimension.
-    #[error(
-        "profile intervals need one relaxation time and a fixed contact; fix x_contact, or share tau_eps"
-    )]
-    ProfileTooWide,
     /// A parameter that the model does not have.
     #[error("the model has no parameter called '{name}'; it has {known}")]
     UnknownParameter {

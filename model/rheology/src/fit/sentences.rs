@@ -1,8 +1,10 @@
 //! What a fit says in words; window, command line and files use the same sentences.
 
-use super::report::FitReport;
+use super::report::{FitReport, Parameter};
 use super::solve::Fitted;
-use crate::viscoelastic::admissibility;
+use super::uncertainty::End;
+use crate::families::OuterRange;
+use palpate_model::viscoelastic::admissibility;
 
 /// Correlation times this many relaxation times long blur the model itself.
 const MEMORY_LONG: f64 = 1.0;
@@ -18,14 +20,13 @@ const UNCERTAIN_SHARE: f64 = 0.5;
 /// What a reader of the numbers must know.
 pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -> Vec<String> {
     let mut warnings = Vec::new();
-    if let Some(edge) = fitted.edge(record) {
-        let (low, high) = fitted.ranges[record].log_tau;
-        warnings.push(format!(
-            "tau_eps lies at the {edge} end of what this record can show ({:.3e} s to {:.3e} s); \
-             the other parameters are conditional on it",
-            low.exp(),
-            high.exp()
-        ));
+    let layout = fitted.system.layout();
+    for outer in 0..layout.outers {
+        warnings.extend(
+            fitted
+                .edge(record, outer)
+                .map(|end| edge(fitted, record, outer, end, &report.parameters[outer])),
+        );
     }
     if fitted.is_contact_at_start(record) {
         warnings.push(
@@ -40,17 +41,28 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
                 .to_owned(),
         );
     }
-    let tau = &report.parameters[0];
-    if tau
-        .std_error
-        .is_some_and(|error| error > UNCERTAIN_SHARE * tau.value)
-    {
-        warnings.push(
-            "tau_eps is uncertain by more than half its value; record a longer hold".to_owned(),
-        );
+    if !fitted.blind.is_empty() {
+        warnings.push(format!(
+            "these records hardly separate {}; record a second speed or depth, or a longer hold",
+            fitted.blind.join(", ")
+        ));
+    }
+    let times: Vec<&Parameter> = (0..layout.outers)
+        .filter(|&k| fitted.system.source.kind(k) == OuterRange::Time)
+        .map(|k| &report.parameters[k])
+        .collect();
+    for time in &times {
+        let is_uncertain = |error: f64| error > UNCERTAIN_SHARE * time.value;
+        if time.std_error.is_some_and(is_uncertain) {
+            warnings.push(format!(
+                "{} is uncertain by more than half its value; record a longer hold",
+                time.name
+            ));
+        }
     }
     let (low, high) = fitted.system.records[record].forces();
-    for parameter in &report.parameters[5..7] {
+    let own = layout.initial().into_iter().chain([layout.offset()]);
+    for parameter in own.map(|k| &report.parameters[k]) {
         if parameter.value.abs() > LEVEL_LARGE * (high - low) {
             warnings.push(format!(
                 "{} is far larger than the force ever changes, so it stands for something the model \
@@ -70,9 +82,10 @@ pub(super) fn warnings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
                 ));
             }
         } else if is_few
-            || noise
-                .correlation_time_s
-                .is_some_and(|time| time > MEMORY_LONG * tau.value)
+            || noise.correlation_time_s.is_some_and(|time| {
+                let longest = times.iter().map(|one| one.value).reduce(f64::max);
+                longest.is_some_and(|longest| time > MEMORY_LONG * longest)
+            })
         {
             warnings.push(format!(
                 "the residuals have a long memory: this body does not describe the record to within \
@@ -114,9 +127,37 @@ pub(super) fn findings(fitted: &Fitted<'_>, record: usize, report: &FitReport) -
         ));
     }
     let (_, deepest) = fitted.system.records[record].depths;
-    let contact = report.parameters[7].value;
-    findings.extend(admissibility::sentences(&report.body(), deepest - contact));
+    let contact = report.parameters[fitted.system.layout().contact()].value;
+    let kelvin = report.kelvin().into_iter();
+    findings.extend(kelvin.flat_map(|body| admissibility::sentences(&body, deepest - contact)));
     findings
+}
+
+/// That an outer parameter ended where its search does.
+fn edge(fitted: &Fitted<'_>, record: usize, outer: usize, end: End, found: &Parameter) -> String {
+    let name = &found.name;
+    if fitted.system.source.kind(outer) != OuterRange::Time {
+        let (value, unit) = (found.value, &found.unit);
+        let unit = if unit.is_empty() {
+            String::new()
+        } else {
+            format!(" {unit}")
+        };
+        return format!(
+            "{name} lies at an end of its range, {value:.3e}{unit}; the other parameters are conditional on it"
+        );
+    }
+    let end = match end {
+        End::Low => "short",
+        End::High => "long",
+    };
+    let (low, high) = fitted.system.ranges[record].outers[outer];
+    format!(
+        "{name} lies at the {end} end of what this record can show ({:.3e} s to {:.3e} s); \
+         the other parameters are conditional on it",
+        low.exp(),
+        high.exp()
+    )
 }
 
 fn independent(samples: f64) -> String {

@@ -1,13 +1,10 @@
 //! A record in a few hundred rows, for searching and judging; nothing is reported from it.
 //!
 //! Blocks of samples grow geometrically from every corner of the path, because every relaxation
-//! begins at a corner: so the shortest and the longest relaxation time stay visible. The mean of a
-//! filtered column over a block needs no samples: integrating `f + tau f' = x^k` gives
-//! `mean f = mean x^k - tau (f_end - f_start) / dt`.
+//! begins at a corner: so the shortest and the longest relaxation time stay visible. The mean of a column over a
+//! block needs no samples, since a relaxation is known from its ends.
 
-use super::design::{Coefficients, Columns};
 use super::sample::FitSample;
-use super::triangle::{Factor, Triangle};
 
 /// Long blocks in a record, about.
 const BLOCKS: usize = 250;
@@ -81,62 +78,6 @@ impl Thin {
         }
         Self { blocks }
     }
-
-    /// The six columns and the force as one triangle, for one relaxation time.
-    pub fn factor(&self, depth_mm: f64, tau: f64, contact: f64) -> Factor {
-        let mut triangle = Triangle::new(7);
-        let Some(first) = self.blocks.first() else {
-            return triangle.finish();
-        };
-        let mut from = first.depth / depth_mm - contact;
-        let mut columns = Columns::<false>::new(tau, from);
-        let mut before = columns.row();
-        for block in &self.blocks {
-            let to = block.depth / depth_mm - contact;
-            if block.dt > 0.0 {
-                columns.advance(to, block.dt);
-            }
-            let after = columns.row();
-            let row = if block.count == 1 {
-                after
-            } else {
-                mean([from.max(0.0), to.max(0.0)], [&before, &after], block, tau)
-            };
-            (before, from) = (after, to);
-            if block.weight > 0.0 {
-                let [f1, f2, f3, g, e, one] = row;
-                let row = [
-                    f1,
-                    2.0 * f2 - f1,
-                    6.0 * (f3 - f2) + f1,
-                    g,
-                    e,
-                    one,
-                    block.force,
-                ];
-                triangle.push(&row, block.weight);
-            }
-        }
-        triangle.finish()
-    }
-}
-
-/// Means over a block of the bare columns, from their values before and at its end. The sum over
-/// samples is at the end of every interval, hence half a difference more than the integral.
-fn mean([x0, x1]: [f64; 2], [before, after]: [&[f64; 6]; 2], block: &Block, tau: f64) -> [f64; 6] {
-    let settled = [
-        (x0 + x1) / 2.0,
-        (x0 * x0 + x0 * x1 + x1 * x1) / 3.0,
-        (x0 + x1) * (x0 * x0 + x1 * x1) / 4.0,
-        (x1 + x0) * (x1 - x0) / (2.0 * block.dt),
-        0.0,
-    ];
-    let share = 0.5 / block.count as f64 - tau / block.dt;
-    let mut row = [1.0; 6];
-    for (k, settled) in settled.into_iter().enumerate() {
-        row[k] = settled + share * (after[k] - before[k]);
-    }
-    row
 }
 
 fn block(
@@ -271,15 +212,10 @@ pub(super) fn tolerance(samples: &[FitSample], depth_mm: f64) -> f64 {
         .min(TOLERANCE_SHARE_MAX * depth_mm)
 }
 
-/// Coefficients of one column alone.
-pub(super) fn unit(k: usize) -> Coefficients {
-    std::array::from_fn(|i| f64::from(u8::from(i == k)))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Depth, Newtons, Seconds};
+    use palpate_model::units::{Depth, Newtons, Seconds};
 
     fn stairs() -> Vec<FitSample> {
         (0..=6000)

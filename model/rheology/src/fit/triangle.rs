@@ -175,6 +175,49 @@ impl Factor {
         solution
     }
 
+    /// Whether all its numbers are.
+    pub fn is_finite(&self) -> bool {
+        self.r.iter().all(|value| value.is_finite())
+    }
+
+    /// With what the first columns explain taken from the last; rows stay an upper triangle but for the last column.
+    pub fn less(mut self, explained: &[f64]) -> Self {
+        for row in self.r.chunks_mut(self.width) {
+            let known: f64 = row.iter().zip(explained).map(|(a, b)| a * b).sum();
+            row[self.width - 1] -= known;
+        }
+        self
+    }
+
+    /// The triangle of some of the columns and the last.
+    pub fn keeping(&self, columns: &[usize]) -> Self {
+        let mut triangle = Triangle::new(columns.len() + 1);
+        let mut chosen = vec![0.0; columns.len() + 1];
+        for i in 0..self.width {
+            let row = self.row(i);
+            for (slot, &k) in chosen.iter_mut().zip(columns) {
+                *slot = row[k];
+            }
+            chosen[columns.len()] = row[self.width - 1];
+            triangle.push(&chosen, 1.0);
+        }
+        triangle.finish()
+    }
+
+    /// Coefficients of the first `columns` columns that fit the last column best, those behind them having the values
+    /// of `others`.
+    pub fn solve_beside(&self, columns: usize, others: &[f64]) -> Vec<f64> {
+        let mut solution = vec![0.0; columns];
+        solution.extend_from_slice(others);
+        for i in (0..columns).rev() {
+            let known = i + 1..solution.len();
+            let known: f64 = known.map(|j| self.at(i, j) * solution[j]).sum();
+            solution[i] = (self.at(i, self.width - 1) - known) / self.at(i, i);
+        }
+        solution.truncate(columns);
+        solution
+    }
+
     /// `|R^-T l|` over the first columns: the standard deviation of the combination `l` of
     /// coefficients, for residuals of unit variance.
     pub fn deviation(&self, combination: &[f64]) -> f64 {

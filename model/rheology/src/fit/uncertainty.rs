@@ -1,19 +1,22 @@
 //! Standard errors that allow for the memory of the residuals.
 
-use super::block_sums::NoiseBlock;
 use super::noise::{self, Blocks, Memory};
-use super::options::{CONTACT, PARAMETER_NAMES, TAU};
-use super::system::{Mapped, System};
+use super::passes::{Mapped, RecordFactor};
+use super::refine::Refined;
+use super::solve::Fitted;
+use super::system::System;
 use super::triangle::Factor;
-use super::{refine::Refined, solve::Fitted};
 
-/// `ln tau` this close to an end of the searched range is at the end.
+/// A search coordinate this close to an end of the searched range is at the end.
 const EDGE: f64 = 1e-3;
 /// A scaled contact this close to the shallowest depth was stopped there.
 const CONTACT_EDGE: f64 = 1e-6;
 
 /// Mean square of rounding errors, relative to that of the forces: 1e-12 of a force.
 const ROUNDING: f64 = 1e-24;
+
+/// Share of a parameter over which what is derived from it is differenced.
+const DIFFERENCE: f64 = 1e-6;
 
 /// What the residuals of all records say.
 pub(super) struct Uncertainty {
@@ -39,15 +42,15 @@ impl Uncertainty {
         let unknowns = system.unknowns.len();
         let spare = system.measured() - unknowns;
         let scatter = (spare > 0).then(|| (refined.sum / spare as f64).sqrt());
-        let change = refined.pass.joint.solve(unknowns);
+        let change = &refined.change;
         let blocks: Vec<Blocks> = refined
             .pass
             .records
             .iter()
             .enumerate()
             .map(|(record, factor)| {
-                let map = system.map(record, true);
-                blocks(system, &factor.blocks, &map, &change)
+                let map = system.map(record, unknowns);
+                blocks(factor, &map, change)
             })
             .collect();
         let white = scatter.unwrap_or(0.0).powi(2);
@@ -60,7 +63,7 @@ impl Uncertainty {
             .enumerate()
             .map(|(record, blocks)| {
                 // Records may scatter differently from what their sigmas say.
-                let own = own_variance(system, refined, record, &change).unwrap_or(white);
+                let own = own_variance(system, refined, record).unwrap_or(white);
                 let memory = match is_rounding {
                     true => Some(Memory::none(white)),
                     false => noise::memory(&blocks, own),
@@ -90,6 +93,17 @@ impl Uncertainty {
         self.records[record].1
     }
 
+    /// How many independent samples of a record would tell as much as these.
+    pub fn effective_samples(&self, record: usize, samples: usize) -> f64 {
+        let samples = samples as f64;
+        match self.memory(record) {
+            Some(memory) if memory.long_run() > 0.0 => {
+                (samples * self.variance(record) / memory.long_run()).clamp(1.0, samples)
+            }
+            _ => samples,
+        }
+    }
+
     /// The uncertainty of a combination of unknowns; `None` where there is nothing to judge it by.
     pub fn error(&self, refined: &Refined, combination: &[f64], spare: f64) -> Option<Error> {
         let scatter = self.scatter?;
@@ -113,36 +127,32 @@ impl Uncertainty {
 
 /// Variance of the weighted residuals of one of several records; `None` for the only one, where
 /// it is the joint one, and for one without spare samples.
-fn own_variance(
-    system: &System<'_>,
-    refined: &Refined,
-    record: usize,
-    change: &[f64],
-) -> Option<f64> {
+fn own_variance(system: &System<'_>, refined: &Refined, record: usize) -> Option<f64> {
     if system.records.len() == 1 {
         return None;
     }
-    let factor = &refined.pass.records[record].factor;
-    let map = system.map(record, true);
-    let square: f64 = (0..factor.width())
-        .map(|i| {
-            let row = factor.row(i);
-            let explained = map.iter().zip(change);
-            let explained: f64 = explained
-                .map(|(column, value)| column.of(row) * value)
-                .sum();
-            (row[factor.width() - 1] - explained).powi(2)
-        })
-        .sum();
     // Its share of the unknowns, as if they were spread over the samples.
     let measured = system.records[record].measured as f64;
     let all = system.measured() as f64;
     let spare = measured * (1.0 - system.unknowns.len() as f64 / all);
-    (spare > 0.0).then(|| square / spare)
+    (spare > 0.0).then(|| square(system, refined, record) / spare)
 }
 
-fn blocks(system: &System<'_>, sums: &[NoiseBlock], map: &[Mapped], solution: &[f64]) -> Blocks {
-    let last = sums.first().map_or(0, |_| width(system) - 1);
+/// Sum of squared weighted residuals of a record.
+fn square(system: &System<'_>, refined: &Refined, record: usize) -> f64 {
+    let factor = &refined.pass.records[record].factor;
+    let map = system.map(record, refined.change.len());
+    let left = |i: usize| {
+        let row = factor.row(i);
+        let pairs = map.iter().zip(&refined.change);
+        let explained: f64 = pairs.map(|(column, value)| column.of(row) * value).sum();
+        row[factor.width() - 1] - explained
+    };
+    (0..factor.width()).map(|i| left(i).powi(2)).sum()
+}
+
+fn blocks(record: &RecordFactor, map: &[Mapped], solution: &[f64]) -> Blocks {
+    let (sums, last) = (&record.blocks, record.factor.width() - 1);
     let mut blocks = Blocks {
         residuals: Vec::with_capacity(sums.len()),
         columns: vec![Vec::with_capacity(sums.len()); map.len()],
@@ -162,23 +172,23 @@ fn blocks(system: &System<'_>, sums: &[NoiseBlock], map: &[Mapped], solution: &[
     blocks
 }
 
-/// Columns of a record's triangle.
-fn width(system: &System<'_>) -> usize {
-    let slopes = [TAU, CONTACT]
-        .iter()
-        .filter(|&&k| system.fixed(k).is_none());
-    7 + slopes.count()
+/// An end of a searched range.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum End {
+    Low,
+    High,
 }
 
 impl Fitted<'_> {
-    /// Which end of the searched relaxation times the one of a record lies at.
-    pub(super) fn edge(&self, record: usize) -> Option<&'static str> {
-        let (low, high) = self.ranges[record].log_tau;
-        let log_tau = self.refined.points[record].outer.tau.ln();
-        match self.system.fixed(TAU) {
+    /// Which end of its searched range an outer parameter of a record lies at.
+    pub(super) fn edge(&self, record: usize, outer: usize) -> Option<End> {
+        let (low, high) = self.system.ranges[record].outers[outer];
+        let value = self.refined.points[record].outer.values[outer];
+        let z = self.system.coordinate(outer, value);
+        match self.system.fixed(record, outer) {
             Some(_) => None,
-            None if log_tau < low + EDGE => Some("short"),
-            None if log_tau > high - EDGE => Some("long"),
+            None if z < low + EDGE => Some(End::Low),
+            None if z > high - EDGE => Some(End::High),
             None => None,
         }
     }
@@ -186,26 +196,68 @@ impl Fitted<'_> {
     /// Whether the contact was stopped at the shallowest depth.
     pub(super) fn is_contact_at_start(&self, record: usize) -> bool {
         let contact = self.refined.points[record].outer.contact;
-        self.system.fixed(CONTACT).is_none()
-            && contact < self.ranges[record].contact.0 + CONTACT_EDGE
+        let (shallowest, _) = self.system.ranges[record].contact;
+        self.system.is_contact_free(record) && contact < shallowest + CONTACT_EDGE
     }
 
-    /// The uncertainty of every parameter of a record, `None` where fixed or not determined.
-    pub(super) fn errors(&self, uncertainty: &Uncertainty, record: usize) -> [Option<Error>; 8] {
+    /// The uncertainty of every parameter of a record, `None` where fixed or not determined; then that of what is
+    /// derived from them, to first order.
+    pub(super) fn errors(&self, uncertainty: &Uncertainty, record: usize) -> Vec<Option<Error>> {
+        let layout = self.system.layout();
         let spare = (self.system.measured() - self.system.unknowns.len()) as f64;
-        std::array::from_fn(|parameter| {
-            debug_assert!(parameter < PARAMETER_NAMES.len());
-            let is_stopped = match parameter {
-                TAU => self.edge(record).is_some(),
-                CONTACT => self.is_contact_at_start(record),
-                _ => false,
-            };
-            if self.system.fixed(parameter).is_some() || is_stopped {
-                return None;
+        let point = &self.refined.points[record];
+        let is_stopped = |parameter: usize| match parameter {
+            k if k < layout.outers => self.edge(record, k).is_some(),
+            k => k == layout.contact() && self.is_contact_at_start(record),
+        };
+        let of = |parameter: usize| self.system.combination(record, parameter, point);
+        let error = |combination: &[f64]| uncertainty.error(&self.refined, combination, spare);
+        let own = (0..layout.count()).map(|parameter| {
+            let is_free = self.system.fixed(record, parameter).is_none();
+            (is_free && !is_stopped(parameter)).then(|| error(&of(parameter)))?
+        });
+        let derived = self.gradients(record).into_iter().map(|gradient| {
+            let mut combination = vec![0.0; self.system.unknowns.len()];
+            for (parameter, share) in gradient.into_iter().enumerate() {
+                if share != 0.0 && is_stopped(parameter) {
+                    return None;
+                }
+                for (sum, one) in combination.iter_mut().zip(of(parameter)) {
+                    *sum += share * one;
+                }
             }
-            let point = &self.refined.points[record];
-            let combination = self.system.combination(record, parameter, point);
-            uncertainty.error(&self.refined, &combination, spare)
-        })
+            error(&combination)
+        });
+        own.chain(derived).collect()
+    }
+
+    /// Derivatives of what is derived from a record's body by its parameters, those that are free.
+    fn gradients(&self, record: usize) -> Vec<Vec<f64>> {
+        let layout = self.system.layout();
+        let values = self.system.physical(record, &self.refined.points[record]);
+        let body = &values[..layout.outers + layout.coefficients];
+        let derived = |body: &[f64]| {
+            let (outer, linear) = body.split_at(layout.outers);
+            self.system.source.family.derived(outer, linear)
+        };
+        let columns = (0..body.len()).map(|k| {
+            let step = DIFFERENCE * body[k].abs().max(f64::MIN_POSITIVE);
+            let [up, down] = [step, -step].map(|step| {
+                let mut moved = body.to_vec();
+                moved[k] += step;
+                derived(&moved)
+            });
+            let is_free = self.system.fixed(record, k).is_none();
+            let pairs = up.into_iter().zip(down);
+            let slopes = pairs.map(|(up, down)| (up.value - down.value) / (2.0 * step));
+            slopes
+                .map(|slope| if is_free { slope } else { 0.0 })
+                .collect()
+        });
+        let columns: Vec<Vec<f64>> = columns.collect();
+        let count = columns.first().map_or(0, Vec::len);
+        (0..count)
+            .map(|k| columns.iter().map(|column| column[k]).collect())
+            .collect()
     }
 }

@@ -1,7 +1,7 @@
 //! The modified Kelvin body with an elastic part of one to five terms.
 
 use crate::families::{Drive, POWER_MAX, Relaxation};
-use crate::viscoelastic::{BodyError, ModifiedKelvin};
+use palpate_model::viscoelastic::{BodyError, ModifiedKelvin};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
 /// `F + tau_eps F' = mu1 x + .. + muN x^N + tau_sig x x'`, `N` from 1 to 5.

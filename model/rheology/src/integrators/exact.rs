@@ -6,7 +6,7 @@ use super::body::SeriesBody;
 use super::real::{Real, Running};
 use super::{Integrator, Start, finished};
 use crate::families::{POWER_MAX, StepError};
-use crate::viscoelastic::{Pieces, psi_first};
+use palpate_model::viscoelastic::{Pieces, psi_first};
 
 /// Exact whatever the step; steps across the surface are cut where they cross it.
 #[derive(Clone, Copy, Debug)]

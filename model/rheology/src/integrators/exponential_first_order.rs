@@ -2,7 +2,7 @@
 //! `F(+) = e^-h F + psi_0 u(left) + psi_1 (u(right) - u(left))`.
 
 use super::rule::{Rule, Weights};
-use crate::viscoelastic::psi;
+use palpate_model::viscoelastic::psi;
 
 /// Amplifies by `e^-h`: stable at any step. Second order, since the powers of a straight depth are not
 /// straight.

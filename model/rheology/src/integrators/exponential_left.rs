@@ -1,7 +1,7 @@
 //! The exact decay with the forcing held at the left edge: `F(+) = e^-h F + (1 - e^-h) u(left)`.
 
 use super::rule::{Rule, Weights};
-use crate::viscoelastic::psi;
+use palpate_model::viscoelastic::psi;
 
 /// Amplifies by `e^-h`: stable at any step. First order, and on a ramp worse than explicit Euler.
 #[derive(Clone, Copy, Debug)]

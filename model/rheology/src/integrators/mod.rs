@@ -45,7 +45,7 @@ pub use runge_kutta::RungeKutta;
 pub use trapezoid::Trapezoid;
 
 use crate::families::StepError;
-use crate::viscoelastic::BodyError;
+use palpate_model::viscoelastic::BodyError;
 use real::Running;
 use serde::{Deserialize, Serialize};
 use thiserror::Error;

@@ -38,7 +38,7 @@ mod sealed {
 
 impl Real for f64 {
     const ZERO: Self = 0.0;
-    const NEGLIGIBLE: Self = crate::viscoelastic::NEGLIGIBLE;
+    const NEGLIGIBLE: Self = palpate_model::viscoelastic::NEGLIGIBLE;
     #[inline]
     fn of(value: f64) -> Self {
         value

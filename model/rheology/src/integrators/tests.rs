@@ -2,8 +2,8 @@
 
 use super::*;
 use crate::reference::Reference;
-use crate::units::{Depth, Newtons, Seconds};
-use crate::viscoelastic::ModifiedKelvin;
+use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_model::viscoelastic::ModifiedKelvin;
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 const FIFTH: SeriesBody<5> = SeriesBody {

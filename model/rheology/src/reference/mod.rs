@@ -2,7 +2,7 @@
 //!
 //! Depth moves straight between the points given and each term's response to that is written down in
 //! closed form, like the exact step of [`crate::families`], but in as many digits as asked for and
-//! without its rearrangements: `y(+) = e^-r y + w` with the weights of [`psi`](crate::viscoelastic::psi).
+//! without its rearrangements: `y(+) = e^-r y + w` with the weights of [`psi`](palpate_model::viscoelastic::psi).
 //! Inputs are doubles and count as exact; what differs from the doubles' answer is theirs.
 
 mod digits;
@@ -10,8 +10,8 @@ mod psi;
 mod rule;
 
 use crate::families::{Drive, POWER_MAX, Relaxation, StepError};
-use crate::units::{Depth, Newtons, Seconds};
 use digits::{Big, Digits, is_negative, is_zero, nearest};
+use palpate_model::units::{Depth, Newtons, Seconds};
 use psi::Weights;
 pub use rule::RuleReference;
 use thiserror::Error;

@@ -1,4 +1,4 @@
-//! The functions of the exact step, in many digits; see [`crate::viscoelastic::psi`].
+//! The functions of the exact step, in many digits; see [`palpate_model::viscoelastic::psi`].
 
 use super::digits::{Big, Digits};
 
@@ -77,7 +77,7 @@ mod tests {
     fn agrees_with_the_file_to_its_last_digit() {
         let digits = Digits::decimal(70);
         let mut count = 0;
-        for line in include_str!("../../tests/data/psi_reference.txt").lines() {
+        for line in include_str!("../../../tests/data/psi_reference.txt").lines() {
             if line.starts_with('#') {
                 continue;
             }

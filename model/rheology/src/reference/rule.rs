@@ -5,7 +5,7 @@ use super::digits::{Big, Digits, nearest};
 use super::psi::Weights;
 use crate::families::StepError;
 use crate::integrators::{Scheme, SeriesBody};
-use crate::units::{Depth, Newtons, Seconds};
+use palpate_model::units::{Depth, Newtons, Seconds};
 
 /// A body stepped by a rule, in many digits. The exact scheme is [`Reference`](super::Reference)'s.
 #[derive(Clone, Debug)]

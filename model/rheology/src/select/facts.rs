@@ -78,7 +78,7 @@ pub(super) fn are_unlike(a: f64, b: f64) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::units::{Depth, Newtons, Seconds};
+    use palpate_model::units::{Depth, Newtons, Seconds};
 
     #[test]
     fn a_ramp_and_hold_after_a_wait() {

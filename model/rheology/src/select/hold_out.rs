@@ -5,8 +5,8 @@
 //! offset, is found on that record, because no other can tell it; the body is not.
 
 use super::facts::{RecordFacts, are_unlike};
-use crate::families::{Family, Model};
-use crate::fit::{FamilyOptions, FitError, FitSample, fit_body, predict};
+use crate::families::Model;
+use crate::fit::{FitError, FitOptions, FitSample, fit_body, predict};
 use serde::Serialize;
 use std::str::FromStr;
 use thiserror::Error;
@@ -258,11 +258,10 @@ fn unseen(facts: &[RecordFacts], record: usize, test: &[usize]) -> Unseen {
 
 /// How a family's body of the records that a fold leaves predicts those it takes.
 pub(super) fn predict_fold(
-    family: &dyn Family,
+    options: &FitOptions,
     records: &[(&str, &[FitSample])],
     facts: &[RecordFacts],
     fold: &Fold,
-    options: FamilyOptions,
 ) -> Result<Vec<PredictionOf>, FitError> {
     let train: Vec<(&str, &[FitSample])> = match fold.cut {
         Some(cut) => vec![(records[0].0, &records[0].1[..cut])],
@@ -273,7 +272,7 @@ pub(super) fn predict_fold(
                 .collect()
         }
     };
-    let body: Model = fit_body(family, &train, options)?;
+    let body: Model = fit_body(&train, options)?;
     let one = |&index: &usize| {
         let (name, samples) = records[index];
         let all = 0..samples.len();
@@ -281,7 +280,7 @@ pub(super) fn predict_fold(
             Some(cut) => (0..cut, cut..samples.len()),
             None => (all.clone(), all),
         };
-        let predicted = predict(&body, samples, own, score, options)?;
+        let predicted = predict(&body, samples, own, score)?;
         Ok(PredictionOf {
             record: name.to_owned(),
             unseen: match fold.cut {

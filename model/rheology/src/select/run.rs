@@ -7,25 +7,23 @@ use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
 use super::ladder::{Step, steps};
 use super::verdict::{Counts, Verdict, verdict};
 use crate::families::{Family, Model, all};
-use crate::fit::{FamilyFit, FamilyOptions, FitError, FitSample, fit_family};
+use crate::fit::{FitError, FitOptions, FitSample, JointReport, fit_joint};
 use crate::tolerance::Tolerance;
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
 use serde::Serialize;
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use thiserror::Error;
 
 /// What is compared, and how.
 #[derive(Debug)]
 pub struct SelectOptions {
     /// Families compared.
-    pub families: Vec<Box<dyn Family>>,
+    pub families: Vec<Arc<dyn Family>>,
     /// Error of force that does not matter; without it information criteria alone decide.
     pub tolerance: Option<Tolerance>,
     /// What is held out.
     pub hold_out: HoldOut,
-    /// What each record has of its own; by default an offset alone. An initial force that fades is not
-    /// defined for families of several relaxation times, and would make the others look costlier.
-    pub fit: FamilyOptions,
     /// The specimen of each record, in their order; fewer where the others are not known.
     pub specimens: Vec<Option<String>>,
 }
@@ -36,10 +34,6 @@ impl Default for SelectOptions {
             families: all(),
             tolerance: None,
             hold_out: HoldOut::Auto,
-            fit: FamilyOptions {
-                offset: true,
-                initial: false,
-            },
             specimens: Vec::new(),
         }
     }
@@ -161,11 +155,12 @@ pub struct Selection {
 /// `progress` is told before each fit and may end the whole.
 ///
 /// ```
-/// use palpate_model::families::{Kelvin, Maxwell, Model, PowerSeries};
-/// use palpate_model::fit::FitSample;
-/// use palpate_model::select::{SelectOptions, select};
+/// use palpate_rheology::families::{Kelvin, Maxwell, Model, PowerSeries};
+/// use palpate_rheology::fit::FitSample;
+/// use palpate_rheology::select::{SelectOptions, select};
 /// use palpate_model::{Depth, Newtons, Seconds};
 /// use std::ops::ControlFlow;
+/// use std::sync::Arc;
 ///
 /// let truth = Model { family: "kelvin".into(), outer: vec![1.5], linear: vec![0.15, 0.6] };
 /// let record = |speed: f64| -> Vec<FitSample> {
@@ -185,12 +180,12 @@ pub struct Selection {
 /// };
 /// let (slow, fast) = (record(0.5), record(4.0));
 /// let families = SelectOptions {
-///     families: vec![Box::new(Maxwell), Box::new(Kelvin), Box::new(PowerSeries::of_order(3).expect("3"))],
+///     families: vec![Arc::new(Maxwell), Arc::new(Kelvin), Arc::new(PowerSeries::of_order(3).expect("3"))],
 ///     ..SelectOptions::default()
 /// };
 /// let found = select(&[("slow", &slow), ("fast", &fast)], &families, &|_| ControlFlow::Continue(()))?;
 /// assert_eq!(found.verdict.family.as_deref(), Some("kelvin"));
-/// # Ok::<(), palpate_model::select::SelectError>(())
+/// # Ok::<(), crate::select::SelectError>(())
 /// ```
 pub fn select(
     records: &[(&str, &[FitSample])],
@@ -231,7 +226,10 @@ pub fn select(
     let mut refused = Vec::new();
     for family in &options.families {
         begin(&**family)?;
-        let fit = match fit_family(&**family, records, options.fit) {
+        // An initial force that fades is not defined for families of several relaxation times, and would make the
+        // others look costlier.
+        let own = FitOptions::of(Arc::clone(family)).at_rest();
+        let fit = match fit_joint(records, &own, &own.body_names()) {
             Ok(fit) => fit,
             Err(reason) => {
                 refused.push((family.key(), reason));
@@ -246,7 +244,7 @@ pub fn select(
         for fold in &folds {
             begin(&**family)?;
             if let Ok(known) = &mut predicted {
-                match predict_fold(&**family, records, &facts, fold, options.fit) {
+                match predict_fold(&own, records, &facts, fold) {
                     Ok(more) => known.extend(more),
                     Err(reason) => predicted = Err(reason.to_string()),
                 }
@@ -260,17 +258,19 @@ pub fn select(
         return Err(reason.clone().into());
     }
     let samples = fitted.first().map_or(0, |(_, fit, _)| fit.samples);
-    let best = fitted.iter().min_by(|a, b| a.1.sum.total_cmp(&b.1.sum));
+    let best = fitted
+        .iter()
+        .min_by(|a, b| a.1.weighted_square.total_cmp(&b.1.weighted_square));
     let effective = best.map_or(0.0, |(_, fit, _)| fit.effective_samples);
     // The force of the tissue: a sensor offset is no part of it.
     if let Some(best) = best {
         for ((facts, own), (_, samples)) in facts.iter_mut().zip(&best.1.records).zip(records) {
-            facts.peak_n = peak(samples, own.offset);
+            facts.peak_n = peak(samples, own.report.value("f_offset").unwrap_or(0.0));
         }
     }
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
-        .map(|(family, fit, predicted)| candidate(&**family, fit, predicted, effective))
+        .map(|(family, fit, predicted)| candidate(&**family, records, fit, predicted, effective))
         .collect::<Result<_, FitError>>()?;
     let lowest =
         |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
@@ -338,23 +338,29 @@ fn check(records: &[(&str, &[FitSample])]) -> Result<(), SelectError> {
 /// A row of the comparison; the criteria are relative to the lowest only once all are known.
 fn candidate(
     family: &dyn Family,
-    fit: FamilyFit,
+    records: &[(&str, &[FitSample])],
+    fit: JointReport,
     predicted: Result<Vec<super::PredictionOf>, String>,
     effective: f64,
 ) -> Result<Candidate, FitError> {
-    let terms = fit.model.terms().map_err(|_| FitError::Overflow)?;
-    let (aicc, bic) = criteria(fit.sum / fit.samples as f64, effective, fit.free);
+    let first = fit.records.first().ok_or(FitError::Overflow)?;
+    let model = first.report.body.clone();
+    let terms = model.terms().map_err(|_| FitError::Overflow)?;
+    let mean = fit.weighted_square / fit.samples as f64;
+    let (aicc, bic) = criteria(mean, effective, fit.free);
     let (prediction, prediction_refused) = match predicted {
         Ok(records) => (Prediction::of(records), None),
         Err(reason) => (None, Some(reason)),
     };
+    let pairs = fit.records.iter().zip(records);
+    let worst = pairs.map(|(one, (_, samples))| one.report.worst(samples).0);
     Ok(Candidate {
         family: family.key(),
         name: family.name(),
-        parameters: fit.model.outer.len() + fit.model.linear.len(),
+        parameters: model.outer.len() + model.linear.len(),
         free: fit.free,
-        rms_n: fit.rms,
-        worst_n: fit.records.iter().fold(0.0, |all, one| all.max(one.worst)),
+        rms_n: fit.rmse_n,
+        worst_n: worst.fold(0.0, f64::max),
         aicc_above: aicc,
         bic,
         bic_above: 0.0,
@@ -363,7 +369,7 @@ fn candidate(
         cost: Cost::of(&terms),
         is_within: None,
         effective_samples: fit.effective_samples,
-        model: fit.model,
-        warnings: fit.warnings,
+        model,
+        warnings: fit.warnings(),
     })
 }

@@ -2,7 +2,7 @@
 
 use super::{FamilyRow, TradeCurves};
 use crate::tolerance::Tolerance;
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
 use serde::Serialize;
 
 /// Times repeat to this share on a quiet machine.

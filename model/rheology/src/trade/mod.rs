@@ -15,7 +15,7 @@ pub use machine::{Machine, STALE_DAYS};
 pub use pareto::{front, pareto};
 
 use crate::integrators::{Precision, Scheme};
-use crate::units::Newtons;
+use palpate_model::units::Newtons;
 use serde::{Deserialize, Serialize};
 
 /// Version of the stored form; another one is not read.

@@ -175,7 +175,7 @@ fn none_is_said_with_its_reason() {
     let fast = curves.recommend(one, 1e6, 0.1);
     assert!(used(&fast.integrator).contains("nothing was measured at 1000000"));
     assert!(used(&fast.families[1].1).contains("takes 30.000 % of each period"));
-    let exact = Tolerance::Newtons(crate::units::Newtons(1e-20));
+    let exact = Tolerance::Newtons(palpate_model::units::Newtons(1e-20));
     let exact = curves.recommend(exact, 1000.0, 0.1);
     assert!(used(&exact.integrator).contains("the nearest is exact, depth straight"));
     assert!(used(&exact.fit).contains("the nearest is 1000 samples"));

@@ -4,16 +4,9 @@
 //! takes a few draws and allows for their chance; `scripts/soak coverage` takes
 //! `PALPATE_COVERAGE_DRAWS` of them and asks for 92 to 97 %.
 
-#![expect(
-    clippy::unwrap_used,
-    reason = "helpers of tests fail by panicking and say what they measured"
-)]
-
-mod support;
-
-use palpate_model::fit::{FitOptions, FitSample, fit};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use support::{ramp_hold, remembering, respond};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_test_support::record::{ramp_hold, remembering, respond};
 
 const TRUTH: [(&str, f64); 5] = [
     ("tau_eps", 1.023),

@@ -1,10 +1,10 @@
 //! Cycles whose shift, energy and decay are known beforehand.
 
-use palpate_model::cycles::{CycleSample, SteadyRule, analyse, by_depth};
 use palpate_model::random::SplitMix;
 use palpate_model::rig::Phase;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::cycles::{CycleSample, SteadyRule, analyse, by_depth};
 
 /// Thesis body behind a surface that has receded by so much in each cycle: in at 3 mm/s to 30 mm, `hold` seconds, back;
 /// two hundred samples a second.
@@ -262,7 +262,7 @@ fn a_record_without_phases_has_the_same_cycles() {
         assert!((a.work_loop.unwrap() - b.work_loop.unwrap()).abs() < 1e-9);
         assert!((a.at_half().unwrap().0 - b.at_half().unwrap().0).abs() < 1e-9);
         let percent =
-            |one: &palpate_model::cycles::CycleAnalysis| one.relaxation.unwrap().percent.value;
+            |one: &palpate_rheology::cycles::CycleAnalysis| one.relaxation.unwrap().percent.value;
         assert!((percent(a) - percent(b)).abs() < 1e-6);
     }
 }

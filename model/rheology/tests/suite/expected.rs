@@ -1,16 +1,13 @@
 //! Expected intervals against published figures, brute force and the scatter of real fits.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
-
-mod support;
-
-use palpate_model::expected::{
+use palpate_model::viscoelastic::ModifiedKelvin;
+use palpate_model::{Depth, MmPerS, Newtons, Seconds};
+use palpate_rheology::expected::{
     Expected, ExpectedError, Family, Memory, Noise, Protocol, Rig, Target, Unknowns, intervals,
     shortest,
 };
-use palpate_model::fit::{FitOptions, FitSample, fit};
-use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_model::{Depth, MmPerS, Newtons, Seconds};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_test_support::record;
 
 const BODY: ModifiedKelvin = ModifiedKelvin::THESIS;
 const DEPTH: Depth = Depth(30.0);
@@ -138,7 +135,7 @@ fn inverse(matrix: &[Vec<f64>]) -> Vec<Vec<f64>> {
 fn brute_force(protocol: &Protocol, noise: &Noise) -> [f64; 5] {
     let path = path(protocol);
     let force = |body: &ModifiedKelvin| -> Vec<f64> {
-        let samples = support::respond(body, &path);
+        let samples = record::respond(body, &path);
         samples.iter().map(|sample| sample.force.0).collect()
     };
     let derivative = |change: &dyn Fn(f64) -> ModifiedKelvin| -> Vec<f64> {
@@ -295,7 +292,7 @@ fn variance_ratios(clean: &[FitSample], noise: &Noise, draws: u32) -> [f64; 5] {
     let expected = intervals(&BODY, &thesis_protocol(rate), noise, Unknowns::default()).unwrap();
     let mut sums = [0.0; 5];
     for seed in 0..draws {
-        let mut random = support::Noise::seeded(u64::from(seed) + 77);
+        let mut random = record::Noise::seeded(u64::from(seed) + 77);
         let memory = noise.memory.map_or((0.0, 0.0), |memory| {
             (memory.sd.0, (-1.0 / rate / memory.time.0).exp())
         });
@@ -321,7 +318,7 @@ fn variance_ratios(clean: &[FitSample], noise: &Noise, draws: u32) -> [f64; 5] {
 
 #[test]
 fn real_fits_scatter_as_expected() {
-    let clean = support::respond(&BODY, &support::ramp_hold(0.75, 50.0, 1e-2));
+    let clean = record::respond(&BODY, &record::ramp_hold(0.75, 50.0, 1e-2));
     // 100 draws: the variance of a variance ratio is 2 / 100, so these bounds are 3.5 standard
     // deviations wide; seeds are fixed.
     for noise in [

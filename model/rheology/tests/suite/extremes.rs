@@ -1,12 +1,13 @@
 //! The extremes: nothing is wrong, and the judge can tell what is.
 
-use palpate_model::extremes::{
+use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::extremes::{
     Answer, Expected, Extent, FamilyBody, PathCase, Subject, Verdict, judge, member, parts,
 };
-use palpate_model::families::{self, Family, Live, Model, Outer, Relaxation};
-use palpate_model::fit::{FamilyOptions, FitSample, fit_family};
-use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families::{self, Family, Live, Model, Outer, Relaxation};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 #[test]
@@ -177,7 +178,7 @@ fn a_fit_is_judged_by_its_parameters_and_warnings() {
 /// A family that counts how often a fit asks for its columns.
 #[derive(Debug)]
 struct Counted {
-    family: Box<dyn Family>,
+    family: Arc<dyn Family>,
     asked: AtomicUsize,
 }
 
@@ -232,10 +233,11 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
         |i, _| f64::from(i).powi(5) * if i % 2 == 0 { 1.0 } else { -1.0 },
     ];
     for family in families::all() {
-        let counted = Counted {
+        let counted = Arc::new(Counted {
             family,
             asked: AtomicUsize::new(0),
-        };
+        });
+        let options = FitOptions::of(counted.clone());
         let limit = bound(counted.outer().len());
         for (number, force) in records.iter().enumerate() {
             let samples: Vec<FitSample> = (0..80)
@@ -247,14 +249,14 @@ fn every_fit_returns_after_a_bounded_number_of_evaluations() {
                 })
                 .collect();
             counted.asked.store(0, Ordering::Relaxed);
-            let fit = fit_family(&counted, &[("odd", &samples)], FamilyOptions::default());
+            let fit = fit(&samples, &options);
             let asked = counted.asked.load(Ordering::Relaxed);
             assert!(asked < limit, "{} {number}: {asked}", counted.key());
             match fit {
                 Ok(fit) => {
                     let values = fit.parameters.iter().map(|one| one.value);
                     assert!(
-                        values.chain([fit.rms, fit.sum]).all(f64::is_finite),
+                        values.chain([fit.r2, fit.rmse_n]).all(f64::is_finite),
                         "{fit:?}"
                     );
                 }

@@ -1,13 +1,11 @@
 //! Records that once fooled the fit: it must say so, or not be fooled.
 
-mod support;
-
-use palpate_model::fit::{
-    Bootstrap, FitError, FitOptions, FitSample, Fitted, LiveFit, fit, fit_joint,
-};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons};
-use support::{Noise, noisy, ramp_hold, remembering, respond};
+use palpate_rheology::fit::{
+    Bootstrap, FitError, FitOptions, FitSample, Fitted, LiveFit, fit, fit_joint,
+};
+use palpate_test_support::record::{Noise, noisy, ramp_hold, remembering, respond};
 
 const THESIS: ModifiedKelvin = ModifiedKelvin::THESIS;
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
@@ -87,7 +85,7 @@ fn relaxation_faster_than_the_mean_interval_is_found() {
     }
     for path in [sparse, ramp_hold(0.75, 50.0, 1.5)] {
         let report = fit(&respond(&THESIS, &path), &FitOptions::default()).unwrap();
-        let miss = (report.body().tau_eps / 1.023 - 1.0).abs();
+        let miss = (report.value("tau_eps").unwrap() / 1.023 - 1.0).abs();
         assert!(miss < 1e-9, "{miss:e} of {} samples", path.len());
     }
 }

@@ -1,13 +1,10 @@
 //! The live fit agrees with the exact one, sees what it cannot know, and never grows.
 
-#![expect(clippy::unwrap_used, reason = "helpers of tests fail by panicking")]
-
-mod support;
-
-use palpate_model::fit::{FitOptions, FitSample, LiveEstimate, LiveFit, fit};
+use palpate_model::estimate::LiveEstimate;
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_model::{Depth, Newtons, Seconds};
-use support::{noisy, ramp_hold, respond};
+use palpate_rheology::fit::{FitOptions, FitSample, LiveFit, fit};
+use palpate_test_support::record::{self, noisy, ramp_hold, respond};
 
 const BODY: [&str; 5] = ["tau_eps", "mu1", "mu2", "mu3", "tau_sig"];
 
@@ -115,7 +112,7 @@ fn depth_of_a_censored_sample_counts_and_its_force_does_not() {
 
 #[test]
 fn uneven_times_and_gaps_are_no_obstacle() {
-    let mut noise = support::Noise::seeded(5);
+    let mut noise = record::Noise::seeded(5);
     let mut t = 0.0;
     let mut path = vec![(t, 0.0)];
     while t < 90.0 {
@@ -133,7 +130,7 @@ fn uneven_times_and_gaps_are_no_obstacle() {
 #[test]
 fn says_during_the_ramp_what_it_cannot_know_and_after_it_knows_all() {
     let clean = thesis_record();
-    let mut noise = support::Noise::seeded(7);
+    let mut noise = record::Noise::seeded(7);
     let stairs: Vec<FitSample> = clean
         .iter()
         .map(|sample| FitSample {

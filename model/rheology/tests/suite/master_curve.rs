@@ -1,15 +1,11 @@
 //! A published Prony series, and the least squares with relaxation times laid down beforehand.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail by panicking and say why they skip"
-)]
-
-use palpate_model::families::{Maxwell, Prony};
-use palpate_model::fit::{FamilyOptions, FitError, FitSample, fit_family, fit_family_at};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families::{Maxwell, Prony};
+use palpate_rheology::fit::{FitError, FitOptions, FitSample, fit, fit_coefficients};
+use palpate_test_support::skip;
 use std::path::Path;
+use std::sync::Arc;
 
 /// NREL/pyvisco at 8755fc5, `verification/time_master/prony_terms_KPf_MD.csv`: moduli over their sum, one
 /// term to a decade from 0.01 s on; the sum is 1739.03 MPa.
@@ -70,11 +66,11 @@ fn relaxation(curve: impl Iterator<Item = (f64, f64)>) -> Vec<FitSample> {
 /// NREL/pyvisco, `examples/time_user_master.csv`.
 fn master_curve() -> Option<Vec<FitSample>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data/pyvisco_time_user_master.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is not here", path.display());
+        .join("../../../shared/data/pyvisco_time_user_master.csv");
+    if skip::lacks_file(&path) {
         return None;
-    };
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
     let rows = text.lines().skip(2).map(|line| {
         let (t, modulus) = line.split_once(',').unwrap();
         (t.parse().unwrap(), modulus.parse().unwrap())
@@ -88,8 +84,8 @@ fn the_published_series_is_reproduced() {
         return;
     };
     let taus: Vec<f64> = (-2..29).map(|decade| 10f64.powi(decade)).collect();
-    let family = Prony::of_terms(31).unwrap();
-    let model = fit_family_at(&family, &taus, &[("curve", &samples)]).unwrap();
+    let family = Arc::new(Prony::of_terms(31).unwrap());
+    let model = fit_coefficients(family, &taus, &[("curve", &samples)]).unwrap();
     let sum: f64 = model.linear.iter().sum();
     assert!((sum - PUBLISHED_SUM).abs() < 0.005, "{sum}");
     for (published, modulus) in PUBLISHED.iter().zip(&model.linear[1..]) {
@@ -101,17 +97,10 @@ fn the_published_series_is_reproduced() {
         );
     }
     // Twenty-four times that are fitted leave less than thirty-one that were laid down.
-    let options = FamilyOptions {
-        offset: false,
-        initial: false,
-    };
-    let free = fit_family(
-        &Prony::of_terms(24).unwrap(),
-        &[("curve", &samples)],
-        options,
-    )
-    .unwrap();
-    assert!(free.rms < 1.218, "{}", free.rms);
+    let mut options = FitOptions::by_key("prony-24").unwrap();
+    options.fix("f_offset", 0.0).unwrap();
+    let free = fit(&samples, &options).unwrap();
+    assert!(free.rmse_n < 1.218, "{}", free.rmse_n);
 }
 
 #[test]
@@ -119,15 +108,15 @@ fn given_times_leave_a_linear_problem_with_bounds() {
     // 2 + 3 e^(-t) and a term in between that is not there.
     let times = || (1..200).map(|i| f64::from(i) * 0.05);
     let samples = relaxation(times().map(|t| (t, 2.0 + 3.0 * (-t).exp())));
-    let family = Prony::of_terms(2).unwrap();
-    let model = fit_family_at(&family, &[1.0, 10.0], &[("curve", &samples)]).unwrap();
+    let family = Arc::new(Prony::of_terms(2).unwrap());
+    let model = fit_coefficients(family.clone(), &[1.0, 10.0], &[("curve", &samples)]).unwrap();
     for (found, exact) in model.linear.iter().zip([2.0, 3.0, 0.0]) {
         // The step of 1 ns relaxes by half a billionth.
         assert!((found - exact).abs() < 1e-8, "{:?}", model.linear);
     }
     // A modulus that grows would need a negative term.
     let samples = relaxation(times().map(|t| (t, 2.0 - (-t).exp())));
-    let model = fit_family_at(&family, &[1.0, 10.0], &[("curve", &samples)]).unwrap();
+    let model = fit_coefficients(family, &[1.0, 10.0], &[("curve", &samples)]).unwrap();
     assert_eq!(&model.linear[1..], [0.0, 0.0]);
     let mean = times().map(|t| 2.0 - (-t).exp()).sum::<f64>() / times().count() as f64;
     assert!((model.linear[0] / mean - 1.0).abs() < 1e-12);
@@ -137,8 +126,9 @@ fn given_times_leave_a_linear_problem_with_bounds() {
 fn times_that_are_none_are_refused() {
     let samples = relaxation((1..9).map(|i| (f64::from(i), 1.0 / f64::from(i))));
     for bad in [0.0, -1.0, f64::NAN] {
-        let refused = fit_family_at(&Maxwell, &[bad], &[("curve", &samples)]).unwrap_err();
+        let refused =
+            fit_coefficients(Arc::new(Maxwell), &[bad], &[("curve", &samples)]).unwrap_err();
         assert!(matches!(refused, FitError::Unsupported { .. }), "{refused}");
     }
-    assert!(fit_family_at(&Maxwell, &[], &[("curve", &samples)]).is_err());
+    assert!(fit_coefficients(Arc::new(Maxwell), &[], &[("curve", &samples)]).is_err());
 }

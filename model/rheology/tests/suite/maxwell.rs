@@ -1,21 +1,17 @@
 //! The Maxwell fit against closed forms and a published example.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail by panicking and say why they skip"
-)]
+#[path = "../../examples/maxwell_fit/mod.rs"]
+mod maxwell_fit;
 
-mod support;
-
-use palpate_model::families;
-use palpate_model::fit::{
-    FamilyOptions, FitError, FitSample, StrainSample, fit_family, fit_maxwell,
-};
+use maxwell_fit::{StrainSample, fit_maxwell};
 use palpate_model::viscoelastic::{Integrator, Maxwell};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families;
+use palpate_rheology::fit::{FitError, FitOptions, FitSample, fit};
+use palpate_test_support::record::Noise;
+use palpate_test_support::skip;
 use std::path::Path;
-use support::Noise;
+use std::sync::Arc;
 
 const BODY: Maxwell = Maxwell { eta: 4.1, k: 2.05 };
 
@@ -42,11 +38,11 @@ fn even() -> impl Iterator<Item = f64> {
 /// RHEOS.jl, `docs/src/assets/example1_data.csv`: t, strain, stress without a header.
 fn rheos_example() -> Option<Vec<StrainSample>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data/rheos_example1_ramp_hold.csv");
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is not here", path.display());
+        .join("../../../shared/data/rheos_example1_ramp_hold.csv");
+    if skip::lacks_file(&path) {
         return None;
-    };
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
     let samples = text.lines().map(|line| {
         let mut fields = line.split(',').map(|field| field.trim().parse().unwrap());
         let mut next = || fields.next().unwrap();
@@ -104,13 +100,11 @@ fn rheos_example_gives_the_published_and_the_exact_values() {
             sigma: Newtons(1.0),
         })
         .collect();
-    let options = FamilyOptions {
-        offset: false,
-        initial: false,
-    };
-    let family = fit_family(&families::Maxwell, &[("example 1", &rows)], options).unwrap();
-    check(family.model.linear[0], exact.body.k, 1e-7);
-    check(family.model.outer[0], exact.body.tau().0, 1e-7);
+    let mut options = FitOptions::of(Arc::new(families::Maxwell)).at_rest();
+    options.fix("f_offset", 0.0).unwrap();
+    let family = fit(&rows, &options).unwrap();
+    check(family.body.linear[0], exact.body.k, 1e-7);
+    check(family.body.outer[0], exact.body.tau().0, 1e-7);
 }
 
 #[test]

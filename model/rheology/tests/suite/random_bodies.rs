@@ -5,11 +5,9 @@
 //! or 50 s, whichever is longer; 100 Hz, no noise. `PALPATE_RANDOM_BODIES=1000` draws a thousand
 //! bodies instead of sixty, the first sixty the same.
 
-mod support;
-
-use palpate_model::fit::{FitOptions, fit};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use support::{Noise, ramp_hold, respond};
+use palpate_rheology::fit::{FitOptions, fit};
+use palpate_test_support::record::{Noise, ramp_hold, respond};
 
 /// What every parameter of every body is recovered to, relative. The worst body drawn moves its
 /// parameters by 1e5 times a relative change of the force, and the force is rounded to 1e-16.
@@ -39,7 +37,8 @@ fn error_of(body: &ModifiedKelvin) -> Result<f64, String> {
     let record = respond(body, &ramp_hold(0.75, hold, 0.01));
     let found = fit(&record, &FitOptions::default())
         .map_err(|err| err.to_string())?
-        .body();
+        .kelvin()
+        .unwrap();
     let pairs = [
         (found.tau_eps, body.tau_eps),
         (found.mu[0], body.mu[0]),

@@ -1,27 +1,22 @@
 //! Recordings of real tissue, kept outside the repository because of their licences. Each test says
 //! so and passes when its file is absent.
 
-#![expect(
-    clippy::unwrap_used,
-    clippy::print_stdout,
-    reason = "helpers of tests fail by panicking and say why they skip"
-)]
-
-use palpate_model::fit::{FitOptions, FitSample, fit};
-use palpate_model::select::{Outcome, SelectOptions, select};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::fit::{FitOptions, FitSample, fit};
+use palpate_rheology::select::{Outcome, SelectOptions, select};
+use palpate_test_support::skip;
 use std::ops::ControlFlow;
 use std::path::Path;
 
 /// Samples of a CSV file with columns t_s, F_N, x_mm.
 fn recording(name: &str) -> Option<Vec<FitSample>> {
     let path = Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../shared/data")
+        .join("../../../shared/data")
         .join(name);
-    let Ok(text) = std::fs::read_to_string(&path) else {
-        println!("skipped: {} is not here", path.display());
+    if skip::lacks_file(&path) {
         return None;
-    };
+    }
+    let text = std::fs::read_to_string(&path).unwrap();
     let samples = text.lines().skip(1).map(|line| {
         let mut fields = line.split(',').map(|field| field.trim().parse().unwrap());
         let mut next = || fields.next().unwrap();

@@ -6,14 +6,12 @@
 //! a twentieth; noise is white and 1 % of the peak force. `PALPATE_SELECT_SEEDS=100` draws a hundred
 //! bodies of each of all families instead of one of a few, and `PALPATE_SELECT_FAMILIES=kelvin,fung` only some families.
 
-mod support;
-
-use palpate_model::families::{self, Model};
-use palpate_model::fit::{FitSample, fit_family};
-use palpate_model::select::{HoldOut, SelectOptions, Selection, select};
 use palpate_model::{Depth, Newtons, Seconds};
+use palpate_rheology::families::{self, Model};
+use palpate_rheology::fit::{FitOptions, FitSample, fit_joint};
+use palpate_rheology::select::{HoldOut, SelectOptions, Selection, select};
+use palpate_test_support::record::{Noise, noisy};
 use std::ops::ControlFlow;
-use support::{Noise, noisy};
 
 /// A family is equivalent to the truth if its best fit to the truth without noise leaves a sum of squares
 /// below this, in squared standard deviations of the noise: even between two curves known exactly and two
@@ -150,9 +148,9 @@ fn selection(records: &[Vec<FitSample>]) -> Selection {
 
 /// What is left of the truth without noise by another family, in squared standard deviations.
 fn left_by(key: &str, exact: &[Vec<FitSample>]) -> f64 {
-    let family = families::by_key(key).expect("a family");
-    let fit = fit_family(&*family, &named(exact), SelectOptions::default().fit);
-    fit.map_or(f64::INFINITY, |fit| fit.sum)
+    let options = FitOptions::by_key(key).expect("a family").at_rest();
+    let fit = fit_joint(&named(exact), &options, &options.body_names());
+    fit.map_or(f64::INFINITY, |fit| fit.weighted_square)
 }
 
 #[test]
@@ -191,7 +189,7 @@ fn the_family_that_made_the_records_is_picked() {
                     || count(picked) <= count(key) && left_by(picked, &exact) <= INDISTINCT;
                 [is_same, is_same || is_equivalent()]
             };
-            let lowest = |value: &dyn Fn(&palpate_model::select::Candidate) -> f64| {
+            let lowest = |value: &dyn Fn(&palpate_rheology::select::Candidate) -> f64| {
                 let order = |a: &&_, b: &&_| value(a).total_cmp(&value(b));
                 found
                     .candidates

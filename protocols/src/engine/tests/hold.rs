@@ -2,7 +2,7 @@
 
 use super::*;
 use crate::plans::{BodyParameter, HoldUntil};
-use palpate_model::fit::{LiveEstimate, Parameter, Verdict};
+use palpate_model::estimate::{Identifiability, LiveEstimate, Parameter};
 
 /// An answer that knows tau to `relative`, and whether it counts as identified.
 fn answer(relative: f64, is_identified: bool) -> Input {
@@ -19,7 +19,7 @@ fn answer(relative: f64, is_identified: bool) -> Input {
         }],
         rmse_weighted_n: 0.02,
         samples: 1000,
-        verdicts: vec![Verdict {
+        verdicts: vec![Identifiability {
             parameter: "tau_eps".into(),
             is_identified,
             reason: (!is_identified).then(|| "hold longer".into()),
@@ -82,14 +82,14 @@ fn the_reason_is_recorded_once_and_says_what_was_reached() {
 #[test]
 fn an_answer_from_before_the_hold_ends_nothing() {
     let mut bench = Bench::new(vec![
-        Step::SelfTest {
+        Step::SelfTest(SelfTest {
             duration: Seconds(0.1),
-        },
-        Step::Hold {
+        }),
+        Step::Hold(Hold {
             duration: Seconds(0.1),
             until: Some(rule(0.0)),
             rate: None,
-        },
+        }),
     ]);
     bench.start();
     assert_eq!(bench.give(answer(0.001, true)), []);
@@ -108,11 +108,11 @@ fn a_plan_without_a_rule_is_written_and_read_as_before() {
     let step: Step = serde_json::from_str(text).unwrap();
     assert_eq!(
         step,
-        Step::Hold {
+        Step::Hold(Hold {
             duration: Seconds(2.0),
             until: None,
             rate: None,
-        }
+        })
     );
     assert_eq!(serde_json::to_string(&step).unwrap(), text);
 }

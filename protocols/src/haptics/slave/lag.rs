@@ -3,8 +3,8 @@
 use super::{FILTER_MS, SlaveSettings};
 use crate::haptics::timing::Kept;
 use crate::runner::Felt;
+use palpate_haptics::margin::{Device, Watch};
 use palpate_model::Nanos;
-use palpate_model::haptics::margin::{Device, Watch};
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};

@@ -12,9 +12,9 @@ pub use lag::{Difference, MasterLoop, Slaved, Spread};
 
 use super::{Beat, Ticking};
 use crate::runner::{Felt, Leading};
+use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
+use palpate_haptics::{ContactSettings, MasterSlaveError, Period};
 use palpate_model::Nanos;
-use palpate_model::haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
-use palpate_model::haptics::{ContactSettings, MasterSlaveError, Period};
 use palpate_model::rig::RigDescription;
 use palpate_model::signal::MovingMean;
 use palpate_model::units::{Depth, Newtons};

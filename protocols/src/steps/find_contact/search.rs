@@ -1,21 +1,19 @@
-//! Finding the tissue: a first pass to know roughly where it is and, if the plan presses, how it answers;
-//! a slow second pass; a rest for the tissue to recover; and the way to depth zero.
+//! A search for the tissue's surface in progress.
 //!
 //! The trigger of a moving mean is late by construction and published testers trigger early on
 //! single peaks, so the trigger only ends a pass; the position comes from a fit: of everything felt where the
 //! plan presses, else of the onset in the second pass.
 
-use super::context::{Context, Progress};
-use super::input::Record;
-use super::millisecond::Millisecond;
-use super::state::{Contact, Tare};
+use super::FindContact;
+use super::noise::{above_noise, check_drift, not_felt};
 use super::touch_log::{Counts, TouchLog};
-use crate::plans::FindContact;
+use crate::engine::{Contact, Context, Millisecond, NOT_TARED, Record};
+use crate::steps::{InProgress, Progress};
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::signal::{
     ContactEstimate, ContactPoint, MovingMean, TouchEstimate, fit_contact, fit_touch,
 };
-use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds, Volts};
+use palpate_model::units::{Depth, MmPerS, Newtons, Position, Seconds};
 use std::collections::VecDeque;
 
 /// Milliseconds averaged before a force is compared with a criterion: two to three mains cycles.
@@ -36,16 +34,8 @@ const FORCE_FAST_MAX: Newtons = Newtons(0.45);
 /// Triggers after which the force fell again; more are no accident.
 const FALSE_TRIGGERS_MAX: u32 = 5;
 
-/// The criterion is at least this many standard deviations of the filtered signal.
-const CRITERION_SIGMAS: f64 = 6.0;
-
 /// A criterion above this would press visibly before it triggers.
 const CRITERION_MAX: Newtons = Newtons(0.2);
-
-/// A drift counts as far as it is beyond so many of its standard errors. At three, one steady but noisy cell in a
-/// thousand was refused; at five it is less than one in a million, and the fit of the contact allows for the drift
-/// that is left.
-const DRIFT_SIGMAS: f64 = 5.0;
 
 /// Contact finding never exerts more than this.
 const FORCE_MAX: Newtons = Newtons(0.5);
@@ -61,9 +51,6 @@ const CLEARANCE_MM: f64 = 1.0;
 
 /// Share of the travel kept free behind the furthest approach, in mm.
 const TRAVEL_MARGIN_MM: f64 = 1.0;
-
-/// A search feels with the load cell.
-pub(crate) const NOT_TARED: &str = "tare the load cell before searching with it";
 
 #[derive(Clone, Debug, PartialEq)]
 enum Stage {
@@ -81,7 +68,7 @@ enum Stage {
     ToZero { found: Contact },
 }
 
-/// Data of a contact search in progress.
+/// A contact search in progress.
 #[derive(Clone, Debug, PartialEq)]
 pub(crate) struct ContactSearch {
     plan: FindContact,
@@ -119,24 +106,24 @@ struct Bin {
 
 impl ContactSearch {
     pub fn begin(cx: &mut Context<'_>, plan: FindContact) -> Result<Self, String> {
-        let tare = cx.state.tare.ok_or(NOT_TARED)?;
-        let rig = &cx.state.config.rig;
+        let unloaded = cx.unloaded().ok_or(NOT_TARED)?;
+        let rig = cx.rig();
         let means = |ms| rig.means_in(ms);
         let filtered = means(FILTER_MS);
         let (fast, point) = (means(FAST_MS), means(POINT_MS));
         let consecutive = means(CONSECUTIVE_MS).max(CONSECUTIVE_MIN);
         let samples = filtered * rig.samples_per_ms() as usize;
-        let (criterion, noise) = above_noise(cx, &tare, plan.criterion, samples);
+        let (criterion, noise) = above_noise(cx, &unloaded, plan.criterion, samples);
         if criterion > CRITERION_MAX {
             return Err(format!(
                 "noise of {noise:.3} would need a contact criterion of {criterion:.3}, above {CRITERION_MAX}; quieten the signal"
             ));
         }
-        let end = Position(cx.state.config.limits.travel_max.0 - TRAVEL_MARGIN_MM);
-        let way_mm = end.distance_from(cx.state.derived.position);
+        let end = Position(cx.limits().travel_max.0 - TRAVEL_MARGIN_MM);
+        let way_mm = end.distance_from(cx.derived().position);
         check_drift(
             cx,
-            &tare,
+            &unloaded,
             Seconds(way_mm / plan.approach_speed.0),
             criterion,
         )?;
@@ -145,7 +132,7 @@ impl ContactSearch {
             plan,
             criterion,
             stage: Stage::Approach,
-            millisecond: Millisecond::of(&cx.state.config.rig),
+            millisecond: Millisecond::of(cx.rig()),
             filter: MovingMean::new(filtered),
             fast: MovingMean::new(fast),
             filtered,
@@ -157,37 +144,23 @@ impl ContactSearch {
             false_triggers: 0,
             first_trigger: Position(0.0),
             first_end: None,
-            log: TouchLog::new(cx.state.tick, &cx.state.config.rig),
+            log: TouchLog::new(cx.tick(), cx.rig()),
             pass_start_tick: 0,
             points: Vec::new(),
             bin: Bin::default(),
         })
     }
 
-    pub fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Progress {
-        match self.advance(cx, reading) {
-            Ok(progress) => progress,
-            Err(reason) => Progress::Fail(format!("contact: {reason}")),
-        }
-    }
-
-    fn advance(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
-        let position = cx.state.derived.position;
-        let force = cx.state.derived.force.unwrap_or(Newtons(0.0));
-        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
-            return Ok(Progress::Continue);
-        };
-        let (felt_at, force) = (Position(felt_at), Newtons(force));
-        let filtered = Newtons(self.filter.push(force.0));
-        let fast = Newtons(self.fast.push(force.0));
-        self.remember(reading.tick, felt_at, force);
-        let at_rest = cx.at_rest()?;
-        self.check_force(filtered, fast)?;
-        match self.stage.clone() {
+    /// What the first touch makes of a millisecond.
+    fn first_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<(), String> {
+        let Felt {
+            reading, at_rest, ..
+        } = *now;
+        match self.stage {
             Stage::Approach => {
-                if self.is_first_triggered(force, filtered) {
-                    self.first_trigger = position;
-                    self.record_trigger(cx, reading, 1, filtered);
+                if self.is_first_triggered(now.force, now.filtered) {
+                    self.first_trigger = now.position;
+                    self.record_trigger(cx, reading, 1, now.filtered);
                     if self.plan.press.is_some() {
                         self.stage = Stage::Press;
                     } else {
@@ -195,36 +168,47 @@ impl ContactSearch {
                         self.stage = Stage::ApproachBraking;
                     }
                 } else if at_rest {
-                    return Err(no_tissue(position));
+                    return Err(no_tissue(now.position));
                 }
             }
             Stage::Press => {
                 let wanted = self.plan.press.map_or(FORCE_MAX, |press| press.force);
-                if filtered >= wanted || fast >= FORCE_FAST_MAX {
+                if now.filtered >= wanted || now.fast >= FORCE_FAST_MAX {
                     cx.stop_move();
                     self.stage = Stage::ApproachBraking;
-                } else if filtered.0 < 0.5 * self.criterion.0 {
+                } else if now.filtered.0 < 0.5 * self.criterion.0 {
                     self.on_false_trigger()?;
                 } else if at_rest {
-                    return Err(no_tissue(position));
+                    return Err(no_tissue(now.position));
                 }
             }
             Stage::ApproachBraking if at_rest => match self.plan.press {
                 Some(press) => {
-                    let until_tick = reading.tick + cx.state.ticks(press.dwell);
+                    let until_tick = reading.tick + cx.ticks(press.dwell);
                     self.stage = Stage::Dwell { until_tick };
                 }
                 None => self.retreat(cx, self.first_trigger)?,
             },
             Stage::Dwell { until_tick } if reading.tick >= until_tick => {
                 let first = self.fit()?;
-                self.first_end = Some(position);
+                self.first_end = Some(now.position);
                 self.retreat(cx, first.contact.position)?;
             }
             Stage::Retreat if at_rest => {
-                let until_tick = reading.tick + cx.state.ticks(self.plan.recovery);
+                let until_tick = reading.tick + cx.ticks(self.plan.recovery);
                 self.stage = Stage::Recover { until_tick };
             }
+            _ => {}
+        }
+        Ok(())
+    }
+
+    /// What the second touch and the way to depth zero make of it.
+    fn second_touch(&mut self, cx: &mut Context<'_>, now: &Felt<'_>) -> Result<Progress, String> {
+        let Felt {
+            reading, at_rest, ..
+        } = *now;
+        match self.stage.clone() {
             Stage::Recover { until_tick } if reading.tick >= until_tick => {
                 let overrun = self.first_trigger.moved_by(PASS_OVERRUN_MM);
                 let end = self.first_end.unwrap_or(overrun);
@@ -234,15 +218,15 @@ impl ContactSearch {
                 self.stage = Stage::SlowPass;
             }
             Stage::SlowPass => {
-                self.collect(cx, reading, felt_at, force);
+                self.collect(cx, reading, now.felt_at, now.force);
                 let target = Newtons(self.plan.pass_force.0.max(2.0 * self.criterion.0));
-                let is_felt = self.first_end.is_some() && filtered >= self.criterion;
-                if self.is_triggered(filtered, target) {
-                    self.record_trigger(cx, reading, 2, filtered);
+                let is_felt = self.first_end.is_some() && now.filtered >= self.criterion;
+                if self.is_triggered(now.filtered, target) {
+                    self.record_trigger(cx, reading, 2, now.filtered);
                     cx.stop_move();
                     self.stage = Stage::SlowBraking;
                 } else if at_rest && is_felt {
-                    self.record_trigger(cx, reading, 2, filtered);
+                    self.record_trigger(cx, reading, 2, now.filtered);
                     self.stage = Stage::SlowBraking;
                 } else if at_rest {
                     return Err(not_felt("pass", self.plan.criterion, self.criterion));
@@ -250,7 +234,7 @@ impl ContactSearch {
             }
             Stage::SlowBraking if at_rest => match self.plan.press {
                 Some(press) => {
-                    let until_tick = reading.tick + cx.state.ticks(press.dwell);
+                    let until_tick = reading.tick + cx.ticks(press.dwell);
                     self.stage = Stage::SlowDwell { until_tick };
                 }
                 None => self.clear(cx)?,
@@ -258,11 +242,11 @@ impl ContactSearch {
             Stage::SlowDwell { until_tick } if reading.tick >= until_tick => self.clear(cx)?,
             Stage::Clear { found } if at_rest => {
                 cx.enter_phase(Phase::Rest);
-                let until_tick = reading.tick + cx.state.ticks(self.plan.recovery);
+                let until_tick = reading.tick + cx.ticks(self.plan.recovery);
                 self.stage = Stage::Rest { found, until_tick };
             }
             Stage::Rest { found, until_tick } if reading.tick >= until_tick => {
-                cx.state.contact = Some(found);
+                cx.set_contact(Some(found));
                 cx.record(Record::ContactFound {
                     position: found.position,
                     std_error_mm: found.std_error_mm,
@@ -370,16 +354,13 @@ impl ContactSearch {
     }
 
     fn is_triggered(&mut self, filtered: Newtons, criterion: Newtons) -> bool {
-        self.above = if filtered >= criterion {
-            self.above + 1
-        } else {
-            0
-        };
+        let is_above = filtered >= criterion;
+        self.above = if is_above { self.above + 1 } else { 0 };
         self.above as usize >= self.consecutive
     }
 
     fn record_trigger(&self, cx: &mut Context<'_>, reading: &Reading, pass: u8, force: Newtons) {
-        let position = cx.state.derived.position;
+        let position = cx.derived().position;
         cx.record(Record::ContactTriggered {
             pass,
             position,
@@ -392,12 +373,12 @@ impl ContactSearch {
     /// Averages what was felt in the slow pass into points for the fit. Only constant speed counts:
     /// the fit takes the pass as one straight line in time.
     fn collect(&mut self, cx: &Context<'_>, reading: &Reading, position: Position, force: Newtons) {
-        if !is_cruising(cx.state.derived.velocity, self.plan.pass_speed) {
+        if !is_cruising(cx.derived().velocity, self.plan.pass_speed) {
             return;
         }
         let bin = &mut self.bin;
         bin.count += 1;
-        bin.t += (reading.tick - self.pass_start_tick) as f64 * cx.state.config.rig.tick().0;
+        bin.t += (reading.tick - self.pass_start_tick) as f64 * cx.rig().tick().0;
         bin.position += position.0;
         bin.force += force.0;
         if bin.count == self.point {
@@ -463,51 +444,48 @@ impl ContactSearch {
     }
 }
 
-/// The force that a mean of so many samples reaches only by touching something, and the noise of one sample.
-pub(super) fn above_noise(
-    cx: &Context<'_>,
-    tare: &Tare,
-    wanted: Newtons,
-    samples: usize,
-) -> (Newtons, Newtons) {
-    let noise = cx.state.config.curve.force_sigma(Newtons(0.0), tare.noise);
-    let filtered = noise.0 / (samples as f64).sqrt();
-    (Newtons(wanted.0.max(CRITERION_SIGMAS * filtered)), noise)
-}
-
-/// Why a second touch ended without its trigger: `wanted` is the criterion of the plan, `criterion` the one that
-/// [`above_noise`] made of it.
-pub(super) fn not_felt(touch: &str, wanted: Newtons, criterion: Newtons) -> String {
-    let advice = if criterion > wanted {
-        format!(
-            "noise raised the criterion from {wanted:.3} to {criterion:.3}; quieten the signal, tare and search again"
-        )
-    } else {
-        "look whether the specimen or its support moved, then search again".to_owned()
-    };
-    format!("the second {touch} did not feel what the first one felt: {advice}")
-}
-
-/// Refuses a drift that surely moves the force by half of the criterion within the time an approach may take.
-fn check_drift(
-    cx: &Context<'_>,
-    tare: &Tare,
-    span: Seconds,
-    criterion: Newtons,
-) -> Result<(), String> {
-    let Some(drift) = tare.drift else {
-        return Ok(());
-    };
-    let sure = (drift.volts_per_s.abs() - DRIFT_SIGMAS * drift.std_error).max(0.0);
-    let curve = &cx.state.config.curve;
-    let moved = curve.force_sigma(Newtons(0.0), Volts(sure * span.0));
-    if moved.0 > 0.5 * criterion.0 {
-        return Err(format!(
-            "the unloaded signal drifts by {:.2} mV a minute, which could move the force by {moved:.3} during the approach; let the load cell warm up, then tare again",
-            drift.volts_per_s * 6e4
-        ));
+impl InProgress for ContactSearch {
+    fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
+        let position = cx.derived().position;
+        let force = cx.derived().force.unwrap_or(Newtons(0.0));
+        let Some((felt_at, force)) = self.millisecond.push(position.0, force.0) else {
+            return Ok(Progress::Continue);
+        };
+        let filtered = Newtons(self.filter.push(force));
+        let fast = Newtons(self.fast.push(force));
+        let (felt_at, force) = (Position(felt_at), Newtons(force));
+        self.remember(reading.tick, felt_at, force);
+        let now = Felt {
+            reading,
+            position,
+            felt_at,
+            force,
+            filtered,
+            fast,
+            at_rest: cx.at_rest()?,
+        };
+        self.check_force(filtered, fast)?;
+        match self.stage {
+            Stage::Approach
+            | Stage::Press
+            | Stage::ApproachBraking
+            | Stage::Dwell { .. }
+            | Stage::Retreat => self.first_touch(cx, &now).map(|()| Progress::Continue),
+            _ => self.second_touch(cx, &now),
+        }
     }
-    Ok(())
+}
+
+/// A millisecond as the search feels it.
+struct Felt<'a> {
+    reading: &'a Reading,
+    position: Position,
+    /// Means of the millisecond, and of what came before it.
+    felt_at: Position,
+    force: Newtons,
+    filtered: Newtons,
+    fast: Newtons,
+    at_rest: bool,
 }
 
 fn no_tissue(position: Position) -> String {

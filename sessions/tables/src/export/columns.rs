@@ -1,7 +1,7 @@
 //! The columns of every table of samples: what they are called and mean, and how they are filled.
 
-use crate::manifest::Manifest;
-use crate::record::Row;
+use palpate_sessions::manifest::Manifest;
+use palpate_sessions::record::Row;
 use polars::prelude::{ChunkFull, Column, DataFrame, IntoSeries, PlSmallStr, PolarsResult};
 use polars::prelude::{Series, StringChunked};
 use polars_arrow::array::{MutableBinaryViewArray, MutablePrimitiveArray, PrimitiveArray};

@@ -2,7 +2,7 @@
 
 use super::columns::ColumnInfo;
 use super::select::Selection;
-use crate::manifest::Manifest;
+use palpate_sessions::manifest::Manifest;
 use std::path::{Path, PathBuf};
 
 /// Where the dictionary of a table stands: beside it, as `NAME.columns.md`.

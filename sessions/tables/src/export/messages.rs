@@ -2,9 +2,9 @@
 //! PlotJuggler. It is no session: its samples are all there, and nothing of what was decided.
 
 use super::{ExportError, Feed, Table, atomic};
-use crate::record::Row;
-use crate::schema::{SAMPLE_TOPIC, sample_metadata, sample_schema};
 use mcap::records::{MessageHeader, Metadata};
+use palpate_sessions::record::Row;
+use palpate_sessions::schema::{SAMPLE_TOPIC, sample_metadata, sample_schema};
 use prost::Message;
 use std::io::{self, Seek, Write};
 use std::path::Path;

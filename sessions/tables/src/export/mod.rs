@@ -18,12 +18,12 @@ pub use encode::Format;
 pub use harmless::harmless;
 pub use select::Selection;
 
-use crate::log::ReadError;
-use crate::manifest::Manifest;
-use crate::record::Row;
-use crate::text::sha256;
 use columns::{Cells, Layout, Samples, time_of};
 use encode::Metadata;
+use palpate_sessions::log::ReadError;
+use palpate_sessions::manifest::Manifest;
+use palpate_sessions::record::Row;
+use palpate_sessions::text::sha256;
 use polars::prelude::{PolarsError, PolarsResult};
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

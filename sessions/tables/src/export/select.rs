@@ -1,7 +1,7 @@
 //! Which samples a table holds.
 
-use crate::record::Row;
 use palpate_model::rig::Phase;
+use palpate_sessions::record::Row;
 use serde::Serialize;
 
 /// Which samples and columns are wanted. The default is all samples and the usual columns.

@@ -3,7 +3,7 @@
 use super::layout::{is_file_name, root, value};
 use crate::export::atomic::{io_error, write_or_same};
 use crate::export::{ExportError, Kept};
-use crate::text::sha256;
+use palpate_sessions::text::sha256;
 use serde_json::{Value, json};
 use std::fs;
 use std::io::Write;

@@ -1,6 +1,6 @@
 //! Where the files of a lake are, and which part of it falls to whom.
 
-use crate::manifest::Manifest;
+use palpate_sessions::manifest::Manifest;
 use sha2::{Digest, Sha256};
 use std::fmt::Write;
 use std::num::NonZeroU32;

@@ -4,15 +4,16 @@ use super::checksums::{Checksums, crc32_of};
 use super::layout::{Part, is_lake, part};
 use super::rows::rows;
 use super::write::kind_name;
-use crate::log::Session;
-use crate::manifest::{Manifest, RECORD_VERSION};
-use crate::record::{Entry, EntryKind};
 use palpate_model::Nanos;
+use palpate_sessions::log::Session;
+use palpate_sessions::manifest::{Manifest, RECORD_VERSION};
+use palpate_sessions::record::{Entry, EntryKind};
 use polars::prelude::{DataFrame, ParquetReader, PolarsError, PolarsResult, SerReader};
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{self, Seek};
 use std::path::{Path, PathBuf};
 use thiserror::Error;
+use walkdir::{DirEntry, WalkDir};
 
 /// A lake, or a session in it, could not be read.
 #[derive(Debug, Error)]
@@ -65,47 +66,26 @@ pub fn sessions(lake: &Path) -> Result<Vec<InLake>, LakeError> {
         return Err(LakeError::NoLake { path: lake.into() });
     }
     let top = part(lake, Part::Sessions);
+    // rig=R, month=YYYY-MM, then the files.
+    let files = WalkDir::new(&top).min_depth(3).max_depth(3);
+    let is_hidden = |one: &DirEntry| one.file_name().to_string_lossy().starts_with('.');
+    let files = files.follow_links(true).into_iter();
     let mut found = Vec::new();
-    // rig=R, then month=YYYY-MM.
-    for rig in names(&top)? {
-        let rig_folder = top.join(&rig);
-        for month in folders(&rig_folder)? {
-            let place = Path::new(&rig).join(&month);
-            for name in names(&top.join(&place))? {
-                let id = name.strip_suffix(".parquet");
-                found.extend(id.map(|id| InLake {
-                    id: id.to_owned(),
-                    place: place.clone(),
-                }));
-            }
-        }
+    for file in files.filter_entry(|one| !is_hidden(one)) {
+        let file = file.map_err(|err| LakeError::Io {
+            path: err.path().unwrap_or(&top).into(),
+            source: err.into(),
+        })?;
+        let id = file.file_name().to_str();
+        let id = id.and_then(|name| name.strip_suffix(".parquet"));
+        let place = file.path().parent();
+        let place = place.and_then(|folder| folder.strip_prefix(&top).ok());
+        found.extend(id.zip(place).map(|(id, place)| InLake {
+            id: id.to_owned(),
+            place: place.to_owned(),
+        }));
     }
     found.sort();
-    Ok(found)
-}
-
-fn folders(folder: &Path) -> Result<Vec<String>, LakeError> {
-    match folder.is_dir() {
-        true => names(folder),
-        false => Ok(Vec::new()),
-    }
-}
-
-/// Names in a folder that are not hidden.
-fn names(folder: &Path) -> Result<Vec<String>, LakeError> {
-    if !folder.is_dir() {
-        return Ok(Vec::new());
-    }
-    let failed = |source| LakeError::Io {
-        path: folder.into(),
-        source,
-    };
-    let mut found = Vec::new();
-    for one in fs::read_dir(folder).map_err(failed)? {
-        let name = one.map_err(failed)?.file_name();
-        let name = name.to_str().filter(|name| !name.starts_with('.'));
-        found.extend(name.map(str::to_owned));
-    }
     Ok(found)
 }
 
@@ -150,7 +130,7 @@ pub fn read_session(lake: &Path, one: &InLake) -> Result<(Session, Option<String
         end: session.end.take(),
         notes: session.notes,
         // A lake holds what was measured and decided, not what went over the wires.
-        beside: crate::log::Beside::default(),
+        beside: palpate_sessions::log::Beside::default(),
     };
     Ok((session, rejection))
 }
@@ -188,7 +168,7 @@ fn with<T>(
 /// What the sessions table tells beside the manifest.
 struct About {
     samples: u64,
-    end: Option<crate::record::EndRecord>,
+    end: Option<palpate_sessions::record::EndRecord>,
     notes: Vec<String>,
 }
 

@@ -1,8 +1,8 @@
 //! Samples of a lake: what is kept of each, and rows made of it again.
 
-use crate::record::Row;
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
+use palpate_sessions::record::Row;
 use polars::prelude::{DataFrame, PolarsError, PolarsResult};
 
 /// Columns of the samples, all that a [`Row`] holds but how long the link may have taken.

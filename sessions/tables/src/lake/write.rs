@@ -3,12 +3,12 @@
 use super::checksums::Checksums;
 use super::layout::{LAKE_VERSION, Part, is_file_name, part, partition};
 use super::rows::SAMPLE_COLUMNS;
-use crate::edits::Verdict;
 use crate::export::atomic::{io_error, write_or_same};
 use crate::export::{Beside, Encoder, ExportError, Feed, Format, Kept, Selection, Table};
-use crate::log::Outline;
-use crate::record::{Entry, EntryKind};
-use crate::text::sha256;
+use palpate_sessions::edits::Verdict;
+use palpate_sessions::log::Outline;
+use palpate_sessions::record::{Entry, EntryKind};
+use palpate_sessions::text::sha256;
 use polars::prelude::{Column, DataFrame, IntoColumn, NamedFrom, PolarsResult, Series};
 use serde_json::json;
 use std::fs;

@@ -16,14 +16,14 @@ use palpate_model::rig::RigCompliance;
 use palpate_sessions::analyses::{Analysed, Analyses, Analysis, add_analysis};
 use palpate_sessions::catalog::CATALOG_FILE;
 use palpate_sessions::checks::{CheckPart, DailyCheck, add_check, read_checks};
-use palpate_sessions::import::{Told, parse_foreign, parse_table, parse_weights};
 use palpate_sessions::journal::Journal;
-use palpate_sessions::lake;
 use palpate_sessions::shelf::{self, Document};
 use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
     Beside, Catalog, Edit, Edits, LOG_FILE, Outline, ReadError, Session, Summary, add_edit,
 };
+use palpate_tables::import::{Told, parse_foreign, parse_table, parse_weights};
+use palpate_tables::lake;
 use std::fs;
 use std::path::{Path, PathBuf};
 

@@ -8,13 +8,13 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::RigCompliance;
 use palpate_sessions::checks::read_checks;
 use palpate_sessions::journal::{JOURNAL_FILE, Journal};
-use palpate_sessions::lake;
 use palpate_sessions::recover::{examine, salvage};
 use palpate_sessions::shelf;
 use palpate_sessions::trade::read_trade;
 use palpate_sessions::{
     ANALYSES_FILE, Analyses, EDITS_FILE, Edits, LOG_FILE, Part, Session, Summary,
 };
+use palpate_tables::lake;
 use std::path::Path;
 
 pub struct Target {

@@ -1,11 +1,11 @@
 //! The object that `palpate analyse --json` prints; `docs/json.md` has its fields.
 
 use super::CycleReport;
-use palpate_model::cycles::{
+use palpate_model::units::{Depth, Newtons};
+use palpate_rheology::cycles::{
     Creep, CycleAnalysis, Estimate, Prediction, PredictionError, Relaxation, Sinusoid,
     SinusoidError,
 };
-use palpate_model::units::{Depth, Newtons};
 use serde_json::{Value, json};
 
 /// The object for all records; `fitted` says where the predicted body is from.

@@ -8,15 +8,15 @@ pub use json::object;
 pub use plot::picture;
 pub use text::whole;
 
-use palpate_model::cycles::{
-    CycleAnalysis, CycleSample, Prediction, PredictionError, Sinusoid, SinusoidError, Steadiness,
-    SteadyRule, analyse, predict, sinusoid,
-};
-use palpate_model::fit::FitSample;
+use crate::cycles::CycleSource;
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::cycles::CycleSource;
+use palpate_rheology::cycles::{
+    CycleAnalysis, CycleSample, Prediction, PredictionError, Sinusoid, SinusoidError, Steadiness,
+    SteadyRule, analyse, predict, sinusoid,
+};
+use palpate_rheology::fit::FitSample;
 
 /// What is asked of an analysis.
 #[derive(Clone, Debug, Default)]

@@ -3,13 +3,13 @@
 use super::CycleReport;
 use crate::report::band::{self, Band};
 use crate::report::picture::{LEFT, RIGHT, WIDTH, look, title};
-use crate::report::svg::{Anchor, Ink, Panel, Svg};
-use crate::report::thin::thin;
-use crate::theme::tokens::LIGHT;
-use eframe::egui::Color32;
+use ecolor::Color32;
+use palpate_figures::drawing::{Anchor, Ink, Panel, Svg};
+use palpate_figures::thin::thin;
+use palpate_figures::tokens::LIGHT;
 use palpate_model::calibration::ForceUncertainty;
-use palpate_model::cycles::CycleSample;
 use palpate_model::rig::Phase;
+use palpate_rheology::cycles::CycleSample;
 
 /// Top and bottom of the loops and of the row of panels below, in px.
 const LOOPS: [f64; 2] = [66.0, 400.0];
@@ -198,10 +198,10 @@ fn by_cycle(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cycles::CycleSource;
     use crate::report::cycles::Question;
     use palpate_model::calibration::Calibration;
     use palpate_model::units::{Depth, Newtons, Seconds, Volts};
-    use palpate_protocols::cycles::CycleSource;
 
     /// Three cycles of a way in, a hold whose force falls, and a way back.
     fn source(calibration: Option<Calibration>) -> CycleSource {

@@ -2,9 +2,9 @@
 
 use super::CycleReport;
 use crate::report::text::in_columns;
-use crate::widgets::uncertain::{plain, with_error};
-use palpate_model::cycles::{CycleAnalysis, Estimate, Prediction, Sinusoid};
+use palpate_figures::uncertain::{plain, with_error};
 use palpate_model::units::{Depth, Newtons};
+use palpate_rheology::cycles::{CycleAnalysis, Estimate, Prediction, Sinusoid};
 
 /// Everything found in one record, in words.
 #[must_use]

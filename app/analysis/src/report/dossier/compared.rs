@@ -1,10 +1,10 @@
 //! Several sessions beside each other.
 
 use super::super::figures::{Align, Traces, overlays};
-use super::super::page::Body;
 use super::super::said;
 use super::Subject;
 use super::html::cells;
+use palpate_figures::page::Body;
 
 /// Table of the sessions, figures over each other, and a table of parameters.
 pub(super) fn comparison(body: &mut Body, subjects: &[Subject], align: Align) {

@@ -1,6 +1,6 @@
 //! Which files a page describes: written into it by their hashes, and read back to be compared.
 
-use super::super::svg::escape;
+use palpate_figures::drawing::escape;
 use palpate_sessions::analyses::{ANALYSES_FILE, AnalysisError, Input, inputs_of};
 use palpate_sessions::text::{sha256, sha256_of_file};
 use std::path::Path;

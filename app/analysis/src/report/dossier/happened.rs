@@ -1,9 +1,9 @@
 //! What happened in a session and what was said of it: deviations, events, edits and analyses, rig and program.
 
-use super::super::page::Body;
 use super::super::text::capital;
 use super::super::{kept, said};
 use super::Subject;
+use palpate_figures::page::Body;
 use palpate_protocols::engine::{Effect, Record};
 use palpate_protocols::fidelity::{Achieved, Fidelity};
 use palpate_sessions::analyses::Analysed;

@@ -1,6 +1,5 @@
 //! The page of a report, part by part.
 
-use super::super::page::{Body, document};
 use super::super::text::{ParameterText, capital, quality, typeset};
 use super::super::{calibration as calibrations, calibration_plot, figures, said};
 use super::compared::comparison;
@@ -8,8 +7,9 @@ use super::files::{MADE, attributes, sealed};
 use super::happened::{afterwards, deviations, events, made_with};
 use super::{FitPart, Subject};
 use crate::report::figures::Align;
-use crate::widgets::uncertain::{error_alone, interval};
-use palpate_model::fit::Parameter;
+use palpate_figures::page::{Body, document};
+use palpate_figures::uncertain::{error_alone, interval};
+use palpate_rheology::fit::Parameter;
 
 /// The whole page.
 pub(super) fn page(subjects: &[Subject], align: Align, made: &str) -> String {

@@ -13,15 +13,16 @@ use super::calibration_plot;
 use super::cycles::{CycleReport, Question, picture as cycles_picture, whole as cycles_text};
 use super::figures::{Align, Traces, Window};
 use super::picture;
-use super::svg::Drawing;
-use crate::workers::fit::Fitted;
+use crate::analysed::{self, Opened};
+use crate::cycles::of_session as cycles_of;
+use crate::fidelity;
+use crate::fit::Fitted;
+use crate::source::{self, SourceError, Stretch};
+use palpate_figures::drawing::Drawing;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
-use palpate_model::fit::{FitOptions, FitReport};
-use palpate_protocols::analysed::{self, Opened};
-use palpate_protocols::analysis::{self, SourceError, Stretch};
 use palpate_protocols::base::FoundBase;
-use palpate_protocols::cycles::of_session as cycles_of;
-use palpate_protocols::fidelity::{self, Fidelity};
+use palpate_protocols::fidelity::Fidelity;
+use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_sessions::analyses::{Analyses, Input, inputs_of};
 use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
 use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
@@ -92,7 +93,7 @@ impl Subject {
         let seen = files.iter().filter(|one| one.what != EDITS_FILE).cloned();
         let seen: Vec<Input> = seen.chain(analyses.input()).collect();
         let name = name_of(path);
-        let calibration = analysis::calibration_of(&session).ok().map(|calibration| {
+        let calibration = source::calibration_of(&session).ok().map(|calibration| {
             let told = Told::of(&calibration).map_err(|err| err.to_string());
             (calibration, told)
         });
@@ -142,7 +143,7 @@ fn cycles(name: &str, session: &Session) -> Option<CyclePart> {
 
 /// The fit of a session, whatever the session is worth, with what its calibration adds.
 fn fit(name: &str, session: Session, left_out_s: &[[f64; 2]]) -> Result<FitPart, String> {
-    let source = analysis::of_session(session, Stretch::RampHold, left_out_s);
+    let source = source::of_session(session, Stretch::RampHold, left_out_s);
     let mut source = source.map_err(|err| err.to_string())?;
     // What the reader remarked is told beside the session.
     source.notes.clear();
@@ -209,7 +210,7 @@ pub fn figure(
         Figure::ForceDepth => Ok(super::figures::force_depth(&traces())),
         Figure::Residual => fit(&name, session, &left_out_s).map(|part| part.figure),
         Figure::Calibration => {
-            let calibration = analysis::calibration_of(&session)?;
+            let calibration = source::calibration_of(&session)?;
             match Told::of(&calibration) {
                 Ok(told) => Ok(calibration_plot::drawing(&calibration, &told)),
                 Err(err) => Err(err.to_string()),
@@ -245,7 +246,7 @@ impl Ending {
     pub fn bytes(self, drawing: &Drawing) -> Result<Vec<u8>, String> {
         match self {
             Self::Svg => Ok(drawing.svg().into_bytes()),
-            Self::Png => super::raster::png(drawing).map_err(|err| err.to_string()),
+            Self::Png => palpate_figures::raster::png(drawing).map_err(|err| err.to_string()),
         }
     }
 }

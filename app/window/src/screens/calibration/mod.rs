@@ -4,15 +4,15 @@
 mod plots;
 
 use crate::command::{Command, Commands};
-use crate::report::calibration::Entry;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
 use crate::workers::Job;
-use crate::workers::calibrations::{Shelved, Shown, keep, read};
 use eframe::egui::{Button, Context, Label, RichText, TextEdit, Ui, vec2};
+use palpate_analysis::calibrations::{Shelved, Shown, keep, read};
+use palpate_analysis::report::calibration::Entry;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;

@@ -1,10 +1,10 @@
 //! The chosen calibration as four plots over force: signal, residual, slope and uncertainty.
 
 use crate::plots::style::{quiet, round_marks};
-use crate::report::calibration_plot::Curves;
 use crate::theme::Tokens;
 use eframe::egui::{Color32, Id, RichText, Ui, vec2};
 use egui_plot::{HoverPosition, Line, LineStyle, Plot, PlotPoints, Points, Span};
+use palpate_analysis::report::calibration_plot::Curves;
 
 /// Labelled steps across one plot, at most: it is half as wide as those of the run.
 const STEPS_ACROSS: f64 = 4.0;

@@ -5,9 +5,9 @@ mod field;
 pub use field::{ParamField, ToldField};
 
 use crate::command::Aside;
+use palpate_analysis::daily::is_gated;
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
-use palpate_protocols::daily::is_gated;
 use palpate_protocols::file::{Problem, Protocol, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};

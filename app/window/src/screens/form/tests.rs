@@ -1,7 +1,7 @@
 use super::*;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::units::MmPerS;
-use palpate_protocols::plans::{RampHold, Step};
+use palpate_protocols::plans::{Hold, RampHold, Step, Unload};
 
 fn bench() -> (RigDescription, Bench) {
     let settings = SimSettings::default();
@@ -93,7 +93,7 @@ fn an_empty_rule_holds_the_whole_time_and_a_wrong_one_refuses() {
     let until = |form: &ProtocolForm| {
         let plan = &form.checked().unwrap().plan;
         plan.steps.iter().find_map(|planned| match planned.step {
-            Step::Hold { until, .. } => until,
+            Step::Hold(Hold { until, .. }) => until,
             _ => None,
         })
     };
@@ -115,7 +115,7 @@ fn an_unload_speed_adds_a_recorded_way_back() {
     let has_unload = plan
         .steps
         .iter()
-        .any(|planned| matches!(planned.step, Step::Unload { speed, .. } if speed == MmPerS(0.6)));
+        .any(|planned| matches!(planned.step, Step::Unload(Unload { speed, .. }) if speed == MmPerS(0.6)));
     assert!(has_unload);
     type_into(&mut form, &[("unload", "0.601")]);
     assert!(form.verdict().unwrap_err().contains("unload"));

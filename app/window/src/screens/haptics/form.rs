@@ -6,9 +6,9 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::text_row::text_row;
-use crate::workers::haptics::{Setting, THESIS};
 use eframe::egui::{Button, RichText, Ui};
-use palpate_model::haptics::{DriveKind, Period, TorqueSettings};
+use palpate_analysis::haptics::{Setting, THESIS};
+use palpate_haptics::{DriveKind, Period, TorqueSettings};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use std::path::{Path, PathBuf};
 

@@ -6,9 +6,9 @@ use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
 use crate::workers::feel::Feel;
-use crate::workers::haptics::Tried;
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Color32, Label, RichText, Ui, vec2};
+use palpate_analysis::haptics::Tried;
 use palpate_protocols::haptics::TrailPoint;
 
 /// What the middle shows.

@@ -14,14 +14,14 @@ use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::tick_box::tick_box;
 use crate::workers::feel::Feel;
-use crate::workers::haptics::{Checked, Setting, body_of, check};
-use crate::workers::haptics_tape::{led_recorder, recorded, replay};
 use crate::workers::path_dialog::Ask;
-use crate::workers::recorded::Replayed;
 use crate::workers::task::Task;
 use eframe::egui::{Button, Context, Label, RichText, Slider, Ui, vec2};
 use form::HapticsForm;
 use middle::View;
+use palpate_analysis::haptics::{Checked, Setting, body_of, check};
+use palpate_analysis::haptics_tape::{led_recorder, recorded, replay};
+use palpate_analysis::recorded::Replayed;
 use std::path::{Path, PathBuf};
 
 /// How far above the surface a hand can be led, in mm.

@@ -1,12 +1,12 @@
 //! How the loop does, and why there is no force.
 
 use super::{HapticsScreen, Looked};
-use crate::report::haptics::{margin_text, tried_text, why_less};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::loop_times::loop_times_ui;
 use crate::workers::feel::Feel;
 use eframe::egui::{Label, RichText, Ui};
+use palpate_analysis::report::haptics::{margin_text, tried_text, why_less};
 
 impl HapticsScreen {
     /// What is known.

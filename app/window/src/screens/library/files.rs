@@ -6,11 +6,11 @@ use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
-use crate::workers::exports::{Destination, Exported, export_all};
 use crate::workers::path_dialog::FolderDialog;
 use crate::workers::task::Task;
 use eframe::egui::{ComboBox, Context, Ui};
-use palpate_sessions::export::Format;
+use palpate_analysis::exports::{Destination, Exported, export_all};
+use palpate_tables::export::Format;
 use std::path::PathBuf;
 
 /// What sessions are written as.

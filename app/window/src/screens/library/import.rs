@@ -4,10 +4,10 @@ use super::say::sentence;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::standing_ui;
 use crate::widgets::text_row::text_row;
-use crate::workers::imports::{Request, import_and_tell};
 use crate::workers::path_dialog::FilesDialog;
 use crate::workers::task::Task;
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
+use palpate_analysis::imports::{Request, import_and_tell};
 use palpate_sessions::Labels;
 use std::path::{Path, PathBuf};
 

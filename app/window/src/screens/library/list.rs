@@ -1,11 +1,11 @@
 //! The sessions found: what is known of those in sight, and which are chosen.
 
-use crate::report::catalog::one_line;
 use crate::widgets::choice_table::{Act, Cell, ChoiceTable, Head, How, Line, Scrolled, Tone};
 use crate::widgets::mark::Mark;
 use crate::widgets::table::Column;
-use crate::workers::find::Found;
 use eframe::egui::Ui;
+use palpate_analysis::find::Found;
+use palpate_analysis::report::catalog::one_line;
 use palpate_sessions::catalog::{Entry, Order, ReviewIs};
 use palpate_sessions::edits::{Decision, Verdict};
 use std::collections::{BTreeMap, BTreeSet};

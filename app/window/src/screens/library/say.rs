@@ -6,9 +6,9 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::standing_ui;
 use crate::widgets::text_row::text_row;
-use crate::workers::edits::{Act, Said, Saying, author, say, take_back};
 use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, Modifiers, Popup, RichText, Ui, vec2};
+use palpate_analysis::edits::{Act, Said, Saying, author, say, take_back};
 use palpate_sessions::edits::{Decision, Verdict};
 use std::path::PathBuf;
 

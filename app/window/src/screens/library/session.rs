@@ -2,12 +2,12 @@
 
 use super::list::{health, review, second, verdict};
 use super::say::sentence;
-use crate::report::catalog::one_line;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{NAME_WIDTH, fact_ui, section_ui};
 use crate::widgets::mark::{self, Mark, mark_at};
-use crate::workers::find::Told;
 use eframe::egui::{Label, RichText, ScrollArea, Sense, Ui, vec2};
+use palpate_analysis::find::Told;
+use palpate_analysis::report::catalog::one_line;
 use palpate_sessions::catalog::{Entry, Origin, Source};
 use std::collections::BTreeSet;
 use std::path::Path;

@@ -1,14 +1,14 @@
 //! A comparison of models, drawn.
 
 use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
-use crate::report::selection;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
-use crate::widgets::uncertain::plain;
-use crate::workers::select::Selected;
 use eframe::egui::{Label, RichText, Ui, vec2};
-use palpate_model::select::{Candidate, Selection};
+use palpate_analysis::report::selection;
+use palpate_analysis::select::Selected;
+use palpate_figures::uncertain::plain;
+use palpate_rheology::select::{Candidate, Selection};
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.46;

@@ -7,9 +7,9 @@ use crate::widgets::quantity_input::form_label;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, ComboBox, Label, RichText, TextEdit, Ui};
-use palpate_model::select::{HoldOut, SelectOptions};
-use palpate_model::tolerance::{BadTolerance, Tolerance};
-use palpate_protocols::analysis::Stretch;
+use palpate_analysis::source::Stretch;
+use palpate_rheology::select::{HoldOut, SelectOptions};
+use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use std::path::{Path, PathBuf};
 
 /// More recordings than this compared by hand are a job for the command line.

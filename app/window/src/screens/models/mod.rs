@@ -10,9 +10,9 @@ use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::{Pressed, task_ui};
-use crate::workers::select::{Selected, select_sources};
 use crate::workers::task::Task;
 use eframe::egui::{Context, Label, RichText, Ui};
+use palpate_analysis::select::{Selected, select_sources};
 
 /// The screen's state.
 #[derive(Default)]

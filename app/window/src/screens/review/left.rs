@@ -67,6 +67,7 @@ impl ReviewScreen {
             quiet_ui(ui, "no session shown has been fitted here yet");
         }
         section_ui(ui, "Fit");
+        self.model.ui(ui, "fit with");
         let verdict = self.fit_verdict();
         match task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
             Some(Pressed::Start) => self.start_fits(ui.ctx()),

@@ -19,6 +19,7 @@ pub use subject::Subject;
 use crate::command::Commands;
 use crate::plots::navigate::Span;
 use crate::plots::over_depth::DepthLines;
+use crate::widgets::model_choice::ModelChoice;
 use crate::workers::review::fit::{FitAnswer, Prediction};
 use crate::workers::review::{Leader, Quantity};
 use crate::workers::task::Task;
@@ -93,6 +94,8 @@ pub struct ReviewScreen {
     depth_lines: DepthLines,
     depth_pixels: [f64; 2],
     fits: Task<Vec<FitAnswer>>,
+    /// What sessions are fitted with here.
+    model: ModelChoice,
     /// Whether the last answer of the fits is handed out.
     are_fits_taken: bool,
     prediction: Task<Prediction>,
@@ -125,6 +128,7 @@ impl ReviewScreen {
             depth_lines: DepthLines::default(),
             depth_pixels: [800.0, 500.0],
             fits: Task::default(),
+            model: ModelChoice::default(),
             are_fits_taken: true,
             prediction: Task::default(),
             prediction_of: None,
@@ -245,7 +249,11 @@ impl ReviewScreen {
 
     /// Begins to fit every session shown.
     fn start_fits(&mut self, ctx: &Context) {
-        let subjects: Vec<_> = self.subjects.iter().map(Subject::for_fit).collect();
+        let subjects: Vec<_> = self
+            .subjects
+            .iter()
+            .map(|one| one.for_fit(&self.model))
+            .collect();
         self.are_fits_taken = false;
         self.fits.start("review-fit", ctx, move |progress| {
             crate::workers::review::fit::fit_sessions(&subjects, progress)

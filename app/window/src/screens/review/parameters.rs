@@ -3,11 +3,11 @@
 use super::ReviewScreen;
 use super::middle::head_ui;
 use super::subject::Subject;
-use crate::report::text::{self, typeset};
 use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::table::{Column, Row, table_ui};
 use eframe::egui::Ui;
-use palpate_model::fit::Parameter;
+use palpate_analysis::report::text::{self, typeset};
+use palpate_rheology::fit::Parameter;
 
 /// A parameter of a session's fit, with numbers as they are.
 #[derive(Clone, Debug, PartialEq)]
@@ -88,7 +88,9 @@ impl ReviewScreen {
             .filter_map(|(subject, specimen)| {
                 let report = &subject.fitted()?.report;
                 let mut cells = vec![specimen.clone(), subject.name.clone()];
-                cells.extend(report.parameters.iter().map(text::cell));
+                let names = first.report.parameters.iter().map(|one| &one.name);
+                let found = names.map(|name| report.parameter(name));
+                cells.extend(found.map(|one| one.map_or(String::new(), text::cell)));
                 cells.push(format!("{:.3}", report.rmse_n * 1e3));
                 Some(Row {
                     cells,

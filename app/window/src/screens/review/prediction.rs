@@ -38,7 +38,7 @@ impl ReviewScreen {
         ) {
             Some(Pressed::Start) => {
                 if let [known, other, ..] = self.subjects.as_slice() {
-                    let pair = [known.for_fit(), other.for_fit()];
+                    let pair = [known, other].map(|one| one.for_fit(&self.model));
                     self.prediction_of = Some([known.name.clone(), other.name.clone()]);
                     self.prediction
                         .start("review-predict", ui.ctx(), move |progress| {

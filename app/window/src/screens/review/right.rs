@@ -6,10 +6,10 @@ use crate::screens::exact_fit::exact_ui;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::uncertain::{interval, plain};
 use crate::workers::review::Facts;
 use crate::workers::review::fit::SessionFit;
 use eframe::egui::{Button, Label, RichText, ScrollArea, Sense, Ui};
+use palpate_figures::uncertain::{interval, plain};
 use palpate_sessions::edits::Verdict;
 
 /// Letters of a hash that tell it apart at a glance; the whole one is copied.

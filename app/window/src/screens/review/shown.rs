@@ -57,7 +57,7 @@ impl ReviewScreen {
     /// What is on the screen.
     #[must_use]
     pub fn shown(&self) -> Shown {
-        let colors = crate::theme::tokens::LIGHT.sessions.len() as u64;
+        let colors = palpate_figures::tokens::LIGHT.sessions.len() as u64;
         let session = |subject: &super::Subject| ShownSession {
             looked: subject.looked.clone(),
             name: subject.name.clone(),

@@ -2,6 +2,7 @@
 
 use super::Looked;
 use crate::plots::stretches::{Stretches, Wanted};
+use crate::widgets::model_choice::ModelChoice;
 use crate::workers::review::fit::{self, SessionFit};
 use crate::workers::review::{Leader, Quantity, Recording, Stage};
 use eframe::egui::Context;
@@ -144,12 +145,13 @@ impl Subject {
 
     /// What a fit takes of it.
     #[must_use]
-    pub fn for_fit(&self) -> fit::Subject {
+    pub fn for_fit(&self, model: &ModelChoice) -> fit::Subject {
         let begins = [Phase::Ramp, Phase::Hold].map(|phase| self.recording.phase_start(phase));
         let first = begins.into_iter().flatten().reduce(f64::min);
         fit::Subject {
             path: self.looked.session.clone(),
             analysis: self.looked.analysis.clone(),
+            family: model.family.clone(),
             ramp_t: first.unwrap_or(0.0),
         }
     }

@@ -7,9 +7,9 @@ use crate::widgets::remark::quiet_ui;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
 use eframe::egui::Ui;
-use palpate_model::haptics::Period;
-use palpate_model::scene::{ScenePath, SceneSettings};
-use palpate_model::surface::INERT;
+use palpate_haptics::Period;
+use palpate_haptics::scene::{ScenePath, SceneSettings};
+use palpate_haptics::surface::INERT;
 use palpate_protocols::haptics::scene_file::SceneFile;
 
 /// The path that is chosen first.

@@ -2,15 +2,15 @@
 
 use super::SceneScreen;
 use crate::command::{Command, Commands};
-use crate::report::scene::plan_text;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::workers::scene_bench::{made_after, planned, planned_again};
 use crate::workers::touch::Touch;
 use eframe::egui::{Ui, vec2};
-use palpate_model::surface::{NoPlan, SceneCurves, ScenePlan};
+use palpate_analysis::report::scene::plan_text;
+use palpate_analysis::scene_bench::{made_after, planned, planned_again};
+use palpate_haptics::surface::{NoPlan, SceneCurves, ScenePlan};
 use palpate_protocols::haptics::scene_file::SceneFile;
 
 /// A plan, what it was made of, and what it answers.
@@ -133,8 +133,8 @@ fn after_miss(file: &SceneFile, curves: &SceneCurves, took: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::trade::{SCENE_SIDE_MM, SCENE_SLOPE};
-    use palpate_model::surface::{CutPoint, FamilyPoint, MeshPoint, StepPoint};
+    use palpate_analysis::trade::{SCENE_SIDE_MM, SCENE_SLOPE};
+    use palpate_haptics::surface::{CutPoint, FamilyPoint, MeshPoint, StepPoint};
 
     /// A fine mesh of 100 us, a coarse one of 10, and one way to step.
     fn curves(file: &SceneFile) -> SceneCurves {

@@ -2,13 +2,13 @@
 
 use super::SceneScreen;
 use super::middle::Side;
-use crate::report::haptics::margin_text;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::loop_times::loop_times_ui;
 use crate::workers::touch::{Touch, force_of, margin_of};
 use eframe::egui::{Label, RichText, Ui};
-use palpate_model::scene::{SceneSettings, SceneTick};
+use palpate_analysis::report::haptics::margin_text;
+use palpate_haptics::scene::{SceneSettings, SceneTick};
 
 impl SceneScreen {
     /// What is known.

@@ -1,10 +1,10 @@
 //! Tables of what was measured, as points and as rows.
 
 use crate::plots::log_scatter::Mark;
-use crate::trade::text::{digits, plain, time};
 use crate::widgets::table::{Column, Row, RowLook};
-use palpate_model::surface::{SceneCurves, ScenePlan};
-use palpate_model::trade::{TradeCurves, front};
+use palpate_analysis::trade::text::{digits, plain, time};
+use palpate_haptics::surface::{SceneCurves, ScenePlan};
+use palpate_rheology::trade::{TradeCurves, front};
 
 /// One table as points and rows.
 pub(super) struct Shown {
@@ -244,7 +244,7 @@ pub(super) fn plan_lines(plan: &ScenePlan) -> Vec<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use palpate_model::surface::MeshPoint;
+    use palpate_haptics::surface::MeshPoint;
 
     fn curves(points: &[(u32, f64, f64)]) -> SceneCurves {
         let mesh = |&(nodes, error_mm, cost_us): &(u32, f64, f64)| MeshPoint {

@@ -1,8 +1,8 @@
 //! What is known of a session besides its samples.
 
+use palpate_analysis::analysed::Passing;
 use palpate_model::calibration::Calibration;
 use palpate_model::signal::track::Track;
-use palpate_protocols::analysed::Passing;
 use palpate_protocols::engine::{Effect, Record};
 use palpate_sessions::about::About;
 use palpate_sessions::analyses::{Input, inputs_of};

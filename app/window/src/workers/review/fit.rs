@@ -1,11 +1,11 @@
 //! Fits of the sessions that are looked at, and what the fit of one foretells of another.
 
-use crate::workers::fit::Fitted;
-use crate::workers::task::Progress;
-use palpate_model::fit::{self, FitOptions, FitReport, FitSample, ProfileInterval};
+use palpate_analysis::fit::Fitted;
+use palpate_analysis::progress::Progress;
+use palpate_analysis::source::{Wanted, read_analysed};
 use palpate_model::signal::track::{SEGMENT, Segment, Track};
 use palpate_model::units::Newtons;
-use palpate_protocols::analysis::{Wanted, read_analysed};
+use palpate_rheology::fit::{self, FitOptions, FitReport, FitSample, ProfileInterval};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -21,8 +21,19 @@ pub struct Subject {
     pub path: PathBuf,
     /// The analysis it is read by.
     pub analysis: Option<String>,
+    /// Key of the family to be fitted; none for the modified Kelvin body of third order.
+    pub family: Option<String>,
     /// Time of the first sample that a fit takes.
     pub ramp_t: f64,
+}
+
+impl Subject {
+    fn options(&self) -> Result<FitOptions, String> {
+        match &self.family {
+            Some(key) => FitOptions::by_key(key).map_err(|err| err.to_string()),
+            None => Ok(FitOptions::default()),
+        }
+    }
 }
 
 /// A fit to look at.
@@ -56,7 +67,7 @@ pub struct Prediction {
 }
 
 fn samples_of(subject: &Subject) -> Result<Fitted, String> {
-    let options = FitOptions::default();
+    let options = subject.options()?;
     // Whoever looks at a session sees its fit, whatever the session is worth.
     let wanted = Wanted::whatever_it_is_worth();
     let source = read_analysed(&subject.path, None, wanted, subject.analysis.as_deref())
@@ -90,7 +101,7 @@ pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
     let fitted = samples_of(subject)?;
     let report = fitted.result.map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
-    let options = FitOptions::default();
+    let options = subject.options()?;
     let profile = fit::Fitted::of(&fitted.samples, &options)
         .and_then(|own| own.profile(0))
         .map_err(|err| err.to_string());
@@ -162,8 +173,9 @@ mod tests {
 
     fn recorded() -> Subject {
         Subject {
-            path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions/ramp-hold-lab"),
+            path: Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions/ramp-hold-lab"),
             analysis: None,
+            family: None,
             ramp_t: 3.0,
         }
     }

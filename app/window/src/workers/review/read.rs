@@ -6,9 +6,9 @@
 
 use super::facts::Facts;
 use super::{News, Quantity, Stretch};
+use palpate_analysis::analysed;
 use palpate_model::rig::Phase;
 use palpate_model::signal::track::{SEGMENT, Segment};
-use palpate_protocols::analysed;
 use palpate_sessions::edits::{Change, Edits};
 use palpate_sessions::log::{Session, Summary};
 use palpate_sessions::manifest::Manifest;
@@ -158,7 +158,7 @@ mod tests {
 
     fn recorded(name: &str) -> PathBuf {
         Path::new(env!("CARGO_MANIFEST_DIR"))
-            .join("../tests/sessions")
+            .join("../../tests/sessions")
             .join(name)
     }
 

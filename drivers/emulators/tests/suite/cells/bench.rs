@@ -1,9 +1,9 @@
 //! An emulated load cell behind a link whose waiting makes the time.
 
 use palpate_drivers::cell::{CellDialogue, CellSample};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::cell::{EmulatedCell, Felt};
 use palpate_drivers::wire::{HostClock, Link};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::cell::{EmulatedCell, Felt};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 use std::io;

@@ -1,11 +1,11 @@
 //! The Mark-10 gauge.
 
 use super::bench::{CellBench, Stranger};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::cell::EmulatedCell;
-use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_drivers::mark10::gauge::{GaugeSettings, open};
 use palpate_drivers::text::{DeviceError, OpenedCell};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::cell::EmulatedCell;
+use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_model::units::Newtons;
 
 fn bench() -> CellBench<EmulatedGauge> {

@@ -2,17 +2,17 @@
 
 use super::bench::{CellBench, Stranger};
 use palpate_drivers::cell::CellDescription;
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use palpate_drivers::hx711::{Hx711Settings, open};
 use palpate_drivers::text::{DeviceError, OpenedCell};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
 use palpate_model::units::Volts;
 
 fn bench(settings: EmulatedHx711Settings) -> CellBench<EmulatedHx711> {
     CellBench::new(EmulatedHx711::new(settings))
 }
 
-fn opened<E: palpate_drivers::emulate::cell::EmulatedCell>(
+fn opened<E: palpate_emulators::cell::EmulatedCell>(
     bench: &CellBench<E>,
     settings: &Hx711Settings,
 ) -> Result<OpenedCell, DeviceError> {

@@ -1,13 +1,13 @@
 //! The sketch itself, compiled for this computer with a chip made of a few lines on its pins.
 
 use palpate_drivers::hx711::protocol::{Header, Message, parse};
+use palpate_test_support::skip;
 use std::path::Path;
 use std::process::Command;
 
 #[test]
 fn the_sketch_speaks_as_it_is_read() {
-    if Command::new("g++").arg("--version").output().is_err() {
-        println!("skipped: there is no g++ to compile the sketch with");
+    if skip::lacks_program("g++") {
         return;
     }
     for gain in [128, 64] {
@@ -19,7 +19,7 @@ fn speaks(gain: u8) {
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     let out = tempfile::tempdir().expect("a folder");
     let program = out.path().join("sketch");
-    let sketch = here.join("hx711/palpate_hx711/palpate_hx711.ino");
+    let sketch = here.join("../hx711/palpate_hx711/palpate_hx711.ino");
     let sketch = std::fs::read_to_string(sketch).expect("the sketch");
     let (usual, set) = ("GAIN = 128;", format!("GAIN = {gain};"));
     assert!(sketch.contains(usual));
@@ -35,8 +35,8 @@ fn speaks(gain: u8) {
         .arg("-I")
         .arg(out.path())
         .arg("-I")
-        .arg(here.join("tests/cells/board"))
-        .arg(here.join("tests/cells/board/main.cpp"))
+        .arg(here.join("tests/suite/cells/board"))
+        .arg(here.join("tests/suite/cells/board/main.cpp"))
         .arg("-o")
         .arg(&program)
         .output();

@@ -2,15 +2,15 @@
 
 use super::bench::CellBench;
 use palpate_drivers::cell::{CellDialogue, CellSample};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::cell::{EmulatedCell, Felt};
-use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
-use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_drivers::hx711::protocol::{Header, Message, line};
 use palpate_drivers::hx711::{self, Hx711Dialogue, Hx711Settings};
 use palpate_drivers::mark10::gauge::{self, GaugeDialogue, GaugeScale, GaugeSettings};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::text::{DeviceError, OpenedCell};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::cell::{EmulatedCell, Felt};
+use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 use rand_distr::{Distribution, StandardUniform};

@@ -1,7 +1,7 @@
 //! A controller in simulated time.
 
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilModel, GalilSettings};
+use palpate_emulators::Device;
+use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
 use palpate_model::Nanos;
 
 /// One controller and the time.

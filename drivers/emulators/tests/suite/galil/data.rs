@@ -1,8 +1,8 @@
 //! Record arrays and data records.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::{GalilModel, GalilSettings};
+use palpate_emulators::Device;
+use palpate_emulators::galil::{GalilModel, GalilSettings};
 
 #[test]
 fn record_arrays_lose_no_sample_in_ninety_seconds() {

@@ -1,8 +1,8 @@
 //! Terminators, prompts, numbers, errors: byte for byte.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::{GalilModel, GalilSettings};
+use palpate_emulators::Device;
+use palpate_emulators::galil::{GalilModel, GalilSettings};
 
 /// Where it is from, what is sent, what comes back. One controller, in this order.
 const TRANSCRIPT: &[(&str, &str, &str)] = &[

@@ -1,7 +1,7 @@
 //! Motion: profiles, pulses, switches, limits, stop codes.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::galil::GalilModel;
+use palpate_emulators::galil::GalilModel;
 use palpate_model::rig::Profile;
 use palpate_model::{MmPerS, MmPerS2, Position, Seconds};
 

@@ -1,8 +1,8 @@
 //! Programs: download, threads, automatic subroutines, a watchdog, unsolicited text.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::GalilModel;
+use palpate_emulators::Device;
+use palpate_emulators::galil::GalilModel;
 
 fn with(program: &str) -> Bench {
     let mut bench = Bench::serial(GalilModel::Dmc4143);

@@ -1,8 +1,8 @@
 //! Random bytes: no panic, an end to every answer, bounded memory.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::GalilModel;
+use palpate_emulators::Device;
+use palpate_emulators::galil::GalilModel;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;
 

@@ -1,8 +1,8 @@
 //! Faults of the controller itself.
 
 use super::bench::Bench;
-use palpate_drivers::emulate::galil::GalilModel;
-use palpate_drivers::emulate::{Device, DeviceFault};
+use palpate_emulators::galil::GalilModel;
+use palpate_emulators::{Device, DeviceFault};
 
 fn moving() -> Bench {
     let mut bench = Bench::serial(GalilModel::Dmc4143);

@@ -1,15 +1,16 @@
 //! The controller on a pseudo-terminal and on a TCP port, in real time.
 
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings};
-use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
+use palpate_emulators::galil::{GalilEmulator, GalilSettings};
+use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_model::Nanos;
+use palpate_test_support::skip;
+use palpate_test_support::wait::{PATIENCE, until};
 use std::io::{ErrorKind, Read, Write};
 use std::net::TcpStream;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::Duration;
 
 struct Served {
     address: String,
@@ -42,7 +43,7 @@ fn start(place: Place, is_serial: bool) -> Served {
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(Duration::from_secs(10)) else {
+    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Served {
@@ -62,17 +63,6 @@ impl Drop for Served {
             assert!(result.is_ok() || std::thread::panicking());
         }
     }
-}
-
-/// What comes about within ten seconds.
-fn soon<T>(mut attempt: impl FnMut() -> Option<T>) -> T {
-    for _ in 0..1000 {
-        if let Some(got) = attempt() {
-            return got;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("it did not come about");
 }
 
 /// Reads until so many prompts have come.
@@ -97,8 +87,7 @@ fn read_prompts(port: &mut impl Read, prompts: usize) -> String {
 
 #[test]
 fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
-    if !std::path::Path::new("/dev/ptmx").exists() {
-        println!("skipped: there are no pseudo-terminals here");
+    if skip::lacks_terminals() {
         return;
     }
     let folder = std::env::temp_dir().join(format!("palpate-galil-{}", std::process::id()));
@@ -107,12 +96,11 @@ fn a_serial_client_talks_to_it_over_a_pseudo_terminal() {
     let served = start(Place::Pty(Some(link.clone())), true);
     assert_eq!(served.address, link.display().to_string());
     let open = || {
-        soon(|| {
-            serialport::new(link.display().to_string(), 115_200)
-                .timeout(Duration::from_secs(10))
-                .open()
-                .ok()
-        })
+        let attempt = || {
+            let port = serialport::new(link.display().to_string(), 115_200).timeout(PATIENCE);
+            port.open().ok()
+        };
+        until(attempt, || format!("no port at {}", link.display()))
     };
     let mut port = open();
     port.write_all(b"EO 0\r").unwrap();
@@ -148,9 +136,7 @@ fn eight_clients_connect_and_the_ninth_is_reset() {
     let connect = || {
         let stream = TcpStream::connect(&served.address).unwrap();
         stream.set_nodelay(true).unwrap();
-        stream
-            .set_read_timeout(Some(Duration::from_secs(10)))
-            .unwrap();
+        stream.set_read_timeout(Some(PATIENCE)).unwrap();
         stream
     };
     let mut clients: Vec<TcpStream> = (0..8)
@@ -172,14 +158,15 @@ fn eight_clients_connect_and_the_ninth_is_reset() {
     assert!(once[..count].ends_with(b"\r\n:"));
     drop(clients.pop());
     // The handle is free once the controller has seen its client go.
-    let mut again = soon(|| {
+    let attempt = || {
         let mut again = connect();
         again.write_all(b"WH\r").ok()?;
         let mut answer = [0_u8; 6];
         again.read_exact(&mut answer).ok()?;
         assert_eq!(&answer, b"IHH\r\n:");
         Some(again)
-    });
+    };
+    let mut again = until(attempt, || "its answer to another client".into());
     again.write_all(b"RS\r").unwrap();
     assert_eq!(again.read(&mut once).unwrap(), 0);
 }

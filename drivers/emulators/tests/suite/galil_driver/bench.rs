@@ -1,13 +1,13 @@
 //! A session and an emulated controller in simulated time, with nothing but a wire between them.
 
 use palpate_drivers::RigEventBody;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::galil::{self, GalilEmulator};
 use palpate_drivers::galil::{
     AnalogRange, Connected, GalilOpenError, GalilSettings, Levels, MotorType, Sampling, Session,
     connect,
 };
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
+use palpate_emulators::Device;
+use palpate_emulators::galil::{self, GalilEmulator};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, Reading, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};

@@ -6,19 +6,21 @@
     reason = "faults and moves meet in real time"
 )]
 
-use crate::bench::{thesis, to};
-use crate::wires::clock;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::faults::DeviceFault;
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings as Emulated};
-use palpate_drivers::emulate::serve::{Place as At, ServeOptions, Told, serve};
+use super::bench::{thesis, to};
+use super::wires::clock;
 use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
 use palpate_drivers::wire::Place;
 use palpate_drivers::{Rig, RigEventBody};
+use palpate_emulators::Device;
+use palpate_emulators::faults::DeviceFault;
+use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
+use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{Fault, HandAction, Oscillation, RigCommand};
 use palpate_model::units::MmPerS2;
+use palpate_test_support::skip;
+use palpate_test_support::wait::PATIENCE;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::sync_channel;
@@ -145,7 +147,7 @@ fn run(seed: u64) -> Result<(), String> {
             device
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(Duration::from_secs(20)) else {
+    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         return Err("the emulator did not start".into());
     };
     let place = Place::Serial {
@@ -210,8 +212,8 @@ fn drive(
     let (mut next_at, mut sent, mut answered, mut is_lost) = (0.0, 0, 0, false);
     rig.send(RigCommand::EnableMotor);
     sent += 1;
-    // Then whatever is not answered yet has some seconds: a search for lost answers takes two.
-    while at(start) < 2.4 || (answered < sent && at(start) < 20.0 && !is_lost) {
+    // Then whatever is not answered yet is waited for: a search for lost answers takes two seconds.
+    while at(start) < 2.4 || (answered < sent && at(start) < PATIENCE.as_secs_f64() && !is_lost) {
         faults.retain(|(due, fault)| {
             let is_due = at(start) >= *due;
             if is_due {
@@ -259,8 +261,7 @@ fn drive(
 
 #[test]
 fn every_run_ends_safe() {
-    if !std::path::Path::new("/dev/ptmx").exists() {
-        println!("skipped: there are no pseudo-terminals here");
+    if skip::lacks_terminals() {
         return;
     }
     let number = |variable: &str, usual: usize| {

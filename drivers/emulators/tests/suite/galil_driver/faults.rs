@@ -1,10 +1,10 @@
 //! Wires and controllers that fail.
 
-use crate::bench::{Host, thesis, to};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::faults::DeviceFault;
+use super::bench::{Host, thesis, to};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
+use palpate_emulators::Device;
+use palpate_emulators::faults::DeviceFault;
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{AxisStatus, Fault, RigCommand};

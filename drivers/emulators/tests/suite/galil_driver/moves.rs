@@ -1,6 +1,6 @@
 //! Motion: what is set is what is acknowledged, and samples show it as it was.
 
-use crate::bench::{Host, thesis, to};
+use super::bench::{Host, thesis, to};
 use palpate_drivers::galil::GalilSettings;
 use palpate_drivers::wire::Dialogue;
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};

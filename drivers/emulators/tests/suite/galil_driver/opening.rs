@@ -1,11 +1,11 @@
 //! What is found out and set when a controller is opened.
 
-use crate::bench::{Host, clock_of, thesis, try_connect, wired};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::faults::DeviceFault;
-use palpate_drivers::emulate::galil::{self, GalilModel};
+use super::bench::{Host, clock_of, thesis, try_connect, wired};
 use palpate_drivers::galil::{AnalogRange, GalilOpenError, GalilSettings, Sampling, connect};
 use palpate_drivers::wire::pair;
+use palpate_emulators::Device;
+use palpate_emulators::faults::DeviceFault;
+use palpate_emulators::galil::{self, GalilModel};
 use palpate_model::Nanos;
 
 #[test]

@@ -1,11 +1,11 @@
 //! Samples that the controller records and the driver fetches.
 
-use crate::bench::{Host, Shared, thesis, to, wired};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::faults::DeviceFault;
-use palpate_drivers::emulate::galil::{self, GalilEmulator, GalilModel};
+use super::bench::{Host, Shared, thesis, to, wired};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
+use palpate_emulators::Device;
+use palpate_emulators::faults::DeviceFault;
+use palpate_emulators::galil::{self, GalilEmulator, GalilModel};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, RigCommand};
@@ -252,7 +252,7 @@ fn all_models_record_and_a_full_memory_is_told() {
         link.contains("polled") && link.contains("no room for arrays"),
         "{link}"
     );
-    let Err(err) = crate::bench::try_connect(&wire, &recorded()) else {
+    let Err(err) = super::bench::try_connect(&wire, &recorded()) else {
         panic!("it records");
     };
     assert!(err.to_string().contains("no room for arrays"), "{err}");

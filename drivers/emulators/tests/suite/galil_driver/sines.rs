@@ -1,6 +1,6 @@
 //! Sines in contour mode.
 
-use crate::bench::{Host, thesis, to};
+use super::bench::{Host, thesis, to};
 use palpate_drivers::galil::{GalilSettings, Sampling};
 use palpate_drivers::wire::Dialogue;
 use palpate_model::rig::{AxisStatus, Oscillation, PathTracker, RigCommand};
@@ -98,12 +98,12 @@ fn a_stop_in_the_middle_ends_it() {
 
 #[test]
 fn a_dead_link_lets_the_axis_stand_within_the_lead() {
-    use palpate_drivers::emulate::Device;
+    use palpate_emulators::Device;
     let mut host = at_forty(&thesis());
     host.tell(RigCommand::Oscillate(sine(50, 1000, 20)));
     host.pass(1.3);
     let mut wire = host.wire.lock();
-    let place = |wire: &mut crate::bench::Wire, now| {
+    let place = |wire: &mut super::bench::Wire, now| {
         wire.emulator.transmit(0);
         wire.emulator.receive(now, 0, b"MG _TDA\r");
         String::from_utf8(wire.emulator.transmit(0)).unwrap()
@@ -126,7 +126,7 @@ fn a_computer_that_is_late_breaks_the_sine_off() {
     host.pass(1.3);
     // For 450 ms nothing is sent, and nothing is read: the buffer is empty, and the watchdog may have stopped the axis.
     {
-        use palpate_drivers::emulate::Device;
+        use palpate_emulators::Device;
         let mut wire = host.wire.lock();
         wire.now = wire.now + palpate_model::Nanos::from_millis(450);
         let now = wire.now;

@@ -5,19 +5,21 @@
     reason = "the clock of a test stands for the runner's"
 )]
 
-use crate::bench::{thesis, to};
-use palpate_drivers::emulate::galil::{GalilEmulator, GalilSettings as Emulated};
-use palpate_drivers::emulate::serve::{Place as At, ServeOptions, Told, serve};
+use super::bench::{thesis, to};
 use palpate_drivers::galil::{GalilRig, GalilSettings};
 use palpate_drivers::wire::{HostClock, Place, WireError};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
+use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
+use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand};
+use palpate_test_support::skip;
+use palpate_test_support::wait::PATIENCE;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
 use std::thread::JoinHandle;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
 pub struct Served {
     pub address: String,
@@ -50,7 +52,7 @@ pub fn start(place: At, is_serial: bool, latency: Nanos, baud: Option<u32>) -> S
             serve(&mut device, &options, &received, &is_over, &mut tell).expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(address)) = told.recv_timeout(Duration::from_secs(10)) else {
+    let Ok(Told::Ready(address)) = told.recv_timeout(PATIENCE) else {
         panic!("it did not start");
     };
     Served {
@@ -108,14 +110,11 @@ impl Runner {
     }
 
     pub fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        // A minute of waiting is for a computer with much else to do.
-        for _ in 0..6_000 {
-            if is_so(self) {
-                return;
-            }
+        let end = Instant::now() + PATIENCE;
+        while !is_so(self) {
+            assert!(Instant::now() < end, "{what} never: {:?}", self.faults());
             self.pass();
         }
-        panic!("{what} never: {:?}", self.faults());
     }
 
     pub fn faults(&self) -> Vec<&Fault> {
@@ -145,15 +144,11 @@ impl Runner {
 
     /// The plug is put back: the same controller, at rest, does what it is told.
     fn reconnect(&mut self) {
-        let mut is_back = false;
-        for _ in 0..2_000 {
-            is_back = self.rig.reconnect().is_ok();
-            if is_back {
-                break;
-            }
+        let end = Instant::now() + PATIENCE;
+        while let Err(err) = self.rig.reconnect() {
+            assert!(Instant::now() < end, "it never came back: {err}");
             self.pass();
         }
-        assert!(is_back, "it came back");
         self.newest = None;
         self.until("a sample", |runner| runner.newest.is_some());
         assert!(self.is_at_rest());
@@ -229,8 +224,7 @@ fn a_controller_on_a_network() {
 
 #[test]
 fn a_controller_on_a_serial_port_that_only_one_program_has() {
-    if !std::path::Path::new("/dev/ptmx").exists() {
-        println!("skipped: there are no pseudo-terminals here");
+    if skip::lacks_terminals() {
         return;
     }
     // Put back, it may be another pseudo-terminal, under the same name.
@@ -252,8 +246,7 @@ fn a_controller_on_a_serial_port_that_only_one_program_has() {
 
 #[test]
 fn a_converter_that_waits_is_measured() {
-    if !std::path::Path::new("/dev/ptmx").exists() {
-        println!("skipped: there are no pseudo-terminals here");
+    if skip::lacks_terminals() {
         return;
     }
     let served = start(At::Pty(None), true, Nanos::from_millis(16), None);

@@ -1,7 +1,7 @@
 //! What the emulated board answers, byte for byte: as gnea/grbl does it (protocol.c, system.c, gcode.c, report.c of 1.1h).
 
-use palpate_drivers::emulate::bench::{EmulatedAxis, Switches};
-use palpate_drivers::emulate::grbl::{Eeprom, Grbl, GrblSettings};
+use palpate_emulators::bench::{EmulatedAxis, Switches};
+use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings};
 use palpate_model::Nanos;
 
 struct Board {

@@ -1,15 +1,15 @@
 //! A session and an emulated board in simulated time, with nothing but a wire between them.
 
 use palpate_drivers::RigEventBody;
-use palpate_drivers::emulate::Plant;
-use palpate_drivers::emulate::bench::{EmulatedAxis, Switches};
-use palpate_drivers::emulate::grbl::{self, Grbl};
 use palpate_drivers::grbl::{
     Connected, GrblOpenError, GrblSettings, HomeSwitch, Session, SharedTrack, connect,
 };
 use palpate_drivers::parts::Track;
 use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
+use palpate_emulators::Plant;
+use palpate_emulators::bench::{EmulatedAxis, Switches};
+use palpate_emulators::grbl::{self, Grbl};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand, RigDescription};
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};

@@ -1,11 +1,11 @@
 //! What goes wrong ends with the axis at rest and in words.
 
-use crate::bench::{Host, slide, to, wired};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::bench::EmulatedAxis;
-use palpate_drivers::emulate::grbl::{self, HomeWiring};
+use super::bench::{Host, slide, to, wired};
 use palpate_drivers::grbl::{GrblSettings, HomeSwitch};
 use palpate_drivers::wire::Dialogue;
+use palpate_emulators::DeviceFault;
+use palpate_emulators::bench::EmulatedAxis;
+use palpate_emulators::grbl::{self, HomeWiring};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, RigCommand};

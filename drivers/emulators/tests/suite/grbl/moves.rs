@@ -1,9 +1,9 @@
 //! Motion: the slide is where the track says it is, at every moment.
 
-use crate::bench::{Host, slide, to, try_connect, wired};
-use palpate_drivers::emulate::grbl;
+use super::bench::{Host, slide, to, try_connect, wired};
 use palpate_drivers::grbl::GrblSettings;
 use palpate_drivers::wire::Link;
+use palpate_emulators::grbl;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, RigCommand};
 

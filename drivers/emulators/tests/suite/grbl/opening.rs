@@ -1,10 +1,10 @@
 //! A board is looked at before it is used, and nothing of it is changed.
 
-use crate::bench::{Shared, slide, try_connect, wired};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::bench::EmulatedAxis;
-use palpate_drivers::emulate::grbl::{self, Eeprom};
+use super::bench::{Shared, slide, try_connect, wired};
 use palpate_drivers::grbl::{GrblOpenError, GrblSettings, HomeSwitch};
+use palpate_emulators::DeviceFault;
+use palpate_emulators::bench::EmulatedAxis;
+use palpate_emulators::grbl::{self, Eeprom};
 use palpate_model::Nanos;
 
 fn board(values: &[(u16, f64)]) -> grbl::GrblSettings {

@@ -1,12 +1,12 @@
 //! Random bytes, to the driver and to the emulated board: no panic, equal answers however they are cut, and both still
 //! work afterwards.
 
-use crate::bench::{Host, slide, wired};
-use palpate_drivers::emulate::DeviceFault;
-use palpate_drivers::emulate::bench::{EmulatedAxis, Switches};
-use palpate_drivers::emulate::grbl::{Grbl, GrblSettings};
+use super::bench::{Host, slide, wired};
 use palpate_drivers::grbl::protocol::{Incoming, Parser};
 use palpate_drivers::wire::Dialogue;
+use palpate_emulators::DeviceFault;
+use palpate_emulators::bench::{EmulatedAxis, Switches};
+use palpate_emulators::grbl::{Grbl, GrblSettings};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;
 use palpate_model::rig::RigCommand;
@@ -141,7 +141,7 @@ fn streams_to_the_session_end_at_rest() {
     for seed in 0..streams().div_ceil(40) {
         let mut random = SplitMix::seeded(seed);
         let mut host = Host::on(wired(GrblSettings::default()), &slide());
-        host.ask(crate::bench::to(40_000, 9.0));
+        host.ask(super::bench::to(40_000, 9.0));
         host.pass(0.2);
         for _ in 0..20 {
             let now = host.now();

@@ -1,20 +1,21 @@
 //! Board and load cell on two pseudo-terminals, as `palpate emulate grbl` puts them there, and the rig of a rig file.
 
-use palpate_drivers::emulate::ScheduledFault;
-use palpate_drivers::emulate::bench::Bench;
-use palpate_drivers::emulate::cell::EmulatedCell;
-use palpate_drivers::emulate::grbl::{Grbl, GrblSettings};
-use palpate_drivers::emulate::hx711::{EmulatedHx711, EmulatedHx711Settings};
-use palpate_drivers::emulate::mark10::{EmulatedGauge, EmulatedGaugeSettings};
-use palpate_drivers::emulate::serve::{Place, ServeOptions, Told, serve};
 use palpate_drivers::rig_file::RigFile;
 use palpate_drivers::sim::SimSettings;
 use palpate_drivers::wire::HostClock;
 use palpate_drivers::{Rig, RigEventBody};
+use palpate_emulators::ScheduledFault;
+use palpate_emulators::bench::Bench;
+use palpate_emulators::cell::EmulatedCell;
+use palpate_emulators::grbl::{Grbl, GrblSettings};
+use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
+use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
 use palpate_model::units::{MmPerS, MmPerS2};
-use std::io::Write;
+use palpate_test_support::skip;
+use palpate_test_support::wait::PATIENCE;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -48,6 +49,9 @@ fn start_at(
     faults: Vec<ScheduledFault>,
     links: Vec<Option<PathBuf>>,
 ) -> Option<Served> {
+    if skip::lacks_terminals() {
+        return None;
+    }
     let stop = Arc::new(AtomicBool::new(false));
     let asked = Arc::clone(&stop);
     let (orders, received) = sync_channel(4);
@@ -71,13 +75,11 @@ fn start_at(
             };
             let mut listener = |said| drop(tell.try_send(said));
             let served = serve(&mut device, &options, &received, &asked, &mut listener);
-            if let Err(err) = served {
-                writeln!(std::io::stderr(), "skipped: {err}").expect("standard error is open");
-            }
+            served.expect("it is served");
         })
         .expect("a thread");
-    let Ok(Told::Ready(places)) = told.recv_timeout(Duration::from_secs(20)) else {
-        return None;
+    let Ok(Told::Ready(places)) = told.recv_timeout(PATIENCE) else {
+        panic!("it did not start");
     };
     Some(Served {
         stop,
@@ -134,7 +136,7 @@ impl Client {
     }
 
     fn until(&mut self, what: &str, is_so: impl Fn(&Self) -> bool) {
-        let end = now() + Duration::from_secs(30);
+        let end = now() + PATIENCE;
         while !is_so(self) {
             assert!(now() < end, "{what} never: {:?}", self.faults);
             self.turn();
@@ -287,7 +289,7 @@ fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() 
         lost.count() == 2
     });
     client.rig.reconnect().expect_err("nothing is there");
-    let end = now() + Duration::from_secs(30);
+    let end = now() + PATIENCE;
     while let Err(err) = client.rig.reconnect() {
         assert!(now() < end, "never again: {err}");
         std::thread::sleep(Duration::from_millis(100));

@@ -2,12 +2,12 @@
 //! against the commanded path, as the engine does.
 
 use palpate_drivers::RigEventBody;
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::mark10::stand::{ConnectedStand, StandSession, StandSettings, connect};
 use palpate_drivers::text::DeviceError;
 use palpate_drivers::wire::{Dialogue, HostClock, Link};
+use palpate_emulators::Device;
+use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{
     AxisStatus, Fault, MoveTo, PathError, PathTracker, Reading, RigCommand, RigDescription,

@@ -1,8 +1,8 @@
 //! What goes wrong in mid-move.
 
 use super::bench::{Host, to};
-use palpate_drivers::emulate::{Device, DeviceFault};
 use palpate_drivers::wire::Dialogue;
+use palpate_emulators::{Device, DeviceFault};
 use palpate_model::rig::{Fault, RigCommand};
 
 #[test]
@@ -70,7 +70,12 @@ fn somebody_moves_it_at_its_panel() {
     let now = host.now();
     host.wire.lock().emulator.receive(now, 0, b"mu");
     host.pass(1.0);
-    assert!(!host.path_errors.is_empty());
+    // It was told to rest 3 mm in, and is where it has gone since, by its own travel.
+    assert!((host.travel() + 3.0).abs() > 0.1, "{}", host.travel());
+    let first = host.path_errors.first().expect("it is noticed");
+    assert_eq!(first.expected_pulses, 300.0);
+    assert!((1..50).contains(&(first.reported_pulses - 300).abs()));
+    assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.02);
 }
 
 #[test]
@@ -205,7 +210,11 @@ fn a_crosshead_that_falls_behind_is_told_where_it_is() {
     let now = host.now();
     host.wire.lock().emulator.receive(now, 0, b"k");
     host.pass(0.5);
-    assert!(!host.path_errors.is_empty());
+    let first = host.path_errors.first().expect("it is noticed");
+    assert!(
+        first.expected_pulses > first.reported_pulses as f64,
+        "{first}"
+    );
     assert!((host.newest().pulses as f64 * 0.01 + host.travel()).abs() < 0.011);
 }
 

@@ -1,8 +1,8 @@
 //! Moves, stops, limits.
 
 use super::bench::{Host, Shared, to};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::mark10::EmulatedStandSettings;
+use palpate_emulators::Device;
+use palpate_emulators::mark10::EmulatedStandSettings;
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, HandAction, Oscillation, RigCommand};
 use palpate_model::units::MmPerS2;

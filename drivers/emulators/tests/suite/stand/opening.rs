@@ -5,13 +5,14 @@
 )]
 
 use super::bench::{Shared, to, usual};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_drivers::mark10::StandRig;
 use palpate_drivers::wire::{Link, pair};
 use palpate_drivers::{Rig, RigEventBody};
+use palpate_emulators::Device;
+use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, RigCommand};
+use palpate_test_support::wait::PATIENCE;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -161,29 +162,25 @@ fn a_rig_moves_stops_and_says_farewell() {
     let begin = Instant::now();
     rig.send(to(50, 1.0));
     let (mut readings, mut is_acknowledged) = (0, false);
-    let mut has_moved = false;
     loop {
         let until = Nanos(begin.elapsed().as_nanos() as u64) + Nanos::from_millis(20);
         match rig.next_event(until).map(|event| event.body) {
             Some(RigEventBody::Reading(reading)) => {
                 readings += 1;
-                let is_moving = reading.status.has(AxisStatus::MOVING);
-                if has_moved && !is_moving {
-                    assert_eq!(reading.pulses, 50);
+                if reading.pulses == 50 && !reading.status.has(AxisStatus::MOVING) {
                     break;
                 }
-                has_moved |= is_moving;
             }
             Some(RigEventBody::Ack(ack)) => is_acknowledged = ack.command == to(50, 1.0),
             Some(RigEventBody::Fault(fault)) => panic!("{fault}"),
             None => {}
         }
         assert!(
-            begin.elapsed() < Duration::from_secs(20),
-            "it never came to rest"
+            begin.elapsed() < PATIENCE,
+            "it never came to rest after {readings} samples"
         );
     }
-    assert!(is_acknowledged && readings > 10, "{readings}");
+    assert!(is_acknowledged, "{readings}");
     assert!(rig.stats().answers > 0);
     let raw = rig.take_raw();
     assert!(raw.iter().any(|piece| piece.is_sent && piece.bytes == b"d"));

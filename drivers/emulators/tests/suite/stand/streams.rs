@@ -1,10 +1,10 @@
 //! Random bytes to both sides: no panic, bounded memory, equal events however they are cut.
 
 use super::bench::{Host, Shared, to, usual};
-use palpate_drivers::emulate::Device;
-use palpate_drivers::emulate::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_drivers::mark10::stand::protocol::{Pair, Status, number, travel};
 use palpate_drivers::text::{Lines, Taken};
+use palpate_emulators::Device;
+use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
 use rand_distr::{Distribution, StandardUniform};
 use rand_pcg::Pcg64;

@@ -5,23 +5,25 @@
 )]
 
 use super::bench::{to, usual};
-use palpate_drivers::emulate::mark10::{EmulatedStand, EmulatedStandSettings};
-use palpate_drivers::emulate::serve::{Place as At, ServeOptions, Told, serve};
 use palpate_drivers::mark10::StandRig;
 use palpate_drivers::wire::{HostClock, Place};
 use palpate_drivers::{Rig, RigEventBody};
+use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
+use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Reading, RigCommand};
+use palpate_test_support::skip;
+use palpate_test_support::wait::PATIENCE;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
-use std::time::{Duration, Instant};
+use std::time::Instant;
 
-/// Takes reports until one is as wanted; half a minute is for a computer with much else to do.
+/// Takes reports until one is as wanted.
 fn until(rig: &mut StandRig, start: Instant, is_so: impl Fn(&RigEventBody) -> bool) -> usize {
     let begin = Instant::now();
     let mut readings = 0;
-    while begin.elapsed() < Duration::from_secs(30) {
+    while begin.elapsed() < PATIENCE {
         let until = Nanos(start.elapsed().as_nanos() as u64) + Nanos::from_millis(20);
         let Some(event) = rig.next_event(until) else {
             continue;
@@ -44,6 +46,9 @@ fn rests_at(pulses: i64) -> impl Fn(&RigEventBody) -> bool {
 
 #[test]
 fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
+    if skip::lacks_terminals() {
+        return;
+    }
     let (_orders, received) = sync_channel(16);
     let (sender, told) = sync_channel(64);
     let stop = Arc::new(AtomicBool::new(false));
@@ -65,9 +70,8 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
         .name("stand".into())
         .spawn(work)
         .expect("a thread");
-    let Ok(Told::Ready(port)) = told.recv_timeout(Duration::from_secs(10)) else {
-        println!("skipped: there are no pseudo-terminals here");
-        return;
+    let Ok(Told::Ready(port)) = told.recv_timeout(PATIENCE) else {
+        panic!("it did not start");
     };
     let place = Place::Serial {
         port,
@@ -83,11 +87,7 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
 
     rig.send(to(100, 1.0));
     let readings = until(&mut rig, start, rests_at(100));
-    println!(
-        "{readings} samples in a move of a second; {:?}",
-        rig.stats()
-    );
-    assert!(readings > 20);
+    println!("{readings} samples in a move; {:?}", rig.stats());
     rig.reconnect().expect("the same stand");
     // It is where it was, by its own travel.
     until(&mut rig, start, rests_at(100));

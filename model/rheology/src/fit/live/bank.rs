@@ -5,7 +5,7 @@
 //! neighbours is what a compiler turns into vector instructions on any machine.
 
 use crate::vectors::wide;
-use crate::viscoelastic::{NEGLIGIBLE, Pieces, psi_all};
+use palpate_model::viscoelastic::{NEGLIGIBLE, Pieces, psi_all};
 
 /// Relaxation times in the bank unless asked otherwise: on the protocol of the thesis twice as many are no
 /// more exact and half as many leave tau off by 2e-6 (`palpate trade`).

@@ -13,21 +13,20 @@ mod residual_blocks;
 mod stencil;
 mod verdict;
 
+use super::design::linear_units;
 use super::noise;
 use super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, PARAMETER_UNITS, TAU};
 use super::report::{Parameter, student_t975};
-use super::system::linear_units;
-use crate::units::{Depth, Newtons, Seconds};
 use bank::{Bank, COLUMNS, Grid, NODES};
 use blocks::Blocks;
 use node::{Solution, Used};
+use palpate_model::estimate::{Identifiability, LiveEstimate};
+use palpate_model::units::{Depth, Newtons, Seconds};
 use path::Path;
-use serde::{Deserialize, Serialize};
 use stencil::{STENCIL_MAX, Stencil};
 use verdict::Blind;
 
 pub use residual_blocks::ResidualBlocks;
-pub use verdict::Verdict;
 
 /// A parameter counts as identified when its standard error is below this share of its value.
 const IDENTIFIED_SHARE: f64 = 0.5;
@@ -50,37 +49,6 @@ pub struct LiveFit {
     /// Time of the newest force that counts.
     measured_until: f64,
     samples: u64,
-}
-
-/// What is known so far.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct LiveEstimate {
-    /// The five of the body, then `f0` and `f_offset`. Without a standard error a parameter is not
-    /// identified yet.
-    pub parameters: Vec<Parameter>,
-    /// Weighted root mean square residual in N.
-    #[serde(alias = "rmse_n")]
-    pub rmse_weighted_n: f64,
-    /// Samples whose force was taken.
-    pub samples: u64,
-    /// One for each parameter, in their order; none in a session recorded before there were any.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub verdicts: Vec<Verdict>,
-}
-
-impl LiveEstimate {
-    /// A parameter by name, if the record so far identifies it.
-    #[must_use]
-    pub fn identified(&self, name: &str) -> Option<&Parameter> {
-        let is_refused = self
-            .verdicts
-            .iter()
-            .any(|verdict| verdict.parameter == name && !verdict.is_identified);
-        self.parameters
-            .iter()
-            .find(|parameter| parameter.name == name)
-            .filter(|parameter| parameter.std_error.is_some() && !is_refused)
-    }
 }
 
 /// The least residual over relaxation times, for one choice of columns.
@@ -227,7 +195,7 @@ impl LiveFit {
             let quantile = student_t975(freedom.min(2.0 / uncertainty));
             let known = reason.is_none().then_some((error, quantile));
             parameters.push(parameter(index, value, known));
-            verdicts.push(Verdict {
+            verdicts.push(Identifiability {
                 parameter: PARAMETER_NAMES[index].into(),
                 is_identified: reason.is_none(),
                 reason,

@@ -5,7 +5,7 @@ use super::LiveFit;
 use super::bank::FILTERED;
 use super::blocks::Mark;
 use super::stencil::{Jet, Stencil};
-use crate::units::Seconds;
+use palpate_model::units::Seconds;
 
 /// Means over equally long blocks of samples, oldest first.
 #[derive(Clone, Debug, PartialEq)]

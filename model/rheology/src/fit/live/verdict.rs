@@ -3,7 +3,6 @@
 use super::super::design::{Columns, legendre_from_powers};
 use super::super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
 use super::super::triangle::Triangle;
-use serde::{Deserialize, Serialize};
 
 /// A scaled design worse than this does not separate its parameters. Real protocols lie between
 /// 20 and 1e4, a single straight ramp above 1e10.
@@ -16,18 +15,6 @@ const ROWS_PIECE_MIN: usize = 4;
 const ROWS_PIECE_MAX: usize = 48;
 /// Parameters judged: six linear ones, then the relaxation time.
 const JUDGED: usize = LINEAR_COUNT + 1;
-
-/// What the record so far says of one parameter.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Verdict {
-    /// Its name, one of [`super::PARAMETER_NAMES`].
-    pub parameter: String,
-    /// Whether path and noise so far determine it.
-    pub is_identified: bool,
-    /// If not, why and what would help, in words.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub reason: Option<String>,
-}
 
 /// What a path cannot show.
 #[derive(Clone, Debug, Default, PartialEq)]

@@ -6,13 +6,11 @@
 //! and the fit is made again; the root of the sum of squared changes is the systematic standard uncertainty
 //! (JCGM 100:2008, section 5.1, with the derivatives as differences). Records read with one calibration move together.
 
-use super::family::{FamilyFit, FamilyOptions, refit_family};
-use super::options::{FitOptions, PARAMETER_NAMES};
+use super::options::FitOptions;
 use super::sample::{FitError, FitSample, Named};
 use super::solve::Fitted;
-use crate::calibration::{ForceUncertainty, Term};
-use crate::families::Family;
-use crate::units::{Depth, Newtons};
+use palpate_model::calibration::{ForceUncertainty, Term};
+use palpate_model::units::{Depth, Newtons};
 use serde::Serialize;
 use std::collections::BTreeMap;
 
@@ -99,12 +97,8 @@ pub struct TermError {
 /// Costs a fit of at most 4000 samples for each independent error, of which there are as many as twice
 /// the weights or more.
 pub fn systematic(record: Traced<'_>, options: &FitOptions) -> Result<Systematic, FitError> {
-    let refit = |records: &[Named<'_>]| {
-        let fitted = Fitted::of(records[0].1, options)?;
-        Ok(fitted.system.physical(&fitted.refined.points[0]).to_vec())
-    };
-    let spread = Spread::of(&[record], refit)?;
-    Ok(spread.told(&[record], &PARAMETER_NAMES, 0))
+    let mut found = systematic_joint(&[record], options, &[])?;
+    Ok(found.pop().unwrap_or_default())
 }
 
 /// The same of a fit of several records together, one for each; [`super::fit_joint`] says what `shared` is.
@@ -113,64 +107,50 @@ pub fn systematic_joint(
     options: &FitOptions,
     shared: &[&str],
 ) -> Result<Vec<Systematic>, FitError> {
-    let refit = |records: &[Named<'_>]| {
-        let fitted = Fitted::joint(records, options, shared)?;
-        let points = fitted.refined.points.iter();
-        Ok(points
-            .flat_map(|point| fitted.system.physical(point))
-            .collect())
-    };
-    let spread = Spread::of(records, refit)?;
-    let each = (0..records.len()).map(|k| k * PARAMETER_NAMES.len());
+    let taken: Vec<Vec<FitSample>> = records.iter().map(|one| thinned(one.samples)).collect();
+    let mut spread = Spread::default();
+    let mut names = Vec::new();
+    let calibrations = records.iter().filter_map(|one| one.calibration);
+    let is_stated = calibrations.into_iter().any(|(_, one)| one.is_stated());
+    if is_stated || records.iter().any(|one| one.compliance.is_some()) {
+        let fitted = Fitted::joint(&named(records, &taken), options, shared)?;
+        names = fitted.value_names();
+        spread = Spread::of(records, &taken, &fitted)?;
+    }
+    let each = 0..records.len();
     Ok(each
-        .map(|first| spread.told(records, &PARAMETER_NAMES, first))
+        .map(|record| spread.told(records, &names, record * names.len()))
         .collect())
 }
 
-/// The same of a fit of any family, one body for all records.
-pub fn systematic_family(
-    fit: &FamilyFit,
-    family: &dyn Family,
-    records: &[Traced<'_>],
-    options: FamilyOptions,
-) -> Result<Systematic, FitError> {
-    let names: Vec<&str> = fit.parameters.iter().map(|one| one.name.as_str()).collect();
-    let spread = Spread::of(records, refit_family(family, options))?;
-    Ok(spread.told(records, &names, 0))
+/// Samples under the names of their records.
+fn named<'a>(records: &[Traced<'a>], samples: &'a [Vec<FitSample>]) -> Vec<Named<'a>> {
+    let names = records.iter().map(|one| one.name);
+    names.zip(samples.iter().map(Vec::as_slice)).collect()
 }
 
 /// Squared changes of everything a fit finds.
+#[derive(Default)]
 struct Spread {
     terms: BTreeMap<Term, Vec<f64>>,
     compliance: Option<Vec<f64>>,
 }
 
 impl Spread {
-    /// Of what `refit` finds in records, in an order of its own.
+    /// Of what is found in records, of which these samples were `taken` and `fitted`.
     fn of(
         records: &[Traced<'_>],
-        mut refit: impl FnMut(&[Named<'_>]) -> Result<Vec<f64>, FitError>,
+        taken: &[Vec<FitSample>],
+        fitted: &Fitted<'_>,
     ) -> Result<Self, FitError> {
-        let taken: Vec<Vec<FitSample>> = records.iter().map(|one| thinned(one.samples)).collect();
-        let names = records.iter().map(|one| one.name);
-        let mut values = |sets: &[Vec<FitSample>]| {
-            let borrowed: Vec<_> = names.clone().zip(sets.iter().map(Vec::as_slice)).collect();
-            refit(&borrowed)
-        };
-        let mut spread = Self {
-            terms: BTreeMap::new(),
-            compliance: None,
-        };
+        let mut spread = Self::default();
         let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
         let compliances = distinct(records.iter().filter_map(|one| one.compliance));
-        if calibrations.iter().all(|(_, one)| !one.is_stated()) && compliances.is_empty() {
-            return Ok(spread);
-        }
-        let before = values(&taken)?;
-        let mut add = |sums: &mut Vec<f64>, moved: &[Vec<FitSample>]| {
+        let before = fitted.values();
+        let add = |sums: &mut Vec<f64>, moved: &[Vec<FitSample>]| {
             sums.resize(before.len(), 0.0);
             if moved != taken {
-                let after = values(moved)?;
+                let after = fitted.again(&named(records, moved))?.values();
                 for (sum, (after, before)) in sums.iter_mut().zip(after.iter().zip(&before)) {
                     *sum += (after - before).powi(2);
                 }
@@ -190,7 +170,7 @@ impl Spread {
                 };
                 let moved = moved(
                     records,
-                    &taken,
+                    taken,
                     |one| one.calibration == Some(*own),
                     |samples| samples.iter().map(move_one).collect(),
                 );
@@ -200,7 +180,7 @@ impl Spread {
         for own in &compliances {
             let moved = moved(
                 records,
-                &taken,
+                taken,
                 |one| one.compliance == Some(*own),
                 |samples| bent(samples, own.1),
             );
@@ -210,7 +190,7 @@ impl Spread {
     }
 
     /// The values from `first` on, by name.
-    fn told(&self, records: &[Traced<'_>], names: &[&str], first: usize) -> Systematic {
+    fn told(&self, records: &[Traced<'_>], names: &[String], first: usize) -> Systematic {
         let calibrations = distinct(records.iter().filter_map(|one| one.calibration));
         let compliances = distinct(records.iter().filter_map(|one| one.compliance));
         let is_told = self.compliance.is_some() || !self.terms.is_empty();
@@ -234,7 +214,7 @@ impl Spread {
                     let compliance = self.compliance.as_ref().map(|sums| sums[k]);
                     let all = self.terms.values().map(|sums| sums[k]).chain(compliance);
                     SystematicError {
-                        name: (*name).to_owned(),
+                        name: name.clone(),
                         error: all.sum::<f64>().sqrt(),
                         terms: self
                             .terms

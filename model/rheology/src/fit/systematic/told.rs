@@ -1,9 +1,8 @@
 //! Systematic errors in a sentence, and beside the statistical ones of a report.
 
-use super::super::family::FamilyFit;
 use super::super::report::{FitReport, JointReport};
 use super::{Stated, Systematic};
-use crate::calibration::Term;
+use palpate_model::calibration::Term;
 
 impl Stated {
     /// Its own part of a sentence.
@@ -113,18 +112,6 @@ impl JointReport {
     pub fn with_systematic(mut self, systematic: &[Systematic]) -> Self {
         for (record, own) in self.records.iter_mut().zip(systematic) {
             record.report.add_systematic(own);
-        }
-        self
-    }
-}
-
-impl FamilyFit {
-    /// This fit with the systematic errors beside the statistical ones.
-    #[must_use]
-    pub fn with_systematic(mut self, systematic: &Systematic) -> Self {
-        let known = self.parameters.iter_mut();
-        for parameter in known.filter(|one| one.std_error.is_some()) {
-            parameter.systematic_error = systematic.error(&parameter.name);
         }
         self
     }

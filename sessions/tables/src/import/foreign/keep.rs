@@ -1,14 +1,14 @@
 //! A session made of a part of a foreign file, the file kept beside its log.
 
 use super::{ForeignPart, Sample};
-use crate::about::Labels;
-use crate::folder::{FolderError, SessionFolder, check_free_space};
-use crate::imported::{Imported, ORIGINAL_FOLDER};
-use crate::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
-use crate::manifest::{IMPORTED_TICKS_PER_S, Manifest, RECORD_VERSION};
-use crate::record::{EndRecord, Row};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
+use palpate_sessions::about::Labels;
+use palpate_sessions::folder::{FolderError, SessionFolder, check_free_space};
+use palpate_sessions::imported::{Imported, ORIGINAL_FOLDER};
+use palpate_sessions::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
+use palpate_sessions::manifest::{IMPORTED_TICKS_PER_S, Manifest, RECORD_VERSION};
+use palpate_sessions::record::{EndRecord, Row};
 use serde_json::Value;
 use std::fs::{self, File};
 use std::io::{self, Write};

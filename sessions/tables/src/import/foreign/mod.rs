@@ -25,8 +25,8 @@ pub use samples::Sample;
 pub use told::{ColumnChoice, Fault, Format, Told, UnitChoice, ZeroChoice};
 
 use super::torn;
-use crate::imported::Imported;
 use columns::Unknown;
+use palpate_sessions::imported::Imported;
 use rows::Rows;
 use said::Said;
 use std::io;

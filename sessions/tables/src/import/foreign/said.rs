@@ -1,6 +1,6 @@
 //! What was taken for what, to be shown and kept.
 
-use crate::imported::Reading;
+use palpate_sessions::imported::Reading;
 
 /// How a part was read, in the order it was found out.
 #[derive(Clone, Debug, Default)]

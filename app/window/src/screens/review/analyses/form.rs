@@ -1,14 +1,14 @@
 //! The analysis to be made, as typed.
 
-use crate::report::dossier::Wanted;
+use crate::widgets::model_choice::ModelChoice;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::analyses::{Deed, FitWanted, Known, OWN_MODEL};
 use eframe::egui::{ComboBox, Ui, vec2};
-use palpate_model::families;
+use palpate_analysis::analyses::{Deed, FitWanted, Known};
+use palpate_analysis::report::dossier::Wanted;
 use std::path::PathBuf;
 
 /// What can be made.
@@ -32,9 +32,7 @@ impl Kind {
 pub(super) struct Form {
     kind: Kind,
     name: String,
-    /// Keys of families, after the own model.
-    families: Vec<String>,
-    family: Option<String>,
+    model: ModelChoice,
     with_unload: bool,
     with_profile: bool,
     is_together: bool,
@@ -51,8 +49,7 @@ impl Default for Form {
         Self {
             kind: Kind::default(),
             name: String::new(),
-            families: families::all().iter().map(|one| one.key()).collect(),
-            family: None,
+            model: ModelChoice::default(),
             with_unload: false,
             with_profile: false,
             is_together: false,
@@ -116,34 +113,16 @@ impl Form {
     }
 
     fn fit_ui(&mut self, ui: &mut Ui, others: usize) {
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "model");
-            let chosen = self.family.as_deref().unwrap_or(OWN_MODEL);
-            ComboBox::from_id_salt("analysis_model")
-                .selected_text(chosen)
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    ui.selectable_value(&mut self.family, None, OWN_MODEL);
-                    for key in &self.families {
-                        ui.selectable_value(&mut self.family, Some(key.clone()), key);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("model");
-        });
-        match self.family {
-            Some(_) => tick_box(
+        self.model.ui(ui, "model");
+        if self.model.family.is_some() {
+            tick_box(
                 ui,
                 &mut self.with_unload,
                 "the way back too, where recorded",
-            ),
-            None if others == 0 || !self.is_together => {
-                tick_box(ui, &mut self.with_profile, "profile intervals too")
-            }
-            None => ui.label("without profile intervals"),
-        };
-        if others > 0 && self.family.is_none() {
+            );
+        }
+        tick_box(ui, &mut self.with_profile, "profile intervals too");
+        if others > 0 {
             let words = match others {
                 1 => "one body for this and the other shown".to_owned(),
                 _ => format!("one body for this and the {others} others shown"),
@@ -192,14 +171,14 @@ impl Form {
                 "there is an analysis '{name}' already, and a name is never used twice; choose another"
             ));
         }
-        let is_together = self.is_together && self.family.is_none() && !others.is_empty();
+        let is_together = self.is_together && !others.is_empty();
         match self.kind {
             Kind::Fit => Ok(Deed::Fit {
                 name,
                 how: FitWanted {
-                    family: self.family.clone(),
-                    with_unload: self.with_unload && self.family.is_some(),
-                    with_profile: self.with_profile && self.family.is_none() && !is_together,
+                    family: self.model.family.clone(),
+                    with_unload: self.with_unload && self.model.family.is_some(),
+                    with_profile: self.with_profile,
                     based_on: read_by.map(str::to_owned),
                     together_with: match is_together {
                         true => others.to_vec(),

@@ -2,15 +2,15 @@
 
 use super::super::Looked;
 use super::Own;
-use crate::report::said;
-use crate::report::{kept, text};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::fact_ui;
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
-use crate::workers::analyses::{Deed, Known};
 use eframe::egui::{Label, RichText, Ui, vec2};
+use palpate_analysis::analyses::{Deed, Known};
+use palpate_analysis::report::said;
+use palpate_analysis::report::{kept, text};
 use palpate_sessions::analyses::{Analysed, Analysis};
 
 /// How the session is read without any analysis.
@@ -81,7 +81,7 @@ fn found_ui(ui: &mut Ui, one: &Analysis, own: Option<&Own>) -> bool {
     if let Some(profile) = results["profile"].as_array() {
         quiet_ui(ui, "95 % from the profile likelihood");
         let number = |value: &serde_json::Value| match value.as_f64() {
-            Some(value) => crate::widgets::uncertain::plain(value),
+            Some(value) => palpate_figures::uncertain::plain(value),
             None => "open".to_owned(),
         };
         for one in profile {

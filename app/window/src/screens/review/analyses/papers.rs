@@ -1,8 +1,6 @@
 //! Report and figure of what is in front, as new files.
 
 use super::super::Looked;
-use crate::report::dossier::{Figure, Wanted, name_of};
-use crate::report::figures::Window;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
@@ -10,10 +8,12 @@ use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::task_bar::{Pressed, task_ui};
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::analyses::{Done, Paper, paper};
 use crate::workers::path_dialog::{SaveAs, SaveDialog};
 use crate::workers::task::Task;
 use eframe::egui::{ComboBox, Ui};
+use palpate_analysis::analyses::{Done, Paper, paper};
+use palpate_analysis::report::dossier::{Figure, Wanted, name_of};
+use palpate_analysis::report::figures::Window;
 use std::path::PathBuf;
 
 /// Which field a dialog fills.

@@ -5,8 +5,8 @@ use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
-use crate::workers::analyses::{Deed, Known};
 use eframe::egui::{ComboBox, Ui, vec2};
+use palpate_analysis::analyses::{Deed, Known};
 use palpate_model::units::Position;
 use palpate_sessions::edits::Verdict;
 

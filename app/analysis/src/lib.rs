@@ -1,0 +1,36 @@
+//! What is done with recorded sessions, once for every front end: read, fit, compare, report, export.
+//!
+//! A use case takes a typed request and gives a typed result or error; it names no command-line flag
+//! and no button, prints nothing and draws in no window. It never commands a rig.
+//!
+//! Start reading at [`source`], which makes samples of a session or a table, and [`fit`].
+
+pub mod analysed;
+pub mod analyses;
+pub mod calibrations;
+pub mod compliance;
+pub mod cycles;
+pub mod daily;
+pub mod edited;
+pub mod edits;
+pub mod exports;
+pub mod extremes;
+pub mod fidelity;
+pub mod find;
+pub mod fit;
+pub mod follow_session;
+pub mod haptics;
+pub mod haptics_tape;
+pub mod imports;
+pub mod margin;
+pub mod opening;
+pub mod origin;
+pub mod pool;
+pub mod progress;
+pub mod recorded;
+pub mod report;
+pub mod scene;
+pub mod scene_bench;
+pub mod select;
+pub mod source;
+pub mod trade;

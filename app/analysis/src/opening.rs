@@ -1,0 +1,45 @@
+//! What a window opens with: the front end that parsed the request need not know any window.
+
+use palpate_drivers::Rig;
+use palpate_model::calibration::Calibration;
+use palpate_model::rig::Limits;
+use palpate_model::units::Newtons;
+use palpate_protocols::replay::Player;
+use palpate_protocols::runner::TimeScale;
+
+/// A rig to work on.
+pub struct WorkbenchRequest {
+    /// The rig, opened.
+    pub rig: Box<dyn Rig>,
+    /// Volts to newtons of its load cell.
+    pub calibration: Calibration,
+    /// Interlock thresholds.
+    pub limits: Limits,
+    /// What must be acknowledged before any run, such as a daily check that failed.
+    pub to_acknowledge: Vec<String>,
+    /// Pace of a simulated rig.
+    pub scale: TimeScale,
+}
+
+/// A recorded session to show moment by moment.
+pub struct PlaybackRequest {
+    /// The session, at its beginning.
+    pub player: Player,
+    /// What its forces were read with.
+    pub calibration: Calibration,
+    /// The force at which its interlock trips.
+    pub force_max: Newtons,
+    /// What it is called in the head of the window.
+    pub name: String,
+    /// Pace at which it begins.
+    pub scale: TimeScale,
+}
+
+/// What opens windows. Each call returns when its window has closed.
+pub trait Windows {
+    /// The workbench.
+    fn workbench(&self, request: WorkbenchRequest) -> Result<(), String>;
+
+    /// A recorded session.
+    fn playback(&self, request: PlaybackRequest) -> Result<(), String>;
+}

@@ -1,0 +1,168 @@
+//! A fit as machines read it: what `palpate fit --json` prints and what an analysis keeps.
+
+use crate::compliance::Correction;
+use crate::fit::Intervals;
+use palpate_model::signal::work;
+use palpate_model::units::Newtons;
+use palpate_rheology::families::Family;
+use palpate_rheology::fit::{FitReport, FitSample, JointReport, Systematic};
+use serde::Serialize;
+
+/// The modelled force along a record, and what it says beside the measured one.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct Overlay {
+    /// At every sample.
+    #[serde(skip)]
+    pub forces: Vec<Newtons>,
+    /// The largest residual in N.
+    pub worst_n: f64,
+    /// Energy in N*mm put into the tissue along the path, as measured; over a closed loop what was lost.
+    pub work_measured_n_mm: f64,
+    /// The same of the modelled force.
+    pub work_fitted_n_mm: f64,
+}
+
+impl Overlay {
+    /// Of a report along the samples that were fitted; energies over those whose force counts.
+    #[must_use]
+    pub fn of(report: &FitReport, samples: &[FitSample]) -> Self {
+        let forces = report.predict(samples);
+        let pairs = || samples.iter().zip(&forces);
+        let known = || pairs().filter(|(one, _)| one.is_measured());
+        let off = known().map(|(one, fit)| (one.force.0 - fit.0).abs());
+        Self {
+            worst_n: off.fold(0.0, f64::max),
+            work_measured_n_mm: work(known().map(|(one, _)| (one.depth, one.force))),
+            work_fitted_n_mm: work(known().map(|(one, fit)| (one.depth, *fit))),
+            forces,
+        }
+    }
+}
+
+/// What a family is, in words.
+#[derive(Serialize)]
+struct Words {
+    equation: &'static str,
+    cannot_represent: &'static str,
+}
+
+impl Words {
+    fn of(family: &dyn Family) -> Self {
+        Self {
+            equation: family.equation(),
+            cannot_represent: family.cannot_represent(),
+        }
+    }
+}
+
+/// A fit of one record.
+#[derive(Serialize)]
+pub struct FitObject<'a> {
+    #[serde(flatten)]
+    report: &'a FitReport,
+    #[serde(flatten)]
+    words: Words,
+    #[serde(flatten)]
+    overlay: &'a Overlay,
+    #[serde(flatten)]
+    intervals: &'a Intervals,
+    /// What calibration and compliance add; absent for tables and where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<&'a Systematic>,
+    /// What the rig's compliance did to the depths, or would; absent where none is known.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compliance: Option<&'a Correction>,
+    /// The fit alone, without reading.
+    seconds: f64,
+}
+
+/// What is told of a fit beside its report.
+#[derive(Clone, Copy)]
+pub struct Beside<'a> {
+    pub overlay: &'a Overlay,
+    pub intervals: &'a Intervals,
+    pub systematic: Option<&'a Systematic>,
+    pub compliance: Option<&'a Correction>,
+}
+
+impl<'a> FitObject<'a> {
+    pub fn of(
+        family: &dyn Family,
+        report: &'a FitReport,
+        beside: Beside<'a>,
+        seconds: f64,
+    ) -> Self {
+        Self {
+            report,
+            words: Words::of(family),
+            overlay: beside.overlay,
+            intervals: beside.intervals,
+            systematic: beside.systematic,
+            compliance: beside.compliance,
+            seconds,
+        }
+    }
+}
+
+/// A fit of several records together.
+#[derive(Serialize)]
+pub struct JointObject<'a> {
+    family: String,
+    #[serde(flatten)]
+    words: Words,
+    shared: &'a [String],
+    records: Vec<RecordObject<'a>>,
+    samples: usize,
+    free: usize,
+    rmse_n: f64,
+    effective_samples: f64,
+    /// What the rig's compliance did to the depths of each record, or would; null where none is known.
+    compliances: Vec<Option<&'a Correction>>,
+    /// What calibrations and compliances add, for each record; absent for tables and where it was not asked for.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<&'a [Systematic]>,
+    seconds: f64,
+}
+
+#[derive(Serialize)]
+struct RecordObject<'a> {
+    record: &'a str,
+    report: &'a FitReport,
+    #[serde(flatten)]
+    overlay: &'a Overlay,
+    #[serde(flatten)]
+    intervals: &'a Intervals,
+}
+
+impl<'a> JointObject<'a> {
+    /// `beside` has one for each record.
+    pub fn of(
+        family: &dyn Family,
+        report: &'a JointReport,
+        beside: &[Beside<'a>],
+        systematic: Option<&'a [Systematic]>,
+        seconds: f64,
+    ) -> Self {
+        let records = report.records.iter().zip(beside);
+        Self {
+            family: family.key(),
+            words: Words::of(family),
+            shared: &report.shared,
+            records: records
+                .map(|(named, beside)| RecordObject {
+                    record: &named.record,
+                    report: &named.report,
+                    overlay: beside.overlay,
+                    intervals: beside.intervals,
+                })
+                .collect(),
+            samples: report.samples,
+            free: report.free,
+            rmse_n: report.rmse_n,
+            effective_samples: report.effective_samples,
+            compliances: beside.iter().map(|one| one.compliance).collect(),
+            systematic,
+            seconds,
+        }
+    }
+}

@@ -1,0 +1,13 @@
+//! Figures and pages as data, and their painters for files: SVG, PNG, HTML.
+//!
+//! What a figure shows is decided above; here is how it looks. No window library is needed, so a
+//! computer without a display draws the same figures.
+//!
+//! Start reading at [`drawing`] for what a figure is made of, [`tokens`] for every colour.
+
+pub mod drawing;
+pub mod page;
+pub mod raster;
+pub mod thin;
+pub mod tokens;
+pub mod uncertain;

@@ -1,0 +1,148 @@
+//! What other programs do to files of palpate while it uses them, or after.
+
+use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use palpate_tables::lake;
+use std::fs;
+use std::process::{Command, Stdio};
+use std::time::Duration;
+
+/// Waits for something that comes at any speed of the computer.
+fn wait(what: &str, mut is_so: impl FnMut() -> bool) {
+    for _ in 0..6000 {
+        if is_so() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("a minute without {what}");
+}
+
+#[test]
+fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let child = Command::new(env!("CARGO_BIN_EXE_palpate"))
+        .args(["run", "ramp-hold", "--out", "emptied", "--json"])
+        .current_dir(at)
+        .env("PALPATE_HOME", at.join("library"))
+        .stdin(Stdio::null())
+        .stdout(Stdio::piped())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let log = at.join("emptied/000.mcap");
+    wait("a log that grows", || {
+        fs::metadata(&log).is_ok_and(|file| file.len() > 100_000)
+    });
+    // Whoever wants it in a lake is told to wait.
+    let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
+    assert_eq!(export.status.code(), Some(1));
+    assert!(
+        stderr(&export).contains("is being recorded"),
+        "{}",
+        stderr(&export)
+    );
+    assert!(lake::sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
+    fs::write(&log, "").unwrap();
+    let done = child.wait_with_output().unwrap();
+    assert_eq!(done.status.code(), Some(1), "{}", stderr(&done));
+    let report: serde_json::Value =
+        serde_json::from_str(stdout(&done).lines().next().unwrap()).unwrap();
+    assert_ne!(report["ending"], "finish", "{report}");
+    assert_ne!(report["verdict"], "valid", "{report}");
+    assert!(report["samples_lost"].as_u64().unwrap() > 0, "{report}");
+    let said = stderr(&done);
+    for words in [
+        "000.mcap",
+        "another program",
+        "are missing",
+        "palpate recover",
+    ] {
+        assert!(said.contains(words), "{words}: {said}");
+    }
+    // What came after is kept, and can be recovered.
+    assert_eq!(palpate(at, &["doctor", "emptied"]).status.code(), Some(1));
+    succeeded(&palpate(at, &["recover", "emptied"]));
+    let info = json(&palpate(at, &["info", "emptied.recovered", "--json"]));
+    assert_eq!(info["samples"], report["samples"]);
+    assert_eq!(
+        (&info["is_complete"], &info["verdict"]),
+        (&true.into(), &report["verdict"])
+    );
+}
+
+#[test]
+fn a_review_that_was_cut_off_is_told_by_every_command() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(
+        at,
+        "library/sessions/one",
+        &["--specimen", "gel"],
+    ));
+    let one = "library/sessions/one";
+    succeeded(&palpate(
+        at,
+        &["review", one, "--reject", "--reason", "hair on the probe"],
+    ));
+    let edits = at.join(one).join("edits.jsonl");
+    let text = fs::read_to_string(&edits).unwrap();
+    let lines: Vec<&str> = text.split_inclusive('\n').collect();
+    fs::write(&edits, lines[..lines.len() - 1].concat()).unwrap();
+    for (words, code) in [
+        (vec!["doctor", one], 1),
+        (vec!["info", one], 1),
+        (vec!["tag", one, "+good"], 1),
+        (vec!["fit", one], 1),
+        (vec!["find"], 0),
+        (vec!["history", "specimen", "gel"], 0),
+    ] {
+        let output = palpate(at, &words);
+        assert_eq!(
+            output.status.code(),
+            Some(code),
+            "{words:?}: {}",
+            stderr(&output)
+        );
+        let said = stdout(&output) + &stderr(&output);
+        assert!(
+            said.contains("edits.jsonl") && said.contains("1 of 2"),
+            "{words:?}: {said}"
+        );
+    }
+    let history = json(&palpate(at, &["history", "specimen", "gel", "--json"]));
+    assert_eq!(history["events"].as_array().unwrap().len(), 1);
+    assert_eq!(history["remarks"].as_array().unwrap().len(), 1);
+}
+
+#[test]
+fn what_a_killed_export_left_is_named_by_doctor_and_swept_by_the_next() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    succeeded(&short_run(at, "demo", &[]));
+    let names = [
+        "tables/.demo.csv.aBcDeF.palpate.tmp",
+        ".demo.csv.123456.palpate.tmp",
+    ];
+    fs::create_dir(at.join("tables")).unwrap();
+    names
+        .iter()
+        .for_each(|name| fs::write(at.join(name), "half").unwrap());
+    let named = || {
+        let visit = json(&palpate(at, &["doctor", "--json"]));
+        let left = visit["leftovers"].as_array().unwrap().clone();
+        left.iter()
+            .map(|path| path.as_str().unwrap().trim_start_matches("./").to_owned())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(named(), [names[1]]);
+    assert!(stdout(&palpate(at, &["doctor", "tables"])).contains(names[0]));
+    for (to, left) in [("tables", vec![names[1]]), (".", vec![])] {
+        succeeded(&palpate(
+            at,
+            &["export", "demo", "--format", "csv", "--to", to],
+        ));
+        assert_eq!(named(), left, "{to}");
+        assert!(!at.join(names[0]).exists());
+    }
+}

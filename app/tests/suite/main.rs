@@ -1,0 +1,29 @@
+//! The command line as a user meets it, and the window once.
+#![cfg(test)]
+
+mod altered;
+mod analyse;
+mod calibration;
+mod catalog;
+mod compliance;
+mod disk;
+mod doctor;
+mod emulate;
+mod extremes;
+mod fit;
+mod haptics;
+mod import;
+mod lake;
+mod plan;
+mod programme;
+mod protocol;
+mod rate;
+mod records;
+mod report;
+mod scene;
+mod select;
+mod support;
+mod trade;
+mod whole_commands;
+mod window;
+mod wired;

@@ -1,0 +1,19 @@
+//! The window of the workbench.
+//!
+//! This crate draws snapshots and sends requests. It never touches hardware except through the
+//! runner, holds no experiment logic and makes no analysis of its own.
+//!
+//! Start reading at [`app`] for what a frame does, [`screens`] for what it shows.
+
+pub mod app;
+pub mod command;
+pub mod playback;
+pub mod plots;
+pub mod scene;
+pub mod screens;
+pub mod settings;
+pub mod shell;
+pub mod theme;
+pub mod widgets;
+pub mod window;
+pub mod workers;

@@ -1,0 +1,97 @@
+//! The sensors of a simulated rig beside its load cell: a bath that is slowly heated, and a switch somebody closes.
+
+use super::amounts::{SimBath, SimInput};
+use super::settings::SimSettings;
+use palpate_model::Nanos;
+use palpate_model::rig::{RigSensors, SensorReading};
+
+/// Temperature of the bath as the rig is switched on, in °C: the room's.
+const ROOM_CELSIUS: f64 = 21.0;
+
+/// Time constant of the bath in s: a litre under a heater of some hundred watts.
+const HEATING_SECS: f64 = 120.0;
+
+/// Values that the thermometer tells apart within a degree.
+const VALUES_PER_DEGREE: f64 = 20.0;
+
+/// A sensor is told when it has changed, and once in this time in any case.
+const TELL_EVERY: Nanos = Nanos::from_millis(1000);
+
+/// What is told of them, by the rig's time.
+#[derive(Clone, Debug)]
+pub struct Sensors {
+    bath: SimBath,
+    input: SimInput,
+    told: Vec<(Nanos, SensorReading)>,
+}
+
+impl Sensors {
+    /// The sensors that settings ask for.
+    pub fn new(settings: &SimSettings) -> Self {
+        Self {
+            bath: settings.bath,
+            input: settings.input,
+            told: Vec::new(),
+        }
+    }
+
+    /// Which there are.
+    pub fn described(settings: &SimSettings) -> RigSensors {
+        RigSensors {
+            digital_inputs: settings.input.seconds().map_or(0, |_| 1),
+            has_bath: settings.bath.celsius().is_some(),
+        }
+    }
+
+    /// What is new at a time since the rig was switched on.
+    pub fn take(&mut self, now: Nanos) -> Vec<SensorReading> {
+        let secs = now.seconds().0;
+        let bath = self.bath.celsius().map(|end| {
+            let celsius = end - (end - ROOM_CELSIUS) * (-secs / HEATING_SECS).exp();
+            let celsius = (celsius * VALUES_PER_DEGREE).round() / VALUES_PER_DEGREE;
+            SensorReading::Bath { celsius }
+        });
+        let input = self.input.seconds().map(|closes| {
+            let is_high = secs >= closes;
+            SensorReading::DigitalInput { number: 1, is_high }
+        });
+        let mut news = Vec::new();
+        for (index, reading) in bath.into_iter().chain(input).enumerate() {
+            match self.told.get_mut(index) {
+                Some((at, told)) if *told == reading && now.since(*at) < TELL_EVERY => continue,
+                Some(told) => *told = (now, reading),
+                None => self.told.push((now, reading)),
+            }
+            news.push(reading);
+        }
+        news
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bath_warms_up_and_switch_closes_when_asked() {
+        let settings = SimSettings {
+            bath: "37".parse().unwrap(),
+            input: "90".parse().unwrap(),
+            ..SimSettings::default()
+        };
+        let mut sensors = Sensors::new(&settings);
+        let at = |secs: u64| Nanos::from_millis(1000 * secs);
+        let high = |is_high| SensorReading::DigitalInput { number: 1, is_high };
+        let bath = |celsius| SensorReading::Bath { celsius };
+        assert_eq!(sensors.take(at(0)), [bath(21.0), high(false)]);
+        assert_eq!(sensors.take(Nanos::from_millis(1)), []);
+        // By hand: 37 - 16 / e = 31.114.
+        let [SensorReading::Bath { celsius }, switch] = sensors.take(at(120))[..] else {
+            panic!("both are told")
+        };
+        assert!((celsius - 31.1).abs() < 1e-9, "{celsius}");
+        assert_eq!(switch, high(true));
+        let mut usual = Sensors::new(&SimSettings::default());
+        assert_eq!(usual.take(at(5)), []);
+    }
+}

@@ -1,0 +1,4 @@
+//! The simulated rig through the crate's public door.
+#![cfg(test)]
+
+mod sim;

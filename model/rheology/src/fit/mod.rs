@@ -1,0 +1,44 @@
+//! Identification of force models.
+//!
+//! Start at [`fit()`]. The method is variable projection: for given outer parameters (relaxation times, curvatures) a
+//! family of models is linear in everything else, so the fit is a search over a few numbers with a small least-squares
+//! problem inside. A family supplies columns ([`columns`]); all else is the same for all.
+
+mod block_sums;
+mod bootstrap;
+mod columns;
+mod design;
+mod design_blocks;
+mod identify;
+mod live;
+mod noise;
+mod nonnegative;
+mod options;
+mod parameters;
+mod passes;
+mod predict;
+mod profile;
+mod record;
+mod refine;
+mod report;
+mod sample;
+mod search;
+mod sentences;
+mod solve;
+mod system;
+mod systematic;
+mod thin;
+mod triangle;
+mod uncertainty;
+
+pub use bootstrap::{Bootstrap, BootstrapInterval};
+pub use live::{LiveFit, ResidualBlocks};
+pub use options::{FitOptions, PARAMETER_NAMES, PARAMETER_UNITS};
+pub use predict::{Predicted, predict};
+pub use profile::ProfileInterval;
+pub use report::{FitReport, JointReport, NamedReport, NoiseFound, Parameter};
+pub use sample::{FitError, FitSample};
+pub use solve::{Fitted, fit, fit_body, fit_coefficients, fit_joint};
+pub use systematic::{
+    Systematic, SystematicError, TermError, Traced, systematic, systematic_joint,
+};

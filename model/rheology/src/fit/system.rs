@@ -1,0 +1,340 @@
+//! One or several records with a family and one choice of free and shared parameters, as a linear problem for
+//! any given outer parameters and contact positions (variable projection: Golub & Pereyra, SIAM J.
+//! Numer. Anal. 10 (1973) 413-432).
+//!
+//! Every record is triangularised by itself with all its columns; the joint problem stacks those
+//! small triangles with its columns mapped to the joint unknowns. So one record is the joint fit
+//! of one, and fixing or sharing a parameter never touches the samples again.
+
+use super::columns::{Point, Source};
+use super::options::{FitOptions, Known, Layout};
+use super::parameters::union;
+use super::record::{Record, check};
+use super::sample::{FitError, FitSample, Named};
+use crate::families::Family;
+use std::sync::Arc;
+
+/// One number the fit finds: a parameter of one record, or of all.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Unknown {
+    pub parameter: usize,
+    pub record: Option<usize>,
+}
+
+impl Unknown {
+    pub fn is_of(self, record: usize) -> bool {
+        self.record.is_none_or(|own| own == record)
+    }
+}
+
+/// Where the outer parameters of a record may go.
+#[derive(Clone, Debug)]
+pub(super) struct Ranges {
+    /// Of each outer parameter of the family, in its search coordinate.
+    pub outers: Vec<(f64, f64)>,
+    /// Scaled.
+    pub contact: (f64, f64),
+}
+
+/// Which rows a pass takes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(super) enum Rows {
+    /// Blocks of samples, for searching.
+    Thin,
+    /// Every sample.
+    All,
+}
+
+/// Records, scales, and what is free.
+#[derive(Clone, Debug)]
+pub(super) struct System<'a> {
+    pub records: Vec<Record<'a>>,
+    pub source: Source,
+    pub(super) options: FitOptions,
+    /// Depth in mm that counts as one, in every record.
+    pub depth_mm: f64,
+    pub(super) sigma_scale: f64,
+    /// Values in physical units, by record and parameter.
+    pub(super) fixed: Vec<Vec<Option<f64>>>,
+    pub(super) shared: Vec<bool>,
+    /// Linear unknowns, then outer ones.
+    pub unknowns: Vec<Unknown>,
+    pub linear: usize,
+    pub ranges: Vec<Ranges>,
+}
+
+impl<'a> System<'a> {
+    pub fn new(
+        records: &[Named<'a>],
+        options: &FitOptions,
+        shared: Vec<bool>,
+    ) -> Result<Self, FitError> {
+        let several = records.len() > 1;
+        let layout = options.layout();
+        let named = |name: &str, reason: FitError| match several {
+            true => FitError::InRecord {
+                record: name.to_owned(),
+                reason: Box::new(reason),
+            },
+            false => reason,
+        };
+        let fixed = options.fixed().to_vec();
+        let is_own = |k: &usize| fixed[*k].is_none() && !(several && shared[*k]);
+        let own = (0..layout.count()).filter(is_own).count();
+        let mut depth_mm = 0.0f64;
+        for (name, samples) in records {
+            let depth = check(samples, own, fixed[layout.contact()]);
+            depth_mm = depth_mm.max(depth.map_err(|reason| named(name, reason))?);
+        }
+        let sigma_scale = records
+            .iter()
+            .flat_map(|(_, samples)| samples.iter())
+            .find(|sample| sample.is_measured())
+            .map_or(1.0, |sample| sample.sigma.0);
+        let source = Source::new(options.shared_family(), options.is_at_rest());
+        let mut system = Self {
+            records: records
+                .iter()
+                .map(|&(name, samples)| Record::new(name, samples, depth_mm, sigma_scale))
+                .collect(),
+            source,
+            options: options.clone(),
+            depth_mm,
+            sigma_scale,
+            fixed: vec![fixed; records.len()],
+            shared,
+            unknowns: Vec::new(),
+            linear: 0,
+            ranges: Vec::new(),
+        };
+        system.ranges = (0..records.len()).map(|k| system.range(k)).collect();
+        for k in (0..layout.outers).filter(|&k| several && system.shared[k]) {
+            // One relaxation time, one range: what any of the records can show.
+            let all = union(system.ranges.iter().map(|one| one.outers[k]));
+            system.ranges.iter_mut().for_each(|one| one.outers[k] = all);
+        }
+        let system = system.arranged();
+        let measured = system.measured();
+        if measured < system.unknowns.len() {
+            return Err(FitError::TooFewSamples {
+                samples: measured,
+                parameters: system.unknowns.len(),
+            });
+        }
+        system.check_return()?;
+        Ok(system)
+    }
+
+    pub fn layout(&self) -> Layout {
+        self.source.layout
+    }
+
+    /// What is known of every parameter beside its value.
+    pub fn known(&self) -> &[Known] {
+        self.options.known()
+    }
+
+    /// With its unknowns counted anew.
+    fn arranged(mut self) -> Self {
+        let layout = self.layout();
+        let records = self.records.len();
+        let parameters = layout.linear().chain(0..layout.outers);
+        let parameters = parameters.chain([layout.contact()]);
+        self.unknowns = parameters
+            .flat_map(|parameter| {
+                let is_one = records == 1 || self.shared[parameter];
+                (0..if is_one { 1 } else { records })
+                    .filter(|&record| self.fixed[record][parameter].is_none())
+                    .map(|record| Unknown {
+                        parameter,
+                        record: (!is_one).then_some(record),
+                    })
+                    .collect::<Vec<_>>()
+            })
+            .collect();
+        let linear = self.unknowns.iter();
+        self.linear = linear
+            .take_while(|unknown| layout.linear().contains(&unknown.parameter))
+            .count();
+        self
+    }
+
+    /// One of the records alone, with all its parameters its own.
+    pub fn alone(&self, record: usize) -> Self {
+        Self {
+            records: vec![self.records[record].clone()],
+            fixed: vec![self.fixed[record].clone()],
+            ranges: vec![self.range(record)],
+            ..self.clone()
+        }
+        .arranged()
+    }
+
+    /// The same with outer parameters the same in all records, and contact where each point has it.
+    pub fn searched(&self) -> Self {
+        let mut system = self.clone();
+        let outers = self.layout().outers;
+        for k in 0..outers {
+            let all = union(self.ranges.iter().map(|one| one.outers[k]));
+            system.ranges.iter_mut().for_each(|one| one.outers[k] = all);
+        }
+        system.shared[..outers].fill(true);
+        let contact = self.layout().contact();
+        for fixed in &mut system.fixed {
+            fixed[contact].get_or_insert(0.0);
+        }
+        system.arranged()
+    }
+
+    /// The same with another member of the family, of the same parameters.
+    pub fn with_member(&self, member: Arc<dyn Family>) -> Self {
+        let mut system = self.clone();
+        system.source.family = member;
+        system
+    }
+
+    /// The same records with another family, its body the same in all.
+    pub fn with_family(&self, options: &FitOptions) -> Self {
+        let (own, layout) = (self.layout(), options.layout());
+        let fixed = self.fixed.iter().map(|before| {
+            let mut fixed = options.fixed().to_vec();
+            fixed[layout.offset()] = before[own.offset()];
+            fixed
+        });
+        let is_body = |k| layout.is_body(k);
+        Self {
+            fixed: fixed.collect(),
+            source: Source::new(options.shared_family(), true),
+            options: options.clone(),
+            shared: (0..layout.count()).map(is_body).collect(),
+            ..self.clone()
+        }
+        .arranged()
+    }
+
+    /// The same with a parameter of one record kept at a value, in all records where they share it.
+    pub fn pinned(&self, record: usize, parameter: usize, value: f64) -> Self {
+        let mut system = self.clone();
+        for (other, fixed) in system.fixed.iter_mut().enumerate() {
+            if self.shared[parameter] || other == record {
+                fixed[parameter] = Some(value);
+            }
+        }
+        system.arranged()
+    }
+
+    /// Other records with the same choice of parameters.
+    pub fn with_records<'b>(&self, records: &[Named<'b>]) -> Result<System<'b>, FitError>
+    where
+        'a: 'b,
+    {
+        System::new(records, &self.options, self.shared.clone())
+    }
+
+    /// The same with other forces in its records.
+    pub fn with_samples<'b>(&self, samples: &'b [Vec<FitSample>]) -> System<'b>
+    where
+        'a: 'b,
+    {
+        let pairs = self.records.iter().zip(samples);
+        System {
+            records: pairs
+                .map(|(record, samples)| Record {
+                    samples,
+                    ..record.clone()
+                })
+                .collect(),
+            ..self.clone()
+        }
+    }
+
+    /// Samples whose force counts, in all records.
+    pub fn measured(&self) -> usize {
+        self.records.iter().map(|record| record.measured).sum()
+    }
+
+    /// Value a parameter of a record is kept at, in its unit.
+    pub fn fixed(&self, record: usize, parameter: usize) -> Option<f64> {
+        self.fixed[record][parameter]
+    }
+
+    /// Whether a free parameter is the same in every record.
+    pub fn is_shared(&self, parameter: usize) -> bool {
+        self.shared[parameter]
+    }
+
+    /// Whether a record's contact position is found.
+    pub fn is_contact_free(&self, record: usize) -> bool {
+        self.fixed(record, self.layout().contact()).is_none()
+    }
+
+    /// Scaled contact position kept, if it is.
+    pub fn fixed_contact(&self, record: usize) -> Option<f64> {
+        let contact = self.fixed(record, self.layout().contact());
+        contact.map(|mm| mm / self.depth_mm)
+    }
+
+    /// Which linear unknowns must not be negative.
+    pub fn bounds(&self) -> Vec<bool> {
+        let linear = self.unknowns[..self.linear].iter();
+        linear
+            .map(|unknown| self.known()[unknown.parameter].is_bound)
+            .collect()
+    }
+
+    /// The rows from which a solution is found many times cheaper, and a small share of a standard error from it; all of
+    /// them where these cost as little.
+    pub fn thinned(&self) -> Rows {
+        match self.source.is_fast() {
+            true => Rows::All,
+            false => Rows::Thin,
+        }
+    }
+
+    /// Whether a coefficient that must not be negative is at zero: what the records do not hold ends there.
+    pub fn has_zero(&self, points: &[Point]) -> bool {
+        self.zero(points).is_some()
+    }
+
+    /// The first such parameter.
+    pub fn zero(&self, points: &[Point]) -> Option<usize> {
+        let layout = self.layout();
+        let is_zero = |record: usize, point: &Point, k: usize| {
+            let parameter = layout.outers + k;
+            let is_free = self.fixed(record, parameter).is_none();
+            is_free && self.known()[parameter].is_bound && point.at[k] <= 0.0
+        };
+        let mut each = points.iter().enumerate();
+        each.find_map(|(record, point)| {
+            let mut all = 0..layout.coefficients;
+            let place = all.find(|&k| is_zero(record, point, k));
+            place.map(|k| layout.outers + k)
+        })
+    }
+
+    /// The linear unknowns that are not at a bound of theirs.
+    pub fn passive(&self, points: &[Point]) -> Vec<usize> {
+        let outers = self.layout().outers;
+        let is_passive = |k: &usize| {
+            let unknown = self.unknowns[*k];
+            let at = &points[unknown.record.unwrap_or(0)].at;
+            !self.known()[unknown.parameter].is_bound || at[unknown.parameter - outers] > 0.0
+        };
+        (0..self.linear).filter(is_passive).collect()
+    }
+
+    /// Which linear unknowns must not be negative when the first so many coefficients must not, whatever the family says.
+    pub fn all_bounds(&self, coefficients: usize) -> Vec<bool> {
+        (0..self.linear).map(|k| k < coefficients).collect()
+    }
+
+    /// The sigma that weighs one.
+    pub fn sigma_scale(&self) -> f64 {
+        self.sigma_scale
+    }
+
+    /// Weight of a sample relative to the first.
+    pub fn weight(&self, sample: &FitSample) -> f64 {
+        self.sigma_scale / sample.sigma.0
+    }
+}

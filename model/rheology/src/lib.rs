@@ -1,0 +1,20 @@
+//! Constitutive models of soft tissue and their identification.
+//!
+//! This crate knows the model families, their exact step and other integrators, the one fit, what a
+//! record can identify, which family to choose and what a protocol will tell beforehand.
+//! It never reads a file, a port or a clock, starts no thread and draws nothing: every result is a
+//! function of its arguments.
+//!
+//! Start reading at [`families`] for the models and [`fit`] for their identification.
+
+pub mod cycles;
+pub mod expected;
+pub mod extremes;
+pub mod families;
+pub mod fit;
+pub mod integrators;
+pub mod reference;
+pub mod select;
+pub mod tolerance;
+pub mod trade;
+pub mod vectors;

@@ -1,0 +1,18 @@
+//! Models and fits through the crate's public door.
+#![cfg(test)]
+
+mod abilities;
+mod coverage;
+mod cycles;
+mod expected;
+mod extremes;
+mod families;
+mod fit_recovers;
+mod honest;
+mod joint;
+mod live_fit;
+mod master_curve;
+mod maxwell;
+mod random_bodies;
+mod real_recordings;
+mod select_picks;

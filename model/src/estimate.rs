@@ -1,0 +1,68 @@
+//! Fitted parameters as everybody speaks of them: who fits, who decides by a fit, who shows one.
+
+use serde::{Deserialize, Serialize};
+
+/// One parameter of a fitted model.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Its name.
+    pub name: String,
+    /// Its value.
+    pub value: f64,
+    /// The unit of value, error and interval.
+    pub unit: String,
+    /// Standard error, the memory of the residuals allowed for; `None` where it was fixed or not
+    /// determined.
+    pub std_error: Option<f64>,
+    /// 95 % interval from Student's t.
+    pub ci95: Option<[f64; 2]>,
+    /// Whether it was kept at a given value.
+    pub is_fixed: bool,
+    /// Standard uncertainty that the calibration adds, the same in every repeat; `None` where it is not
+    /// known or not asked for.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub systematic_error: Option<f64>,
+}
+
+/// What the record so far says of one parameter.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Identifiability {
+    /// Its name.
+    pub parameter: String,
+    /// Whether path and noise so far determine it.
+    pub is_identified: bool,
+    /// If not, why and what would help, in words.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub reason: Option<String>,
+}
+
+/// What is known so far.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LiveEstimate {
+    /// The five of the body, then `f0` and `f_offset`. Without a standard error a parameter is not
+    /// identified yet.
+    pub parameters: Vec<Parameter>,
+    /// Weighted root mean square residual in N.
+    #[serde(alias = "rmse_n")]
+    pub rmse_weighted_n: f64,
+    /// Samples whose force was taken.
+    pub samples: u64,
+    /// One for each parameter, in their order; none in a session recorded before there were any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub verdicts: Vec<Identifiability>,
+}
+
+impl LiveEstimate {
+    /// A parameter by name, if the record so far identifies it.
+    #[must_use]
+    pub fn identified(&self, name: &str) -> Option<&Parameter> {
+        let is_refused = self
+            .verdicts
+            .iter()
+            .any(|verdict| verdict.parameter == name && !verdict.is_identified);
+        self.parameters
+            .iter()
+            .find(|parameter| parameter.name == name)
+            .filter(|parameter| parameter.std_error.is_some() && !is_refused)
+    }
+}

@@ -1,0 +1,4 @@
+//! Signals through the crate's public door.
+#![cfg(test)]
+
+mod touches;

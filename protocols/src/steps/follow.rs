@@ -1,0 +1,176 @@
+//! A slave that goes where it is led, one move after another: a controller takes a new target only at rest, so the
+//! slave is behind its lead by about the duration of a move.
+//!
+//! In doubt it stops: a lead that stops coming leaves it where it is, and after a while the step ends.
+
+use super::known::FROM_SURFACE;
+use super::{Done, Executable, Facts, InProgress, Known, Pausing, Progress, StepEvent, StepKind};
+use crate::engine::{Context, Record};
+use crate::preview::{Reach, SETTLE_SECS, Span, Walk};
+use palpate_model::Nanos;
+use palpate_model::rig::command::pulses_from_position;
+use palpate_model::rig::{Phase, Reading};
+use palpate_model::units::{Depth, MmPerS, Position, Seconds};
+use serde::{Deserialize, Serialize};
+
+/// Go where a lead from outside says, such as the master of a master-slave system, within bounds that no lead can
+/// move.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Follow {
+    /// How long.
+    pub duration: Seconds,
+    /// Fastest move.
+    pub speed: MmPerS,
+    /// Depth beyond which it does not follow.
+    pub depth_max: Depth,
+}
+
+/// No protocol asks for it: what leads is a program.
+pub(super) const FACTS: Facts = Facts {
+    about: "Go where a lead from outside says.",
+    needs: FROM_SURFACE,
+    is_measuring: true,
+    label: "follow",
+    // What leads may be elsewhere by then, and the slave goes there.
+    ..Facts::of("follow", Phase::Follow, Pausing::Repeat)
+};
+
+impl StepKind for Follow {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn pass(&self, known: &mut Known) {
+        known.is_inside = true;
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_speed(self.speed);
+        walk.check_depth(self.depth_max);
+        walk.check_span(self.duration);
+        let (duration, way) = (self.duration.0, self.depth_max.0);
+        // Where it goes is not known before; what bounds it is.
+        let there = walk.move_secs(way - walk.expected.depth(), self.speed);
+        walk.expected.go(walk.phase, way, there.min(duration));
+        walk.expected.stay(walk.phase, (duration - there).max(0.0));
+        walk.reach = Reach {
+            low: -walk.limits.travel_max.0,
+            high: way,
+        };
+        walk.note(format!(
+            "the slave goes where it is led, at {} at most and no deeper than {}",
+            self.speed, self.depth_max
+        ));
+        // The move under way is braked first.
+        let braking = self.speed.0 / walk.rig.acceleration.0;
+        Span(duration, duration + braking + SETTLE_SECS, false)
+    }
+
+    fn judge(&self, done: &mut Done<'_>) {
+        // The move under way is braked first.
+        done.duration(self.duration, self.speed.0 / done.rig.acceleration.0);
+    }
+}
+
+/// Time without a lead after which the slave stops: a hand that is followed is never still for so long to what leads,
+/// which says where it is all the time.
+const SILENT_MAX: Seconds = Seconds(0.5);
+
+/// Time without a lead after which the step ends, so that the plan leaves the tissue: long enough for a program that
+/// hangs to come back.
+const LOST: Seconds = Seconds(5.0);
+
+/// A slave that follows.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Following {
+    speed: MmPerS,
+    until_tick: u64,
+    /// The surface, and the furthest pulse that is neither deeper than the plan allows nor beyond the travel.
+    surface: Position,
+    deepest_pulses: i64,
+    /// Where it is to be; none before the first lead.
+    wanted: Option<Depth>,
+    /// When the last lead came, or the step began.
+    led_at: Nanos,
+    is_lost: bool,
+    is_stopping: bool,
+    is_refusal_told: bool,
+}
+
+impl Executable for Follow {
+    type Run = Following;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Following, String> {
+        let contact = cx.contact()?;
+        let deepest = self.depth_max.position_from(contact.position);
+        let deepest = deepest.0.min(cx.limits().travel_max.0);
+        Ok(Following {
+            speed: self.speed,
+            until_tick: cx.tick_after(self.duration),
+            surface: contact.position,
+            // 1e-6 of a pulse forgives the rounding of what is a whole number of them.
+            deepest_pulses: (deepest / cx.rig().mm_per_pulse + 1e-6).floor() as i64,
+            wanted: None,
+            led_at: cx.now,
+            is_lost: false,
+            is_stopping: false,
+            is_refusal_told: false,
+        })
+    }
+}
+
+impl InProgress for Following {
+    fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
+        let at_rest = cx.at_rest()?;
+        let silent = cx.now.since(self.led_at).seconds();
+        let is_lost = silent > SILENT_MAX;
+        if is_lost && !self.is_lost {
+            self.wanted = None;
+            cx.record(Record::LeadLost { silent });
+        }
+        self.is_lost = is_lost;
+        let is_over = reading.tick >= self.until_tick || silent > LOST;
+        if !at_rest {
+            if (is_lost || is_over) && !self.is_stopping {
+                self.is_stopping = true;
+                cx.stop_move();
+            }
+            return Ok(Progress::Continue);
+        }
+        self.is_stopping = false;
+        if is_over {
+            return Ok(Progress::Done);
+        }
+        if let Some(wanted) = self.wanted {
+            let wanted = wanted.position_from(self.surface);
+            let wanted = pulses_from_position(wanted, cx.rig().mm_per_pulse);
+            // Home is the end of the way out.
+            let target = wanted.clamp(0, self.deepest_pulses.max(0));
+            if target != cx.pulses() {
+                cx.move_to_pulses(target, self.speed)?;
+            }
+        }
+        Ok(Progress::Continue)
+    }
+
+    fn on_event(&mut self, cx: &mut Context<'_>, event: &StepEvent) -> Option<Progress> {
+        let StepEvent::Lead(depth) = event else {
+            return None;
+        };
+        match depth.filter(|depth| depth.0.is_finite()) {
+            Some(depth) => {
+                self.wanted = Some(depth);
+                self.led_at = cx.now;
+            }
+            // It is as good as none: should no other come, the slave stops.
+            None if self.is_refusal_told => {}
+            None => {
+                self.is_refusal_told = true;
+                cx.record(Record::Refused {
+                    reason: "what leads the slave gave no number; check what leads it".into(),
+                });
+            }
+        }
+        Some(Progress::Continue)
+    }
+}

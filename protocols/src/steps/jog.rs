@@ -1,0 +1,92 @@
+//! Move by a signed distance; allowed before homing.
+
+use super::{Executable, Facts, Known, Moving, Need, Pausing, StepKind};
+use crate::engine::{Context, outside_travel};
+use crate::file::{Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, MmPerS, Position};
+use serde::{Deserialize, Serialize};
+
+/// Move by a signed distance; allowed before homing.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Jog {
+    /// Signed distance in mm, positive towards the tissue.
+    pub distance_mm: f64,
+    /// Speed.
+    pub speed: MmPerS,
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Move by a distance, positive towards the tissue. Allowed before homing.",
+    keys: &[
+        Key::needed("distance", Kind::Length, "signed").any(),
+        Key::needed("speed", Kind::Speed, "of the move"),
+    ],
+    build: Some(|args| {
+        Ok(Jog {
+            distance_mm: args.number("distance")?,
+            speed: args.speed("speed")?,
+        }
+        .into())
+    }),
+    needs: &[Need::Motor],
+    ..Facts::of("jog", Phase::Jog, Pausing::RepeatFromStart)
+};
+
+impl StepKind for Jog {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn pass(&self, known: &mut Known) {
+        // From the surface a jog towards the tissue goes in.
+        known.is_inside |= known.contact && self.may_touch();
+    }
+
+    fn may_touch(&self) -> bool {
+        self.distance_mm > 0.0
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        let travel = walk.limits.travel_max.0;
+        walk.check_sizes(&[self.distance_mm]);
+        if self.distance_mm.abs() > travel {
+            walk.refuse(format!(
+                "a jog of {} mm is longer than the travel of {travel:.1} mm",
+                self.distance_mm
+            ));
+        }
+        walk.check_speed(self.speed);
+        let pulse = walk.rig.mm_per_pulse;
+        let moved = (self.distance_mm / pulse).round() * pulse;
+        if self.may_touch() && walk.known.home {
+            walk.check_travel("jog", moved);
+        }
+        let secs = walk.secs(walk.move_ticks(moved, self.speed));
+        if walk.known.contact && !walk.is_refused() {
+            walk.reach = walk.reach.moved_by(moved);
+            let depth = Depth(walk.expected.depth() + moved);
+            walk.expected.go(walk.phase, depth.0, secs);
+        } else {
+            walk.expected.stay(walk.phase, secs);
+        }
+        Span(secs, secs, walk.is_answer_exact())
+    }
+}
+
+impl Executable for Jog {
+    type Run = Moving;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+        let to = cx.pulses() + cx.pulses_of(self.distance_mm);
+        let end = Position(to as f64 * cx.rig().mm_per_pulse);
+        let travel = cx.limits().travel_max;
+        // Where home is unknown the switches are all there is; a jog that comes back is always allowed.
+        if cx.is_homed() && self.may_touch() && end > travel {
+            return Err(outside_travel("jog", end, travel));
+        }
+        cx.move_to_pulses(to, self.speed)?;
+        Ok(Moving)
+    }
+}

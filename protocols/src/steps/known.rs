@@ -1,0 +1,103 @@
+//! What the order of steps must keep, on any rig: what each needs, and what is known at a place of a plan.
+
+use crate::engine::{NOT_HOMED, NOT_TARED};
+
+/// What a step can need, in the order in which it is missed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Need {
+    /// The motor is on.
+    Motor,
+    /// The axis is homed.
+    Home,
+    /// The load cell is tared.
+    Tare,
+    /// The surface is known.
+    Contact,
+    /// The probe is in the tissue.
+    Inside,
+    /// A specimen is there.
+    Specimen,
+    /// The probe is not in the tissue.
+    Outside,
+}
+
+/// Needs of every way that counts from the surface.
+pub(crate) const FROM_SURFACE: &[Need] = &[Need::Motor, Need::Home, Need::Contact];
+
+impl Need {
+    /// Why a rig refuses a step without it; none where that is the author's business only.
+    pub fn refusal(self) -> Option<&'static str> {
+        match self {
+            Self::Home => Some(NOT_HOMED),
+            Self::Tare => Some(NOT_TARED),
+            Self::Contact => Some("contact is not known here; put find-contact before it"),
+            Self::Motor | Self::Inside | Self::Specimen | Self::Outside => None,
+        }
+    }
+
+    /// What the author of a protocol is told of a step without it.
+    pub fn message(self) -> &'static str {
+        match self {
+            Self::Motor => {
+                "moves the axis, but the motor is not on yet; begin with { do = \"self-test\" }"
+            }
+            Self::Home => {
+                "needs a homed axis; put { do = \"home\" } before it, which is left out where the axis is homed already"
+            }
+            Self::Tare => {
+                "compares forces, but the load cell is not tared yet; put { do = \"tare\" } before it"
+            }
+            Self::Contact => {
+                "counts depth from the surface, which is not known yet; put { do = \"find-contact\" } before it"
+            }
+            Self::Inside => {
+                "keeps a force that is there already and hardly moves where there is none; put { do = \"load\", to = \"1 N\", ... } before it"
+            }
+            Self::Specimen => {
+                "would run into the base, for the specimen was taken out before it; clip one in with { do = \"prompt\", message = \"...\", mount = 1 } before it, or find the base with { do = \"find-base\" }"
+            }
+            Self::Outside => {
+                "must not be done while the probe is in the tissue; put { do = \"retract\" } before it"
+            }
+        }
+    }
+}
+
+/// What is known at a place of a plan.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Known {
+    pub motor: bool,
+    pub home: bool,
+    pub tare: bool,
+    pub contact: bool,
+    pub is_inside: bool,
+    /// Whether the specimen was taken out and no other clipped in.
+    pub is_bare: bool,
+}
+
+impl Known {
+    pub fn has(&self, need: Need) -> bool {
+        match need {
+            Need::Motor => self.motor,
+            Need::Home => self.home,
+            Need::Tare => self.tare,
+            Need::Contact => self.contact,
+            Need::Inside => self.is_inside,
+            Need::Specimen => !self.is_bare,
+            Need::Outside => !self.is_inside,
+        }
+    }
+
+    /// What is missed is missed once: the steps behind would only repeat it.
+    pub fn assume(&mut self, need: Need) {
+        match need {
+            Need::Motor => self.motor = true,
+            Need::Home => self.home = true,
+            Need::Tare => self.tare = true,
+            Need::Contact => self.contact = true,
+            Need::Inside => self.is_inside = true,
+            Need::Specimen => self.is_bare = false,
+            Need::Outside => self.is_inside = false,
+        }
+    }
+}

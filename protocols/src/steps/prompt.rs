@@ -1,0 +1,212 @@
+//! A question to a person, with an end.
+
+use super::{
+    Executable, Facts, InProgress, Known, Need, Pausing, Progress, Step, StepEvent, StepKind, table,
+};
+use crate::engine::{Answer, Context, Record, State};
+use crate::file::{Args, Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::Nanos;
+use palpate_model::rig::{HandAction, Phase, Reading};
+use palpate_model::units::Seconds;
+use serde::{Deserialize, Serialize};
+
+/// Ask a person for something and wait.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Prompt {
+    /// What to do, as one sentence.
+    pub message: String,
+    /// How long the run waits for an answer.
+    pub timeout: Seconds,
+    /// What follows without one.
+    #[serde(default)]
+    pub on_timeout: OnTimeout,
+    /// What is done by hand before the answer: a simulated rig does it then.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub hand: Option<HandAction>,
+}
+
+/// What follows where what a step waits for does not come in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum OnTimeout {
+    /// The run stops where it is.
+    #[default]
+    Stop,
+    /// The plan goes on.
+    Continue,
+}
+
+impl OnTimeout {
+    pub(super) const WORDS: &[&str] = &["stop", "continue"];
+
+    pub(super) fn read(args: &Args) -> Result<Self, String> {
+        Ok(match args.text("on_timeout")? {
+            "continue" => Self::Continue,
+            _ => Self::Stop,
+        })
+    }
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Ask a person for something and wait. A simulated rig does the hand's work when the answer comes.",
+    keys: &[
+        Key::needed("message", Kind::Text, "what to do, as one sentence"),
+        Key::usual("timeout", Kind::Time, "10 min", "how long the run waits"),
+        Key::usual(
+            "on_timeout",
+            Kind::Text,
+            "stop",
+            "`stop` or `continue`: what follows without an answer",
+        )
+        .one_of(OnTimeout::WORDS),
+        Key::optional(
+            "cell_mass",
+            Kind::Mass,
+            "by hand: all that shall lie on the load cell, `\"0 g\"` for nothing",
+        )
+        .from_0(),
+        Key::optional(
+            "mount",
+            Kind::Count,
+            "by hand: the number of the specimen to clip in",
+        )
+        .from_0(),
+        Key::optional(
+            "unmount",
+            Kind::Flag,
+            "by hand: `true` takes the specimen out",
+        ),
+    ],
+    build: Some(read),
+    may_touch: false,
+    ..Facts::of("prompt", Phase::Prompt, Pausing::Wait)
+};
+
+fn read(args: &Args) -> Result<Step, String> {
+    let mount = args.has("mount").then(|| args.count("mount")).transpose()?;
+    let hand = match (args.maybe("cell_mass"), mount, args.is_true("unmount")) {
+        (None, None, false) => None,
+        (Some(mass_g), None, false) => Some(HandAction::LoadCell { mass_g }),
+        (None, Some(specimen), false) => Some(HandAction::Mount {
+            specimen: specimen.into(),
+        }),
+        (None, None, true) => Some(HandAction::Unmount),
+        _ => {
+            return Err(
+                "a prompt asks for one thing: give one of 'cell_mass', 'mount' and 'unmount'"
+                    .into(),
+            );
+        }
+    };
+    Ok(Prompt {
+        message: args.text("message")?.to_owned(),
+        timeout: args.seconds("timeout")?,
+        on_timeout: OnTimeout::read(args)?,
+        hand,
+    }
+    .into())
+}
+
+impl StepKind for Prompt {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn needs(&self) -> &'static [Need] {
+        match self.hand {
+            Some(_) => &[Need::Outside],
+            None => &[],
+        }
+    }
+
+    fn pass(&self, known: &mut Known) {
+        // Another specimen has its surface elsewhere. Without one there is only the base to find.
+        if let Some(hand @ (HandAction::Mount { .. } | HandAction::Unmount)) = self.hand {
+            known.contact = false;
+            known.is_bare = hand == HandAction::Unmount;
+        }
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_span(self.timeout);
+        if self.message.trim().is_empty() {
+            walk.refuse("a prompt must say what it asks for".into());
+        }
+        // Somebody who stands beside the rig answers within half a minute.
+        walk.unknown(self.timeout.0.min(30.0), self.timeout.0)
+    }
+}
+
+/// A question that waits for its answer.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Asking {
+    plan: Prompt,
+    deadline: Nanos,
+}
+
+impl Executable for Prompt {
+    type Run = Asking;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Asking, String> {
+        cx.record(Record::Prompted {
+            message: self.message.clone(),
+            timeout: self.timeout,
+        });
+        Ok(Asking {
+            plan: self.clone(),
+            deadline: cx.now + Nanos::from_seconds(self.timeout),
+        })
+    }
+}
+
+impl InProgress for Asking {
+    /// Time passes without an answer. A pause stops this clock; it begins anew when the run goes on.
+    fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
+        let timeout = self.plan.timeout;
+        if cx.is_extended() {
+            self.deadline = cx.now + Nanos::from_seconds(timeout);
+        }
+        if cx.now < self.deadline {
+            return Ok(Progress::Continue);
+        }
+        cx.record(Record::Answered {
+            answer: Answer::TimedOut,
+        });
+        Ok(match self.plan.on_timeout {
+            OnTimeout::Continue => Progress::Done,
+            OnTimeout::Stop => Progress::Stop(format!("nobody answered within {timeout:.0}")),
+        })
+    }
+
+    fn on_event(&mut self, cx: &mut Context<'_>, event: &StepEvent) -> Option<Progress> {
+        let StepEvent::Answer(answer) = *event else {
+            return None;
+        };
+        cx.record(Record::Answered { answer });
+        if answer != Answer::Confirmed {
+            return Some(Progress::Stop(
+                "the operator declined what the plan asked for".into(),
+            ));
+        }
+        if matches!(self.plan.hand, Some(HandAction::Mount { .. })) {
+            // What was known of the tissue was known of another specimen.
+            cx.set_contact(None);
+        }
+        cx.by_hand(self.plan.hand);
+        // Who answers goes on.
+        cx.end_pause();
+        Some(Progress::Done)
+    }
+}
+
+impl State {
+    /// The prompt that waits for an answer, and until when.
+    #[must_use]
+    pub fn prompt(&self) -> Option<(&Prompt, Nanos)> {
+        match self.active() {
+            Some(table::Active::Prompt(asking)) => Some((&asking.plan, asking.deadline)),
+            _ => None,
+        }
+    }
+}

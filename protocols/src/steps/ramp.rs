@@ -1,0 +1,79 @@
+//! Indent to a depth at constant speed.
+
+use super::known::FROM_SURFACE;
+use super::{Done, Executable, Facts, Known, MeterSample, Moving, Pausing, StepKind};
+use crate::engine::Context;
+use crate::file::{Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::rig::Phase;
+use palpate_model::units::{Depth, MmPerS};
+use serde::{Deserialize, Serialize};
+
+/// Indent to a depth at constant speed.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Ramp {
+    /// Indentation speed.
+    pub speed: MmPerS,
+    /// Depth from contact.
+    pub depth: Depth,
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Indent to a depth at constant speed.",
+    keys: &[
+        Key::needed("speed", Kind::Speed, "of the indentation"),
+        Key::needed("depth", Kind::Length, "from contact"),
+    ],
+    build: Some(|args| {
+        Ok(Ramp {
+            speed: args.speed("speed")?,
+            depth: Depth(args.number("depth")?),
+        }
+        .into())
+    }),
+    needs: FROM_SURFACE,
+    is_measuring: true,
+    ..Facts::of("ramp", Phase::Ramp, Pausing::Measure(INTERRUPTED))
+};
+
+/// Why an indentation does not go on after a pause.
+pub(super) const INTERRUPTED: &str = "an interrupted indentation is another experiment";
+
+impl StepKind for Ramp {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn pass(&self, known: &mut Known) {
+        known.is_inside = true;
+    }
+
+    fn deepest(&self) -> Option<Depth> {
+        Some(self.depth)
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_speed(self.speed);
+        walk.check_depth(self.depth);
+        walk.go(self.depth, self.speed)
+    }
+
+    fn is_cruising(&self, begun: f64, sample: &MeterSample, way: &dyn Fn(f64) -> f64) -> bool {
+        sample.is_between(begun, self.depth.0, way(self.speed.0))
+    }
+
+    fn judge(&self, done: &mut Done<'_>) {
+        done.speed(self.speed);
+        done.depth(self.depth, self.speed);
+    }
+}
+
+impl Executable for Ramp {
+    type Run = Moving;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+        let target = cx.position_of(self.depth)?;
+        cx.move_to(target, self.speed)?;
+        Ok(Moving)
+    }
+}

@@ -1,0 +1,135 @@
+//! A sine from where the probe stands to deeper and back, beginning and ending at rest.
+
+use super::known::FROM_SURFACE;
+use super::{Done, Executable, FORCE_FLOOR, Facts, Known, Moving, Pausing, StepKind};
+use crate::engine::Context;
+use crate::file::{Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::rig::{Oscillation, Phase, RigDescription};
+use palpate_model::units::{Depth, Seconds};
+use serde::{Deserialize, Serialize};
+
+/// A sine from where the probe stands to deeper and back, beginning and ending at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Sine {
+    /// Half of the distance between the turning points, in mm.
+    pub amplitude_mm: f64,
+    /// Frequency in Hz.
+    pub frequency_hz: f64,
+    /// Whole cycles.
+    pub cycles: u32,
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Swing from where the probe stands to deeper and back, beginning and ending at rest.",
+    keys: &[
+        Key::needed(
+            "amplitude",
+            Kind::Length,
+            "half of the way between the turning points",
+        ),
+        Key::needed("frequency", Kind::Frequency, "of the swing"),
+        Key::needed("cycles", Kind::Count, "whole cycles"),
+    ],
+    build: Some(|args| {
+        Ok(Sine {
+            amplitude_mm: args.number("amplitude")?,
+            frequency_hz: args.number("frequency")?,
+            cycles: args.count("cycles")?,
+        }
+        .into())
+    }),
+    needs: FROM_SURFACE,
+    is_measuring: true,
+    ..Facts::of(
+        "sine",
+        Phase::Sine,
+        Pausing::Measure("an interrupted oscillation is another experiment"),
+    )
+};
+
+/// The lowest force of a sine is the lowest mean over this share of a period: short beside it, and long beside noise.
+const MEAN_SHARE: f64 = 0.02;
+
+/// and over so many samples at most, which hide any noise.
+const MEAN_SAMPLES_MAX: f64 = 1000.0;
+
+impl Sine {
+    /// What a rig is told: whole pulses and whole ticks.
+    #[must_use]
+    pub fn command(&self, rig: &RigDescription) -> Oscillation {
+        Oscillation {
+            amplitude_pulses: (self.amplitude_mm / rig.mm_per_pulse).round() as i64,
+            period_ticks: (1.0 / (self.frequency_hz * rig.tick().0)).round() as u32,
+            cycles: self.cycles,
+            acceleration: rig.acceleration,
+        }
+    }
+}
+
+impl StepKind for Sine {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn pass(&self, known: &mut Known) {
+        known.is_inside = true;
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_span(Seconds(f64::from(self.cycles) / self.frequency_hz));
+        walk.check_sizes(&[self.amplitude_mm]);
+        if self.cycles == 0 || self.amplitude_mm <= 0.0 {
+            walk.refuse("a sine needs a cycle and an amplitude above 0 mm".into());
+        }
+        if walk.is_refused() {
+            return Span(0.0, 0.0, true);
+        }
+        let command = self.command(walk.rig);
+        if let Err(reason) = walk.rig.check_oscillation(&command) {
+            walk.refuse(reason);
+        }
+        let deepest = 2.0 * command.amplitude_pulses as f64 * walk.rig.mm_per_pulse;
+        walk.check_travel("sine", deepest);
+        let from = Depth(walk.expected.depth());
+        if walk.expected.oscillate(walk.phase, self).0 <= 0.0 {
+            walk.note(format!(
+                "tissue like that of the source presses too little at {from:.1} for a swing of {} mm either way: the force would come back to zero and the probe lose the tissue; go deeper or swing less",
+                self.amplitude_mm
+            ));
+        }
+        // The rig counts whole ticks of each period.
+        let ticks = u64::from(command.cycles) * u64::from(command.period_ticks);
+        let secs = walk.secs(ticks + walk.answer_ticks());
+        Span(secs, secs, walk.is_answer_exact())
+    }
+
+    fn force_mean_samples(&self, rig: &RigDescription) -> Option<usize> {
+        let samples = MEAN_SHARE / (self.frequency_hz * rig.tick().0);
+        Some(samples.min(MEAN_SAMPLES_MAX) as usize)
+    }
+
+    fn judge(&self, done: &mut Done<'_>) {
+        done.amplitude(self.amplitude_mm);
+        done.frequency(self.frequency_hz, self.cycles);
+    }
+
+    fn doubt(&self, done: &Done<'_>) -> Option<String> {
+        let lowest = done
+            .lowest_force()
+            .filter(|lowest| *lowest <= FORCE_FLOOR)?;
+        Some(format!(
+            "the force came back to {lowest:.3} N, where nothing tells contact from none (below {FORCE_FLOOR} N): the probe may have lost the tissue; go deeper or swing less"
+        ))
+    }
+}
+
+impl Executable for Sine {
+    type Run = Moving;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Moving, String> {
+        let command = self.command(cx.rig());
+        cx.oscillate(command)?;
+        Ok(Moving)
+    }
+}

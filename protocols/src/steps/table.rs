@@ -1,0 +1,71 @@
+//! The steps there are. A line here and a `mod` line in the folder's head make a file of a step known to the engine,
+//! the language, the preview and the fidelity.
+
+use super::{Executable, Facts, InProgress, StepKind};
+use crate::engine::Context;
+use serde::{Deserialize, Serialize};
+
+macro_rules! steps {
+    ($($module:ident::$name:ident)*) => {
+        $(pub use super::$module::*;)*
+
+        /// One step of a plan.
+        #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+        #[serde(tag = "step", rename_all = "kebab-case")]
+        #[expect(missing_docs, reason = "each is explained at its own data")]
+        pub enum Step { $($name($name)),* }
+
+        $(impl From<$name> for Step {
+            fn from(step: $name) -> Self { Self::$name(step) }
+        })*
+
+        /// A step in progress, holding only its own data.
+        #[derive(Clone, Debug, PartialEq)]
+        pub(crate) enum Active { $($name(<$name as Executable>::Run)),* }
+
+        /// What is the same for every step, of all kinds.
+        pub(crate) const KINDS: &[&Facts] = &[$(&super::$module::FACTS),*];
+
+        impl Step {
+            pub(crate) fn kind(&self) -> &dyn StepKind {
+                match self { $(Self::$name(step) => step),* }
+            }
+
+            pub(crate) fn is_done_already(&self, cx: &Context<'_>) -> bool {
+                match self { $(Self::$name(step) => step.is_done_already(cx)),* }
+            }
+
+            pub(crate) fn begin(&self, cx: &mut Context<'_>) -> Result<Active, String> {
+                Ok(match self { $(Self::$name(step) => Active::$name(step.begin(cx)?)),* })
+            }
+        }
+
+        impl Active {
+            pub(crate) fn in_progress(&mut self) -> &mut dyn InProgress {
+                match self { $(Self::$name(run) => run),* }
+            }
+        }
+    };
+}
+
+// In the order in which a run uses them, which is that of the reference.
+steps! {
+    self_test::SelfTest
+    home::Home
+    tare::Tare
+    find_contact::FindContact
+    find_base::FindBase
+    ramp::Ramp
+    load_to::LoadTo
+    hold::Hold
+    hold_force::HoldForce
+    sine::Sine
+    unload::Unload
+    retract::Retract
+    rest::Rest
+    prompt::Prompt
+    weigh::Weigh
+    check_home::CheckHome
+    jog::Jog
+    follow::Follow
+}

@@ -1,0 +1,176 @@
+//! One reading of a calibration: the signal under a known mass, once it has come to rest.
+
+use super::{Executable, Facts, InProgress, Known, Pausing, Progress, Step, StepKind, table};
+use crate::engine::{Context, Record, State};
+use crate::file::{Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::calibration::{Settle as Settled, SettleRule, Settling, SettlingNow};
+use palpate_model::rig::{Phase, Reading};
+use palpate_model::units::{Seconds, Volts};
+use serde::{Deserialize, Serialize};
+
+/// Read the load cell under a known mass: one reading of a calibration.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Weigh {
+    /// Mass on the cell in g, the platform included.
+    pub mass_g: f64,
+    /// Whether the masses go up or down.
+    pub is_loading: bool,
+    /// Which pass through the masses, from 1.
+    pub repeat: u32,
+    /// When the signal counts as settled.
+    pub settle: Settle,
+}
+
+/// When a signal counts as settled.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Settle {
+    /// Length of the window that is looked at and averaged.
+    pub window: Seconds,
+    /// Longest wait.
+    pub timeout: Seconds,
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Read the load cell under a known mass, once the signal has settled.",
+    keys: &[
+        Key::needed("mass", Kind::Mass, "all of it, the platform included").from_0(),
+        Key::usual(
+            "masses_go",
+            Kind::Text,
+            "up",
+            "`up` or `down`: whether weights were put on or taken off",
+        )
+        .one_of(&["up", "down"]),
+        Key::usual("pass", Kind::Count, "1", "which pass through the masses"),
+        Key::usual(
+            "window",
+            Kind::Time,
+            "2 s",
+            "time that must be steady, and is averaged",
+        ),
+        Key::usual("timeout", Kind::Time, "30 s", "longest wait"),
+    ],
+    build: Some(|args| {
+        Ok(Weigh {
+            mass_g: args.number("mass")?,
+            is_loading: args.text("masses_go")? == "up",
+            repeat: args.count("pass")?,
+            settle: Settle {
+                window: args.seconds("window")?,
+                timeout: args.seconds("timeout")?,
+            },
+        }
+        .into())
+    }),
+    may_touch: false,
+    ..Facts::of("weigh", Phase::Weigh, Pausing::Complete)
+};
+
+impl StepKind for Weigh {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn warning(&self, known: &Known) -> Option<&'static str> {
+        known.motor.then_some(
+            "'weigh' with the motor on ends at the force limit of the rig; leave { do = \"self-test\" } out of a protocol that only weighs",
+        )
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_span(self.settle.window);
+        walk.check_span(self.settle.timeout);
+        let (window, timeout) = (self.settle.window.0, self.settle.timeout.0);
+        walk.unknown((2.0 * window).min(timeout), timeout)
+    }
+}
+
+/// A reading in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Weighing {
+    plan: Weigh,
+    settling: Settling,
+    newest_tick: Option<u64>,
+}
+
+impl Executable for Weigh {
+    type Run = Box<Weighing>;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Box<Weighing>, String> {
+        let rig = cx.rig();
+        let rule = SettleRule {
+            window: self.settle.window,
+            timeout: self.settle.timeout,
+            ..SettleRule::for_noise(rig.tick(), rig.noise_expected, Volts(cx.volts_per_count()))
+        };
+        // A weight was laid on or taken off: forces before and after do not compare.
+        cx.forget_force_rate();
+        Ok(Box::new(Weighing {
+            plan: self.clone(),
+            settling: Settling::new(rule),
+            newest_tick: None,
+        }))
+    }
+}
+
+impl InProgress for Weighing {
+    fn on_reading(&mut self, cx: &mut Context<'_>, reading: &Reading) -> Result<Progress, String> {
+        // A controller that restarted counts from zero again.
+        let ticks = self
+            .newest_tick
+            .map_or(1, |newest| reading.tick.saturating_sub(newest));
+        self.newest_tick = Some(reading.tick);
+        match self.settling.push(ticks, reading.volts) {
+            Settled::Waiting => Ok(Progress::Continue),
+            Settled::TimedOut(unsettled) => {
+                Err(format!("weigh {} g: {unsettled}", self.plan.mass_g))
+            }
+            Settled::Settled(steady) => {
+                cx.record(Record::Weighed {
+                    mass_g: self.plan.mass_g,
+                    is_loading: self.plan.is_loading,
+                    repeat: self.plan.repeat,
+                    volts: steady.mean,
+                    noise: steady.noise,
+                    slope_v_per_s: steady.slope_v_per_s,
+                    samples: steady.samples,
+                    waited: steady.waited,
+                });
+                Ok(Progress::Done)
+            }
+        }
+    }
+}
+
+impl State {
+    /// How far the signal under a weight has come to rest; `None` where nothing is weighed.
+    #[must_use]
+    pub fn settling(&self) -> Option<SettlingNow> {
+        match self.active() {
+            Some(table::Active::Weigh(weighing)) => Some(weighing.settling.now()),
+            _ => None,
+        }
+    }
+
+    /// Whether the last weight can be read again now, or why not.
+    pub fn can_redo(&self) -> Result<(), &'static str> {
+        self.redo_step().map(|_| ())
+    }
+
+    /// The prompt to go back to for weighing again what was weighed last, or what is being weighed; or why there is
+    /// none.
+    pub(crate) fn redo_step(&self) -> Result<usize, &'static str> {
+        let steps = &self.config().plan.steps;
+        let (at, _) = self.step_progress();
+        let is_weigh = |index: usize| matches!(steps[index].step, Step::Weigh(_));
+        let is_prompt = |index: usize| matches!(steps[index].step, Step::Prompt(_));
+        match self.active() {
+            Some(table::Active::Weigh(_)) if at >= 1 && is_prompt(at - 1) => Ok(at - 1),
+            Some(table::Active::Prompt(_)) if at >= 2 && is_weigh(at - 1) && is_prompt(at - 2) => {
+                Ok(at - 2)
+            }
+            _ => Err("no weight was read just before"),
+        }
+    }
+}

@@ -1,0 +1,222 @@
+//! Files that are whole under their names or not there: the one way in which a file is made or replaced at once.
+//!
+//! A [`Draft`] is written under a hidden name in the folder where it is to be, and is locked while it is. What a
+//! killed process leaves of one is therefore told from one that is being written: nobody holds it.
+
+use std::fs::{File, Permissions, TryLockError};
+use std::io::{self, BufWriter, Write};
+use std::os::unix::fs::{MetadataExt, PermissionsExt};
+use std::path::{Path, PathBuf};
+use tempfile::{Builder, NamedTempFile};
+use walkdir::WalkDir;
+
+/// What the hidden names end in.
+const ENDING: &str = ".palpate.tmp";
+/// Letters of a file's own name that its draft's has: a file system takes 255 bytes, and a letter has four at most.
+const NAME_LETTERS_MAX: usize = 50;
+
+/// What becomes of a file that has the name already.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Existing {
+    /// The new one takes its place.
+    Replace,
+    /// It stays, and the new one is refused with [`io::ErrorKind::AlreadyExists`].
+    Keep,
+}
+
+/// A file that is being written. Dropped without [`persist`](Self::persist), it goes.
+#[derive(Debug)]
+pub struct Draft {
+    file: NamedTempFile,
+    path: PathBuf,
+}
+
+impl Draft {
+    /// Begins the file that is to be at `path`.
+    pub fn new(path: &Path) -> io::Result<Self> {
+        let name = path.file_name().ok_or(io::ErrorKind::InvalidInput)?;
+        let name: String = name
+            .to_string_lossy()
+            .chars()
+            .take(NAME_LETTERS_MAX)
+            .collect();
+        let prefix = format!(".{name}.");
+        loop {
+            let file = Builder::new()
+                .prefix(&prefix)
+                .suffix(ENDING)
+                // As any new file: what the user's mask leaves.
+                .permissions(Permissions::from_mode(0o666))
+                .tempfile_in(folder_of(path))
+                .map_err(without_hidden_name)?;
+            // Between its making and its lock, a sweep may have taken it for one that nobody writes.
+            match file.as_file().try_lock() {
+                Err(TryLockError::WouldBlock) => continue,
+                // Where nothing can be locked, nothing is swept.
+                Err(TryLockError::Error(_)) => {}
+                Ok(()) if !is_at(file.as_file(), file.path()) => continue,
+                Ok(()) => {}
+            }
+            let path = path.to_owned();
+            return Ok(Self { file, path });
+        }
+    }
+
+    /// Takes what is written.
+    pub fn writer(&self) -> BufWriter<&File> {
+        BufWriter::new(self.file.as_file())
+    }
+
+    /// Where it is while it is written.
+    #[must_use]
+    pub fn hidden_path(&self) -> &Path {
+        self.file.path()
+    }
+
+    /// Gives the file its name. When this returns, it survives a power cut with all that was written.
+    pub fn persist(self, existing: Existing) -> io::Result<()> {
+        self.file.as_file().sync_all()?;
+        let named = match existing {
+            Existing::Replace => self.file.persist(&self.path),
+            Existing::Keep => self.file.persist_noclobber(&self.path),
+        };
+        named.map_err(|err| err.error)?;
+        // A folder that cannot be opened may still be written to; then its disk decides when it keeps the name.
+        match File::open(folder_of(&self.path)) {
+            Ok(folder) => folder.sync_all(),
+            Err(_) => Ok(()),
+        }
+    }
+}
+
+/// Puts a file of these bytes at `path`, whatever is there.
+pub fn replace(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    write(path, bytes, Existing::Replace)
+}
+
+/// Makes a new file of these bytes.
+pub fn create(path: &Path, bytes: &[u8]) -> io::Result<()> {
+    write(path, bytes, Existing::Keep)
+}
+
+fn write(path: &Path, bytes: &[u8], existing: Existing) -> io::Result<()> {
+    let draft = Draft::new(path)?;
+    draft.file.as_file().write_all(bytes)?;
+    draft.persist(existing)
+}
+
+/// The drafts below a folder, so many folders deep, that nobody writes any more.
+#[must_use]
+pub fn leftovers(folder: &Path, depth: usize) -> Vec<PathBuf> {
+    let found = unowned(folder, depth);
+    found.into_iter().map(|(path, _lock)| path).collect()
+}
+
+/// Takes them away, and tells which. What cannot be taken away stays.
+pub fn sweep(folder: &Path, depth: usize) -> Vec<PathBuf> {
+    let mut found = unowned(folder, depth);
+    // The lock is held until the name is gone, so that a process that has just begun this draft notices.
+    found.retain(|(path, _lock)| std::fs::remove_file(path).is_ok());
+    found.into_iter().map(|(path, _lock)| path).collect()
+}
+
+fn unowned(folder: &Path, depth: usize) -> Vec<(PathBuf, File)> {
+    let here = Path::new(".");
+    let folder = if folder == Path::new("") {
+        here
+    } else {
+        folder
+    };
+    let entries = WalkDir::new(folder).max_depth(depth).sort_by_file_name();
+    let is_draft = |name: &str| name.starts_with('.') && name.ends_with(ENDING);
+    let files = entries.into_iter().flatten().filter(|entry| {
+        entry.file_type().is_file() && entry.file_name().to_str().is_some_and(is_draft)
+    });
+    let locked = files.filter_map(|entry| {
+        let file = File::open(entry.path()).ok()?;
+        file.try_lock().ok()?;
+        Some((entry.into_path(), file))
+    });
+    locked.collect()
+}
+
+fn folder_of(path: &Path) -> &Path {
+    match path.parent() {
+        Some(folder) if !folder.as_os_str().is_empty() => folder,
+        _ => Path::new("."),
+    }
+}
+
+/// Whether the open file is the one that has this name.
+fn is_at(file: &File, path: &Path) -> bool {
+    let id = |facts: std::fs::Metadata| (facts.dev(), facts.ino());
+    let there = std::fs::metadata(path).map(id).ok();
+    there.is_some() && there == file.metadata().map(id).ok()
+}
+
+/// What the system said, without the hidden name, of which nobody knows.
+fn without_hidden_name(err: io::Error) -> io::Error {
+    match err.kind() {
+        io::ErrorKind::Other => err,
+        kind => kind.into(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    fn names(folder: &Path) -> Vec<String> {
+        let names = fs::read_dir(folder).unwrap();
+        let mut names: Vec<String> = names
+            .map(|one| one.unwrap().file_name().into_string().unwrap())
+            .collect();
+        names.sort();
+        names
+    }
+
+    #[test]
+    fn a_file_is_the_old_or_the_new_one_and_nothing_is_left_beside_it() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path().join("table.csv");
+        create(&at, b"one").unwrap();
+        let refused = create(&at, b"two").unwrap_err();
+        assert_eq!(refused.kind(), io::ErrorKind::AlreadyExists);
+        assert_eq!(fs::read(&at).unwrap(), b"one");
+        let draft = Draft::new(&at).unwrap();
+        draft.writer().write_all(b"half").unwrap();
+        drop(draft);
+        replace(&at, b"three").unwrap();
+        assert_eq!(fs::read(&at).unwrap(), b"three");
+        assert_eq!(names(folder.path()), ["table.csv"]);
+        // It may be read by others as any file of this user.
+        let plain = folder.path().join("plain");
+        fs::write(&plain, "").unwrap();
+        let mode = |path: &Path| fs::metadata(path).unwrap().permissions().mode();
+        assert_eq!(mode(&at), mode(&plain));
+        let long = "ä".repeat(120);
+        create(&folder.path().join(long), b"").unwrap();
+    }
+
+    #[test]
+    fn only_drafts_that_nobody_writes_are_swept() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        let written = Draft::new(&at.join("now.csv")).unwrap();
+        let (_, abandoned) = Draft::new(&at.join("old.csv"))
+            .unwrap()
+            .file
+            .keep()
+            .unwrap();
+        fs::write(at.join(".another.tmp"), "somebody else's").unwrap();
+        fs::create_dir(at.join("deep")).unwrap();
+        let deep = Draft::new(&at.join("deep/old.csv")).unwrap().file.keep();
+        let (_, deep) = deep.unwrap();
+        assert_eq!(leftovers(at, 1), std::slice::from_ref(&abandoned));
+        assert_eq!(sweep(at, 1), [abandoned]);
+        assert_eq!(sweep(at, usize::MAX), [deep]);
+        written.persist(Existing::Keep).unwrap();
+        assert_eq!(names(at), [".another.tmp", "deep", "now.csv"]);
+    }
+}

@@ -1,0 +1,89 @@
+//! Which files a session's log is in.
+
+use super::reader::ReadError;
+use crate::folder::{LOG_FILE, SPARE_FILE, segment_file, segment_number};
+use std::collections::BTreeMap;
+use std::io::{self, Read};
+use std::path::{Path, PathBuf};
+
+/// With more missing segments than that, what is behind them is not looked at: a name alone must not
+/// ask for endless work.
+const MISSING_MAX: usize = 1000;
+
+/// The files to read.
+pub(crate) fn find_files(path: &Path) -> Result<Vec<PathBuf>, ReadError> {
+    if !path.exists() {
+        return Err(ReadError::Missing { path: path.into() });
+    }
+    if !path.is_dir() {
+        return Ok(vec![path.into()]);
+    }
+    let failed = |source| ReadError::Io {
+        path: path.into(),
+        source,
+    };
+    let mut found = BTreeMap::new();
+    let mut add = |folder: &Path| -> io::Result<()> {
+        for item in std::fs::read_dir(folder)? {
+            let name = item?.file_name();
+            if let Some(number) = name.to_str().and_then(segment_number) {
+                found.entry(number).or_insert(folder.join(name));
+            }
+        }
+        Ok(())
+    };
+    add(path).map_err(failed)?;
+    // If it is not there, neither is its disk: see `absent_spare`.
+    if let Some(spare) = spare_of(path).filter(|spare| spare.is_dir()) {
+        add(&spare).map_err(failed)?;
+    }
+    // A missing one is listed too: it will be looked for and not found.
+    let last = found.last_key_value().map_or(0, |(number, _)| *number);
+    let many = last as usize > found.len() + MISSING_MAX;
+    let last = if many { found.len() as u32 } else { last };
+    Ok((0..=last)
+        .map(|number| {
+            let own = || path.join(segment_file(number));
+            found.remove(&number).unwrap_or_else(own)
+        })
+        .collect())
+}
+
+/// The other folder that segments of a session may be in.
+fn spare_of(path: &Path) -> Option<PathBuf> {
+    let pointer = path.join(SPARE_FILE);
+    // Whatever somebody put there in place of the file is neither waited for nor read without end.
+    if !std::fs::symlink_metadata(&pointer).ok()?.is_file() {
+        return None;
+    }
+    let mut spare = String::new();
+    let mut file = std::fs::File::open(pointer).ok()?.take(SPARE_BYTES_MAX);
+    file.read_to_string(&mut spare).ok()?;
+    (!spare.is_empty()).then(|| spare.into())
+}
+
+/// The longest path that Linux takes (`PATH_MAX`).
+const SPARE_BYTES_MAX: u64 = 4096;
+
+/// The folder that segments may be in and that is not there, as on a disk that is not connected. The writer makes
+/// it before the log.
+pub(crate) fn absent_spare(path: &Path) -> Option<PathBuf> {
+    spare_of(path).filter(|spare| !spare.is_dir())
+}
+
+/// What to say of such a folder.
+pub(crate) fn away(spare: &Path) -> String {
+    let spare = spare.display();
+    format!("a part of it may be in {spare}, which is not there; connect that disk")
+}
+
+/// Refuses a folder without a log.
+pub(crate) fn check_files(path: &Path, files: &[PathBuf]) -> Result<(), ReadError> {
+    if files[0].is_file() || (files.len() > 1 && path.is_dir()) {
+        return Ok(());
+    }
+    Err(ReadError::NotASession {
+        path: path.into(),
+        reason: format!("it holds no {LOG_FILE}"),
+    })
+}

@@ -1,0 +1,150 @@
+//! Logs that another program changes while they are recorded: told, as a fault of the session, and what comes after is kept.
+
+use crate::support::{end, entries, manifest, rows};
+use palpate_model::Nanos;
+use palpate_sessions::recover::{Health, examine};
+use palpate_sessions::{
+    Alteration, FileSink, FolderSegments, LOG_FILE, LogError, LogWriter, Notice, Pace, Row,
+    Session, SessionFolder, SessionWriter, segment_file,
+};
+use std::path::Path;
+use std::process::Command;
+use std::time::Duration;
+
+/// Does something to the file `$1` in a process of its own.
+fn stranger(command: &str, file: &Path) {
+    let done = Command::new("sh")
+        .args(["-ec", command, "stranger"])
+        .arg(file)
+        .status();
+    assert!(done.expect("there is a shell").success(), "{command}");
+}
+
+const EMPTY: &str = ": > \"$1\"";
+const CUT: &str = "truncate -s 5000 \"$1\"";
+const REMOVE: &str = "rm \"$1\"";
+const REPLACE: &str = "cp \"$1\" \"$1.copy\"; mv \"$1.copy\" \"$1\"";
+const ADD: &str = "printf x >> \"$1\"";
+const CHANGE: &str = "printf x | dd of=\"$1\" bs=1 seek=5000 conv=notrunc status=none";
+
+#[test]
+fn whatever_another_program_does_to_a_log_is_told_when_it_is_closed() {
+    let rows = rows(2000, 5);
+    for command in [EMPTY, CUT, REMOVE, REPLACE, ADD, CHANGE] {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join(LOG_FILE);
+        let sink = FileSink::create(&path).unwrap();
+        let mut log = LogWriter::begin(sink, "log", &manifest()).unwrap();
+        log.append(&rows, &[]).unwrap();
+        log.sync().unwrap();
+        stranger(command, &path);
+        let Err(LogError::Altered { alteration, .. }) = log.finish(end(Nanos(0))) else {
+            panic!("not told: {command}");
+        };
+        let is_right = match command {
+            EMPTY | CUT | ADD => {
+                matches!(alteration, Alteration::Length { found, written } if found != written)
+            }
+            REMOVE => alteration == Alteration::Gone,
+            REPLACE => alteration == Alteration::Replaced,
+            _ => alteration == Alteration::Content,
+        };
+        assert!(is_right, "{command}: {alteration}");
+    }
+}
+
+/// Pushes rows, an event after the last of them.
+fn push(writer: &mut SessionWriter, rows: &[Row], order: u64) {
+    for row in rows {
+        writer.push_row(*row).unwrap();
+    }
+    let last = rows.last().unwrap();
+    let mut event = entries(rows, rows.len() - 1).pop().unwrap();
+    (event.order, event.now) = (order, last.host);
+    writer.push_entry(event).unwrap();
+    writer.on_tick(last.host + Nanos(1)).unwrap();
+}
+
+/// Waits until all that was pushed is on the disk.
+fn wait(mut is_so: impl FnMut() -> bool) {
+    for _ in 0..6000 {
+        if is_so() {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    panic!("a minute has passed");
+}
+
+#[test]
+fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
+    let rows = rows(6000, 6);
+    let (first, rest) = rows.split_at(3000);
+    for command in [EMPTY, CUT, REMOVE, REPLACE] {
+        let parent = tempfile::tempdir().unwrap();
+        let path = parent.path().join("session");
+        let folder = SessionFolder::create(&path).unwrap();
+        let mut writer = SessionWriter::start(folder, None, &manifest(), Pace::Real).unwrap();
+        push(&mut writer, first, 1);
+        wait(|| writer.saved_through() >= first[2999].host && writer.disk_state().sync_s.is_some());
+        stranger(command, &path.join(LOG_FILE));
+        push(&mut writer, rest, 2);
+        let mut told = Vec::new();
+        wait(|| {
+            told.extend(writer.take_notices());
+            !told.is_empty()
+        });
+        assert!(
+            matches!(&told[..], [Notice::Altered(LogError::Altered { .. })]),
+            "{command}: {told:?}"
+        );
+        assert!(told[0].ends_the_run());
+        let closed = writer.close(end(rows[5999].host));
+        assert!(
+            matches!(closed, Err(LogError::Altered { .. })),
+            "{command}: {closed:?}"
+        );
+        // What came after is whole, and what is missing is told.
+        let patient = examine(&path);
+        if command == REPLACE {
+            // What was on the disk by then is in the copy: nothing is missing, and it was told all the same.
+            assert_eq!((&patient.health, patient.samples), (&Health::Healthy, 6000));
+            continue;
+        }
+        let Health::Damaged { missing } = &patient.health else {
+            panic!("{command}: {patient:?}");
+        };
+        assert!(!missing.is_end_lost, "{command}: {missing:?}");
+        assert!(
+            patient.samples >= 3000 && patient.until_s > 5.9,
+            "{command}: {patient:?}"
+        );
+        let lost: u64 = missing.gaps.iter().map(|gap| gap.samples).sum();
+        assert_eq!(patient.samples + lost, 6000, "{command}");
+        assert!(Session::open(&path).is_err());
+    }
+}
+
+#[test]
+fn a_segment_that_was_finished_is_looked_at_too() {
+    let rows = rows(4000, 7);
+    let (first, rest) = rows.split_at(2000);
+    // While it is written, its content alone changes; later, its length does.
+    for (command, is_open) in [(CHANGE, true), (CUT, false)] {
+        let folder = tempfile::tempdir().unwrap();
+        let source = FolderSegments::new(folder.path());
+        let batches = if is_open { 1000 } else { 5 };
+        let mut writer =
+            SessionWriter::start_in_segments(source, batches, &manifest(), Pace::Virtual).unwrap();
+        first.iter().for_each(|row| writer.push_row(*row).unwrap());
+        let second = folder.path().join(segment_file(1));
+        assert_eq!(second.exists(), !is_open);
+        stranger(command, &folder.path().join(LOG_FILE));
+        rest.iter().for_each(|row| writer.push_row(*row).unwrap());
+        let closed = writer.close(end(rows[3999].host));
+        let Err(LogError::Altered { path, .. }) = closed else {
+            panic!("{command}: {closed:?}");
+        };
+        assert!(path.ends_with(LOG_FILE), "{path}");
+    }
+}

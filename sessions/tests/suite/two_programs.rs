@@ -1,0 +1,154 @@
+//! Two programs at once: nobody waits for ever, one of several wins, and nothing is left over.
+
+use crate::support::{count_from, end, log_bytes, manifest, rows};
+use crate::worker::{command, edit, told};
+use palpate_model::Nanos;
+use palpate_sessions::atomic::{leftovers, sweep};
+use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError};
+use palpate_sessions::folder::Busy;
+use palpate_sessions::recover::{RecoverError, recover, recovered_folder};
+use palpate_sessions::{ChainError, EDITS_FILE, EditError, LOG_FILE, Session, add_edit};
+use std::fs;
+use std::io::{BufRead, BufReader};
+use std::path::Path;
+use std::process::{Child, Stdio};
+
+/// A process that has begun its task and does it until it is let go.
+struct Beside(Child);
+
+impl Beside {
+    fn start(task: &str, folder: &Path) -> Self {
+        let mut command = command(&[], task, folder);
+        let piped = command
+            .stdin(Stdio::piped())
+            .stdout(Stdio::null())
+            .stderr(Stdio::piped());
+        let mut child = piped.spawn().expect("a test is a program");
+        let mut said = BufReader::new(child.stderr.take().expect("it is piped"));
+        let mut line = String::new();
+        said.read_line(&mut line).expect("it says so");
+        assert_eq!(line, "saved 0\n");
+        Self(child)
+    }
+
+    /// Whether this is the process that is told as the holder, where the system tells any.
+    fn is(&self, busy: &Busy) -> bool {
+        busy.holder.is_none_or(|number| number == self.0.id())
+    }
+}
+
+impl Drop for Beside {
+    fn drop(&mut self) {
+        drop(self.0.stdin.take());
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn a_strangers_lock_on_edits_is_waited_for_a_little_and_told() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let id = manifest().session_id;
+    add_edit(at, &id, &edit(1)).unwrap();
+    let stranger = Beside::start(&format!("lock {EDITS_FILE}"), at);
+    match add_edit(at, &id, &edit(2)) {
+        Err(EditError::Chain(ChainError::Busy(busy))) => {
+            assert!(stranger.is(&busy), "{busy}");
+            assert!(busy.path.ends_with(EDITS_FILE), "{busy}");
+        }
+        other => panic!("{other:?}"),
+    }
+    drop(stranger);
+    add_edit(at, &id, &edit(2)).unwrap();
+}
+
+#[test]
+fn a_strangers_lock_on_the_catalog_is_waited_for_a_little_and_told() {
+    let library = tempfile::tempdir().unwrap();
+    let at = library.path();
+    let session = at.join("sessions/one");
+    fs::create_dir_all(&session).unwrap();
+    fs::write(
+        session.join(LOG_FILE),
+        log_bytes(&rows(100, 1), &[], Some(end(Nanos(0)))),
+    )
+    .unwrap();
+    let count = || Catalog::with(at, |catalog| Ok(catalog.update(&mut |_, _| {})?.sessions));
+    assert_eq!(count().unwrap(), 1);
+    for task in [
+        "lock catalog.lock".to_owned(),
+        format!("sqlite {CATALOG_FILE}"),
+    ] {
+        let stranger = Beside::start(&task, at);
+        match count() {
+            Err(CatalogError::Busy(busy)) => assert!(stranger.is(&busy), "{busy}"),
+            other => panic!("{task}: {other:?}"),
+        }
+        drop(stranger);
+        assert_eq!(count().unwrap(), 1, "{task}");
+    }
+}
+
+#[test]
+fn what_a_killed_process_was_writing_is_told_and_swept_and_no_other() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    let mut killed = Beside::start("draft killed.csv", at);
+    let _going_on = Beside::start("draft written.csv", at);
+    assert!(leftovers(at, 1).is_empty());
+    killed.0.kill().unwrap();
+    killed.0.wait().unwrap();
+    let left = leftovers(at, 1);
+    assert!(
+        left.len() == 1 && left[0].to_string_lossy().contains("killed.csv"),
+        "{left:?}"
+    );
+    assert_eq!(sweep(at, 1), left);
+    assert_eq!(fs::read_dir(at).unwrap().count(), 1);
+}
+
+#[test]
+fn of_many_recoveries_at_once_one_wins_and_nothing_is_left_over() {
+    let parent = tempfile::tempdir().unwrap();
+    for round in 0..count_from("PALPATE_ROUNDS", 3) {
+        let folder = parent.path().join(format!("cut-{round}"));
+        fs::create_dir(&folder).unwrap();
+        let all = rows(20_000, 3);
+        fs::write(folder.join(LOG_FILE), log_bytes(&all, &[], None)).unwrap();
+        let children: Vec<Child> = (0..10)
+            .map(|_| {
+                let mut command = command(&[], "recover", &folder);
+                let quiet = command.stdout(Stdio::null()).stderr(Stdio::piped());
+                quiet.spawn().unwrap()
+            })
+            .collect();
+        let outputs: Vec<_> = children
+            .into_iter()
+            .map(|it| it.wait_with_output().unwrap())
+            .collect();
+        let won: u64 = outputs
+            .iter()
+            .flat_map(|output| told(output, "saved"))
+            .sum();
+        assert_eq!(won, 1, "{outputs:?}");
+        assert!(
+            outputs.iter().all(|output| output.status.success()),
+            "{outputs:?}"
+        );
+        assert_eq!(
+            Session::open(&recovered_folder(&folder))
+                .unwrap()
+                .rows
+                .len(),
+            all.len()
+        );
+        let again = recover(&folder, "1", chrono::DateTime::UNIX_EPOCH).unwrap_err();
+        assert!(matches!(again, RecoverError::Before { .. }), "{again}");
+        // The session and its copy, of each round so far.
+        assert_eq!(
+            fs::read_dir(parent.path()).unwrap().count(),
+            2 * (round + 1)
+        );
+        assert_eq!(fs::read_dir(&folder).unwrap().count(), 1);
+    }
+}

@@ -1,0 +1,8 @@
+//! What the test programs of all crates share, and examples and benchmarks with them.
+//!
+//! It is a dependency of tests only and needs the model alone, so that no test program waits for another crate.
+
+pub mod naive_surface;
+pub mod record;
+pub mod skip;
+pub mod wait;

@@ -1,0 +1,86 @@
+//! Tests that cannot run on a computer say so in one way, and are counted.
+#![expect(
+    clippy::print_stdout,
+    reason = "a test that is skipped says so where tests say things"
+)]
+
+use std::io::Write;
+use std::path::Path;
+
+/// Names the file that gets a line for every test that is skipped, as `scripts/skipped` reads them.
+const LIST: &str = "PALPATE_SKIPPED";
+
+/// What a test needs that a computer may lack.
+#[derive(Clone, Copy, Debug)]
+pub enum Need<'a> {
+    /// A program on the path.
+    Program(&'a str),
+    /// A package that `python3` imports.
+    Python(&'a str),
+    /// A file or a folder.
+    File(&'a Path),
+    /// A right or a service of the operating system, which only trying shows.
+    System(&'a str),
+}
+
+impl Need<'_> {
+    /// Its kind, as the list has it, and its name.
+    fn words(&self) -> (&'static str, String) {
+        match self {
+            Self::Program(name) => ("program", (*name).into()),
+            Self::Python(name) => ("python", (*name).into()),
+            Self::File(path) => ("file", path.display().to_string()),
+            Self::System(what) => ("system", (*what).into()),
+        }
+    }
+}
+
+/// Says that the test of this thread is skipped and for want of what. The caller returns.
+///
+/// # Panics
+/// If the list cannot be written: a gate that counts must not count too few.
+pub fn skip(need: Need, reason: &str) {
+    let (kind, name) = need.words();
+    let thread = std::thread::current();
+    let test = thread.name().unwrap_or("a test").to_owned();
+    println!("skipped: {test}: no {kind} {name}: {reason}");
+    let Some(list) = std::env::var_os(LIST) else {
+        return;
+    };
+    let one_line = reason.split_whitespace().collect::<Vec<_>>().join(" ");
+    let line = format!("{kind}\t{name}\t{test}\t{one_line}\n");
+    let file = std::fs::OpenOptions::new()
+        .create(true)
+        .append(true)
+        .open(list);
+    // One write, so that lines of programs that run at the same time stay whole.
+    let written = file.and_then(|mut file| file.write_all(line.as_bytes()));
+    written.expect("the list of skipped tests can be written");
+}
+
+/// Whether a program is missing; if so the test is skipped.
+#[must_use]
+pub fn lacks_program(name: &str) -> bool {
+    let folders = std::env::var_os("PATH").unwrap_or_default();
+    let is_missing = !std::env::split_paths(&folders).any(|folder| folder.join(name).is_file());
+    if is_missing {
+        skip(Need::Program(name), "it is not on the path");
+    }
+    is_missing
+}
+
+/// Whether a file or folder is missing; if so the test is skipped.
+#[must_use]
+pub fn lacks_file(path: &Path) -> bool {
+    let is_missing = !path.exists();
+    if is_missing {
+        skip(Need::File(path), "it is not here");
+    }
+    is_missing
+}
+
+/// Whether there are no pseudo-terminals; if so the test is skipped.
+#[must_use]
+pub fn lacks_terminals() -> bool {
+    lacks_file(Path::new("/dev/ptmx"))
+}
