@@ -29,6 +29,7 @@ mod table;
 mod tare;
 mod target;
 mod unload;
+mod wait_until;
 mod weigh;
 
 pub(crate) use known::{Known, Need};

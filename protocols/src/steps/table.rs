@@ -63,6 +63,7 @@ steps! {
     unload::Unload
     retract::Retract
     rest::Rest
+    wait_until::WaitUntil
     prompt::Prompt
     weigh::Weigh
     check_home::CheckHome

@@ -35,4 +35,5 @@ mod thirty_seeds;
 mod tidy;
 mod trade;
 mod unloading;
+mod wait_until;
 mod wired;

@@ -1,0 +1,236 @@
+//! Wait at rest for something outside the run: a digital input of the rig, or the temperature of the specimen's bath.
+
+use super::{Executable, Facts, InProgress, OnTimeout, Pausing, Progress, Step, StepKind};
+use crate::engine::{Context, Record};
+use crate::file::{Args, Key, Kind};
+use crate::preview::{Span, Walk};
+use palpate_model::Nanos;
+use palpate_model::rig::{DIGITAL_INPUTS_MAX, Phase, Reading};
+use palpate_model::units::Seconds;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+use std::fmt;
+
+/// Wait at rest until a digital input or the bath is as wanted.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WaitUntil {
+    /// What for.
+    pub condition: WaitCondition,
+    /// How long, at most.
+    pub timeout: Seconds,
+    /// What follows if it does not come.
+    #[serde(default)]
+    pub on_timeout: OnTimeout,
+}
+
+/// What is waited for.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
+pub enum WaitCondition {
+    /// A digital input has a level.
+    DigitalInput {
+        /// Its number, from 1.
+        number: u8,
+        /// The level.
+        is_high: bool,
+    },
+    /// The bath is within a band.
+    Bath {
+        /// Lower end in °C.
+        from_celsius: f64,
+        /// Upper end in °C.
+        to_celsius: f64,
+    },
+}
+
+pub(super) const FACTS: Facts = Facts {
+    about: "Wait at rest until a digital input of the rig has a level, or its bath a temperature.",
+    keys: &[
+        Key::optional("input", Kind::Count, "number of the digital input, from 1"),
+        Key::usual(
+            "level",
+            Kind::Text,
+            "high",
+            "`high` or `low`: the level of the input to wait for",
+        )
+        .one_of(&["high", "low"]),
+        Key::optional(
+            "bath_from",
+            Kind::Temperature,
+            "lowest temperature of the bath; goes with `bath_to`",
+        ),
+        Key::optional(
+            "bath_to",
+            Kind::Temperature,
+            "highest temperature of the bath",
+        ),
+        Key::usual("timeout", Kind::Time, "10 min", "longest wait"),
+        Key::usual(
+            "on_timeout",
+            Kind::Text,
+            "stop",
+            "`stop` or `continue`: what follows if it does not come",
+        )
+        .one_of(OnTimeout::WORDS),
+    ],
+    build: Some(read),
+    may_touch: false,
+    ..Facts::of("wait-until", Phase::Rest, Pausing::Wait)
+};
+
+fn read(args: &Args) -> Result<Step, String> {
+    let input = args.has("input").then(|| args.count("input")).transpose()?;
+    let condition = match (input, args.maybe("bath_from"), args.maybe("bath_to")) {
+        (Some(number), None, None) => WaitCondition::DigitalInput {
+            number: u8::try_from(number).unwrap_or(u8::MAX),
+            is_high: args.text("level")? == "high",
+        },
+        (None, Some(from_celsius), Some(to_celsius)) => WaitCondition::Bath {
+            from_celsius,
+            to_celsius,
+        },
+        _ => return Err("give either 'input', or 'bath_from' and 'bath_to'".into()),
+    };
+    condition.check()?;
+    Ok(WaitUntil {
+        condition,
+        timeout: args.seconds("timeout")?,
+        on_timeout: OnTimeout::read(args)?,
+    }
+    .into())
+}
+
+impl WaitCondition {
+    fn check(&self) -> Result<(), String> {
+        match *self {
+            Self::DigitalInput { number, .. }
+                if !(1..=DIGITAL_INPUTS_MAX).contains(&usize::from(number)) =>
+            {
+                Err(format!(
+                    "there is no digital input {number}; give 1 to {DIGITAL_INPUTS_MAX}"
+                ))
+            }
+            Self::Bath {
+                from_celsius: from,
+                to_celsius: to,
+            } if !(from < to) => Err(format!(
+                "no temperature is from {from} to {to} °C; give the lower end first"
+            )),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether it is so; an unknown value is not.
+    fn is_met(&self, cx: &Context<'_>) -> bool {
+        let sensors = cx.sensors();
+        match *self {
+            Self::DigitalInput { number, is_high } => sensors.is_high(number) == Some(is_high),
+            Self::Bath {
+                from_celsius,
+                to_celsius,
+            } => sensors
+                .bath_celsius()
+                .is_some_and(|celsius| (from_celsius..=to_celsius).contains(&celsius)),
+        }
+    }
+}
+
+impl fmt::Display for WaitCondition {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::DigitalInput { number, is_high } => {
+                let level = if *is_high { "high" } else { "low" };
+                write!(f, "digital input {number} is {level}")
+            }
+            Self::Bath {
+                from_celsius,
+                to_celsius,
+            } => write!(f, "the bath is between {from_celsius} and {to_celsius} °C"),
+        }
+    }
+}
+
+impl StepKind for WaitUntil {
+    fn facts(&self) -> &'static Facts {
+        &FACTS
+    }
+
+    fn expect(&self, walk: &mut Walk<'_>) -> Span {
+        walk.check_span(self.timeout);
+        walk.refusals.extend(self.condition.check().err());
+        let sensors = walk.rig.sensors;
+        let is_there = match self.condition {
+            WaitCondition::DigitalInput { number, .. } => number <= sensors.digital_inputs,
+            WaitCondition::Bath { .. } => sensors.has_bath,
+        };
+        if !is_there {
+            walk.refuse(format!(
+                "rig {} cannot tell whether {}: it has no such sensor",
+                walk.rig.name, self.condition
+            ));
+        }
+        // Nobody knows when it comes; a plan that continues without it takes as long as it may.
+        walk.unknown(self.timeout.0, self.timeout.0)
+    }
+}
+
+impl Executable for WaitUntil {
+    type Run = Waiting;
+
+    fn begin(&self, cx: &mut Context<'_>) -> Result<Waiting, String> {
+        Ok(Waiting {
+            plan: *self,
+            begun: cx.now,
+            deadline: cx.now + Nanos::from_seconds(self.timeout),
+        })
+    }
+}
+
+/// A wait in progress.
+#[derive(Clone, Debug, PartialEq)]
+pub(crate) struct Waiting {
+    plan: WaitUntil,
+    begun: Nanos,
+    deadline: Nanos,
+}
+
+impl InProgress for Waiting {
+    /// A pause stops the clock of the timeout; it begins anew when the run goes on.
+    fn on_reading(&mut self, cx: &mut Context<'_>, _reading: &Reading) -> Result<Progress, String> {
+        let WaitUntil {
+            condition,
+            timeout,
+            on_timeout,
+        } = self.plan;
+        if cx.is_extended() {
+            self.deadline = cx.now + Nanos::from_seconds(timeout);
+            return Ok(Progress::Continue);
+        }
+        if condition.is_met(cx) {
+            self.report(cx, condition.to_string());
+            return Ok(Progress::Done);
+        }
+        if cx.now < self.deadline {
+            return Ok(Progress::Continue);
+        }
+        let missed = format!("within {timeout:.0} it did not come to pass that {condition}");
+        Ok(match on_timeout {
+            OnTimeout::Stop => Progress::Stop(missed),
+            OnTimeout::Continue => {
+                self.report(cx, missed);
+                Progress::Done
+            }
+        })
+    }
+}
+
+impl Waiting {
+    fn report(&self, cx: &mut Context<'_>, text: String) {
+        let waited = cx.now.since(self.begun).seconds();
+        let mut values = BTreeMap::from([("waited_s".to_owned(), waited.0)]);
+        let bath = cx.sensors().bath_celsius();
+        values.extend(bath.map(|celsius| ("bath_celsius".to_owned(), celsius)));
+        let text = format!("{text}, after {waited:.1}");
+        cx.record(Record::StepReported { text, values });
+    }
+}
