@@ -76,7 +76,7 @@ pub(super) const MONITOR_KEYS: [Key; 4] = [
         "1 s",
         "how long it must be past before a paused run goes on",
     )
-    .from_0(),
+    .zero_allowed(),
     Key::needed(
         "action",
         Kind::Text,

@@ -64,7 +64,7 @@ impl Key {
     }
 
     /// It takes 0 too.
-    pub const fn from_0(self) -> Self {
+    pub const fn zero_allowed(self) -> Self {
         let range = Range::From0;
         Self { range, ..self }
     }

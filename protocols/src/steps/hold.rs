@@ -28,7 +28,7 @@ pub struct Hold {
 pub(super) const FACTS: Facts = Facts {
     about: "Stay at depth while the force relaxes.",
     keys: &[
-        Key::needed("for", Kind::Time, "how long, at most").from_0(),
+        Key::needed("for", Kind::Time, "how long, at most").zero_allowed(),
         Key::optional(
             "until",
             Kind::Text,

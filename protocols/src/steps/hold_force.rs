@@ -27,7 +27,7 @@ pub(super) const FACTS: Facts = Facts {
     about: "Keep the force and let the depth creep.",
     keys: &[
         Key::needed("force", Kind::Force, "above tare"),
-        Key::needed("for", Kind::Time, "how long").from_0(),
+        Key::needed("for", Kind::Time, "how long").zero_allowed(),
         Key::usual("speed", Kind::Speed, "0.75 mm/s", "of the corrections"),
         Key::needed(
             "deepest",

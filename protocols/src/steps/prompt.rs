@@ -65,13 +65,13 @@ pub(super) const FACTS: Facts = Facts {
             Kind::Mass,
             "by hand: all that shall lie on the load cell, `\"0 g\"` for nothing",
         )
-        .from_0(),
+        .zero_allowed(),
         Key::optional(
             "mount",
             Kind::Count,
             "by hand: the number of the specimen to clip in",
         )
-        .from_0(),
+        .zero_allowed(),
         Key::optional(
             "unmount",
             Kind::Flag,

@@ -17,7 +17,7 @@ pub struct Rest {
 
 pub(super) const FACTS: Facts = Facts {
     about: "Stay where the probe is and let the tissue recover.",
-    keys: &[Key::needed("for", Kind::Time, "how long").from_0()],
+    keys: &[Key::needed("for", Kind::Time, "how long").zero_allowed()],
     build: Some(|args| {
         let duration = args.seconds("for")?;
         Ok(Rest { duration }.into())

@@ -28,7 +28,7 @@ pub(super) const FACTS: Facts = Facts {
             "10 mm",
             "distance from the surface to stop at",
         )
-        .from_0(),
+        .zero_allowed(),
     ],
     build: Some(|args| {
         Ok(Retract {

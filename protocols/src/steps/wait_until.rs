@@ -113,7 +113,7 @@ impl WaitCondition {
             Self::Bath {
                 from_celsius: from,
                 to_celsius: to,
-            } if !(from < to) => Err(format!(
+            } if from >= to || from.is_nan() || to.is_nan() => Err(format!(
                 "no temperature is from {from} to {to} °C; give the lower end first"
             )),
             _ => Ok(()),

@@ -34,7 +34,7 @@ pub struct Settle {
 pub(super) const FACTS: Facts = Facts {
     about: "Read the load cell under a known mass, once the signal has settled.",
     keys: &[
-        Key::needed("mass", Kind::Mass, "all of it, the platform included").from_0(),
+        Key::needed("mass", Kind::Mass, "all of it, the platform included").zero_allowed(),
         Key::usual(
             "masses_go",
             Kind::Text,

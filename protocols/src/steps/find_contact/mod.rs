@@ -89,7 +89,7 @@ pub(super) const FACTS: Facts = Facts {
         Key::optional("retreat", Kind::Length, "way back before the second pass"),
         Key::optional("pass_speed", Kind::Speed, "of the second pass"),
         Key::optional("pass_force", Kind::Force, "force that ends the second pass"),
-        Key::optional("recovery", Kind::Time, "rest after each pass").from_0(),
+        Key::optional("recovery", Kind::Time, "rest after each pass").zero_allowed(),
         Key::optional(
             "std_error_max",
             Kind::Length,
@@ -100,13 +100,13 @@ pub(super) const FACTS: Facts = Facts {
             Kind::Force,
             "force to which the first pass goes on to learn how the tissue answers; `0 N` ends it at the criterion",
         )
-        .from_0(),
+        .zero_allowed(),
         Key::optional(
             "press_dwell",
             Kind::Time,
             "time at the end of each pass while the force relaxes",
         )
-        .from_0(),
+        .zero_allowed(),
     ],
     build: Some(read),
     note: Some(usual_search),
