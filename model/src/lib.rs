@@ -8,6 +8,7 @@
 //!
 //! Start reading at [`units`], then [`rig`] for the words every crate shares.
 
+pub mod about;
 pub mod calibration;
 pub mod estimate;
 pub mod linalg;

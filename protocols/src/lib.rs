@@ -1,19 +1,15 @@
-//! What is done with a rig: plans, the engine that runs them, the runner and replay.
+//! What is done with a rig, as values: plans, the language they are written in, and the engine that runs them.
 //!
-//! A plan describes; [`engine`] decides, one pure step at a time; [`runner`] is the only place
-//! where decisions meet hardware, disk and clock; [`replay`] feeds a recorded session to the
-//! same engine. Nothing here draws, and nothing in [`engine`] or [`plans`] does any I/O.
+//! A plan describes; [`engine`] decides, one pure step at a time; [`preview`] says before a start what a plan
+//! will do. The manifest names the model and no other crate of ours, so nothing here can reach a rig, a file
+//! or a clock. What does is `palpate-runner`.
 //! Start reading at [`engine::step`].
 
-pub mod base;
 pub mod engine;
-pub mod fidelity;
 pub mod file;
-pub mod haptics;
 pub mod plans;
 pub mod preview;
-pub mod programme;
-pub mod replay;
-pub mod runner;
 mod steps;
 pub mod weighed;
+
+pub use steps::{MeterSample, StepMeter, Target};

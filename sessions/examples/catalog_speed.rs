@@ -6,9 +6,10 @@
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::Duration;
+use palpate_model::about::Labels;
 use palpate_sessions::catalog::{Catalog, Condition, Query};
 use palpate_sessions::{
-    Change, Edit, EndRecord, Labels, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
+    Change, Edit, EndRecord, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
 };
 use std::error::Error;
 use std::fs;

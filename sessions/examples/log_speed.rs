@@ -4,11 +4,12 @@
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
 use chrono::{TimeZone, Utc};
+use palpate_model::about::About;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    About, EndRecord, Manifest, Pace, RECORD_VERSION, Row, Session, SessionFolder, SessionWriter,
-    Summary, new_session_id,
+    EndRecord, Manifest, Pace, RECORD_VERSION, Row, Session, SessionFolder, SessionWriter, Summary,
+    new_session_id,
 };
 use std::time::Instant;
 

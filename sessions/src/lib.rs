@@ -10,7 +10,6 @@
 //! Start reading at [`record`] for what a session holds and [`manifest`] for what it says about
 //! itself, then [`log::SessionWriter`] and [`log::Session`].
 
-pub mod about;
 pub mod analyses;
 pub mod atomic;
 pub mod calibrations;
@@ -37,7 +36,6 @@ pub mod text;
 pub mod ticks;
 pub mod trade;
 
-pub use about::{About, AboutError, Labels};
 pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
 pub use calibrations::{Kept, Shelf, read_calibration};
 pub use catalog::{Catalog, CatalogError};

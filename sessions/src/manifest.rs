@@ -1,9 +1,9 @@
 //! The first message of every session: who measured what, on which rig, with which versions.
 
-use crate::about::About;
 use crate::imported::Imported;
 use crate::recover::Recovered;
 use chrono::{DateTime, SecondsFormat, Utc};
+use palpate_model::about::About;
 use palpate_model::rig::{Limits, RigDescription, SignalFacts};
 use palpate_model::units::Seconds;
 use serde::{Deserialize, Serialize};
@@ -40,7 +40,7 @@ pub struct Manifest {
     pub specimen: String,
     /// The probe's shape and size, in words.
     pub indenter: String,
-    /// What else was told of specimen, probe and series; see [`crate::about::KEYS`].
+    /// What else was told of specimen, probe and series; see [`palpate_model::about::KEYS`].
     #[serde(default, skip_serializing_if = "About::is_empty")]
     pub about: About,
     /// How the signal was taken; `None` in sessions recorded before this was written down.

@@ -6,7 +6,7 @@
 
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_protocols::runner::{Stopwatch, TimeScale};
+use palpate_runner::{Stopwatch, TimeScale};
 use palpate_tests::flow::{Flow, Window};
 use palpate_tests::many::{original, write};
 use std::time::Duration;

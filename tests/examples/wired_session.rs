@@ -9,7 +9,7 @@ use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::rig::RawBytes;
 use palpate_model::units::{Depth, MmPerS, Seconds};
 use palpate_protocols::plans::RampHold;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_sessions::{
     FolderSegments, LogWriter, Part, Parts, RawBlock, Row, Session, SessionFolder,
 };

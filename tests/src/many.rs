@@ -1,8 +1,9 @@
 //! A library of many small sessions, each the beginning of a recorded one under another manifest.
 
 use crate::workspace;
+use palpate_model::about::Labels;
 use palpate_sessions::{
-    Change, Edit, EndRecord, Labels, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
+    Change, Edit, EndRecord, LogWriter, Manifest, Session, Sink, Verdict, add_edit,
 };
 use std::fs;
 use std::io;

@@ -1,11 +1,12 @@
 //! A ramp and hold through the runner, as a session read back from disk.
 
 use palpate_drivers::Rig;
+use palpate_model::about::Labels;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_protocols::plans::{Plan, RampHold};
-use palpate_protocols::runner::{
-    AfterStop, Answers, Labels, Leader, Request, RunRequest, Runner, StartError, TimeScale,
+use palpate_runner::{
+    AfterStop, Answers, Leader, Request, RunRequest, Runner, StartError, TimeScale,
 };
 use palpate_sessions::Session;
 use palpate_test_support::wait::PATIENCE;

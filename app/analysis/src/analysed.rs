@@ -8,7 +8,7 @@ use crate::source::{SourceError, calibration_of, decisions, decisions_among};
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::units::{Seconds, Volts};
 use palpate_protocols::engine::{ENGINE_VERSION, Effect, Record};
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::analyses::{
     Analysed, Analyses, Analysis, AnalysisError, Input, changed_inputs, document_input, inputs_of,
 };

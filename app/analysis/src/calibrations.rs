@@ -3,8 +3,8 @@
 use crate::report::calibration::{Entry, Told};
 use crate::report::calibration_plot::Curves;
 use palpate_model::calibration::{Bench, Calibration};
-use palpate_protocols::programme::calibration_of;
-use palpate_protocols::runner::wall_now;
+use palpate_runner::programme::calibration_of;
+use palpate_runner::wall_now;
 use palpate_sessions::{Session, Shelf, age_days, save, supersede};
 use std::path::Path;
 

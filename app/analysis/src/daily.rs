@@ -314,7 +314,7 @@ mod tests {
     fn a_failed_check_closes_the_gate_until_one_passes() {
         let library = tempfile::tempdir().unwrap();
         let at = Some(library.path());
-        let now = palpate_protocols::runner::wall_now();
+        let now = palpate_runner::wall_now();
         let plan = RampHold::default().plan();
         let gate = |is_virtual| Gate::of(&plan, at, "bench", is_virtual, now).unwrap();
         assert!(matches!(gate(true), Gate::Note(_)));

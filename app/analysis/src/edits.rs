@@ -3,7 +3,7 @@
 
 use crate::progress::Progress;
 use chrono::{DateTime, Utc};
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::analyses::{Analyses, AnalysisError, inputs_of};
 use palpate_sessions::edits::{
     Change, Decision, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit,

@@ -1,8 +1,8 @@
 //! What a recorded session was to do against what it did.
 
 use crate::source::{SourceError, decisions};
-use palpate_protocols::fidelity::{Fidelity, FidelityMeter};
 use palpate_protocols::plans::Plan;
+use palpate_runner::fidelity::{Fidelity, FidelityMeter};
 use palpate_sessions::log::Session;
 
 /// The fidelity of a recorded session.
@@ -36,7 +36,7 @@ pub fn of_session(session: &Session) -> Result<Fidelity, SourceError> {
 mod tests {
     use super::*;
     use palpate_model::rig::Phase;
-    use palpate_protocols::fidelity::Achieved;
+    use palpate_runner::fidelity::Achieved;
     use palpate_sessions::record::Row;
     use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! The library's catalog asked and brought up to date, away from the window's thread.
 
 use crate::progress::Progress;
-use palpate_protocols::runner::Stopwatch;
+use palpate_runner::Stopwatch;
 use palpate_sessions::catalog::{Catalog, CatalogError, Changes, Choices, Entry, Event, Query};
 use palpate_sessions::edits::{Edit, Edits};
 use std::ops::ControlFlow;

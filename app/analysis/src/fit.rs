@@ -5,11 +5,11 @@ use crate::origin::Origin;
 use crate::source::{self, FitSource, SourceError, Wanted};
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Seconds;
-use palpate_protocols::runner::Stopwatch;
 use palpate_rheology::fit::{
     self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample,
     ProfileInterval, Systematic, systematic,
 };
+use palpate_runner::Stopwatch;
 use palpate_tables::import::ColumnNames;
 use serde::Serialize;
 use std::path::Path;

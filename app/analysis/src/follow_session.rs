@@ -2,8 +2,9 @@
 
 use super::haptics::Followed;
 use crate::report::haptics::follow_table;
-use palpate_protocols::runner::wall_now;
-use palpate_sessions::{Labels, new_session_id};
+use palpate_model::about::Labels;
+use palpate_runner::wall_now;
+use palpate_sessions::new_session_id;
 use palpate_tables::import::{Kept, Told, keep, parse_foreign};
 use std::path::Path;
 

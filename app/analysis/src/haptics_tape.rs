@@ -6,11 +6,11 @@ use palpate_drivers::rig_file::fields::{Fields, in_words};
 use palpate_haptics::{DELAY_MAX, DriveKind, MasterSlaveError, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::haptics::scene_file::{body_text, read_body};
-use palpate_protocols::haptics::taped::{
+use palpate_runner::haptics::scene_file::{body_text, read_body};
+use palpate_runner::haptics::taped::{
     COLUMNS, LED_COLUMNS, LedRecorder, LedRow, TapeRecorder, TapedLed, TapedRow, led_row, taped_row,
 };
-use palpate_protocols::haptics::{Led, Simulated, Ticking};
+use palpate_runner::haptics::{Led, Simulated, Ticking};
 use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use std::path::Path;
 

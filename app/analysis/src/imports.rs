@@ -2,8 +2,9 @@
 
 use crate::progress::Progress;
 use crate::report::imported;
-use palpate_protocols::runner::wall_now;
-use palpate_sessions::{FolderError, Imported, Labels, library_folder};
+use palpate_model::about::Labels;
+use palpate_runner::wall_now;
+use palpate_sessions::{FolderError, Imported, library_folder};
 use palpate_sessions::{new_session_folder, new_session_id};
 use palpate_tables::import::{
     Foreign, ForeignError, ForeignPart, KeepError, Kept, Told, folder_name, keep, open_foreign,

@@ -4,8 +4,8 @@ use palpate_drivers::Rig;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::Newtons;
-use palpate_protocols::replay::Player;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
+use palpate_runner::replay::Player;
 
 /// A rig to work on.
 pub struct WorkbenchRequest {

@@ -3,11 +3,11 @@
 use super::haptics::{Paced, body_of};
 use super::recorded::{Again, Ended, RecordedTicks, Replayed, computed_again};
 use palpate_haptics::scene::{Hand6, LedScene, Pose, Scene, ScenePath, WhyNoForce};
-use palpate_protocols::haptics::scene::{
+use palpate_runner::haptics::scene::{
     COLUMNS, SENSED_COLUMNS, SceneRecorder, SceneRow, scene_input, scene_row,
 };
-use palpate_protocols::haptics::scene_file::SceneFile;
-use palpate_protocols::haptics::{SceneEnd, SceneLoop};
+use palpate_runner::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::{SceneEnd, SceneLoop};
 use palpate_sessions::ticks::{Recording, SETTINGS, has_columns};
 use serde::Serialize;
 use std::path::Path;

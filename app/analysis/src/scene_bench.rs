@@ -5,10 +5,10 @@ use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Needs, NoPlan, Recovery, SceneCurves, ScenePlan, Side,
     StepPoint, Surface, plan, slower,
 };
-use palpate_protocols::haptics::scene_file::SceneFile;
-use palpate_protocols::runner::Stopwatch;
 use palpate_rheology::tolerance::Tolerance;
 use palpate_rheology::trade::{Machine, pareto};
+use palpate_runner::Stopwatch;
+use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
 
 /// The family that a scene plays: the modified Kelvin body of third order.

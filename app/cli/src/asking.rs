@@ -5,7 +5,7 @@ use super::output::Output;
 use palpate_model::time::Nanos;
 use palpate_model::units::Seconds;
 use palpate_protocols::engine::{Operator, Outcome};
-use palpate_protocols::runner::{PromptView, Request, RunView};
+use palpate_runner::{PromptView, Request, RunView};
 use std::io::BufRead;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

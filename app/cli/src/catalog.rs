@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::Output;
 use clap::{Args, Subcommand};
 use indicatif::ProgressBar;
-use palpate_protocols::runner::Stopwatch;
+use palpate_runner::Stopwatch;
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, Changes, Doubt};
 use palpate_sessions::library_folder;
 use serde::Serialize;

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::atomic::leftovers;
 use palpate_sessions::library_folder;
 use palpate_sessions::recover::{

@@ -4,7 +4,7 @@ use super::Failure;
 use super::output::Output;
 use clap::Args;
 use palpate_analysis::imports::{FileReport, ImportFailure, Request, import, text};
-use palpate_sessions::Labels;
+use palpate_model::about::Labels;
 use palpate_tables::import::{
     ColumnChoice, Decimal, Delimiter, Fault, ForeignError, Format, KeepError, TextEncoding, Told,
     UnitChoice, ZeroChoice,

@@ -6,12 +6,13 @@ use clap::Args;
 use palpate_analysis::analysed;
 use palpate_analysis::report::catalog::one_line;
 use palpate_analysis::report::said;
+use palpate_model::about::About;
 use palpate_model::rig::SignalFacts;
-use palpate_protocols::base::FoundBase;
+use palpate_runner::base::FoundBase;
 use palpate_sessions::analyses::{Analysis, inputs_of};
 use palpate_sessions::edits::{Edit, Review, Verdict};
 use palpate_sessions::log::Session;
-use palpate_sessions::{About, EDITS_FILE, HealthSummary, Imported};
+use palpate_sessions::{EDITS_FILE, HealthSummary, Imported};
 use serde::Serialize;
 use std::path::PathBuf;
 

@@ -45,7 +45,7 @@ use clap::{Parser, Subcommand};
 use output::Output;
 use palpate_analysis::opening::Windows;
 use palpate_analysis::source::SourceError;
-use palpate_sessions::Labels;
+use palpate_model::about::Labels;
 use palpate_sessions::log::ReadError;
 use protocol::ProtocolCommand;
 use std::process::ExitCode;

@@ -14,7 +14,7 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position, Volts};
 use palpate_protocols::plans::RampHold;
-use palpate_protocols::runner::{TimeScale, driver_clock};
+use palpate_runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
 
 /// The bench of a simulated rig or behind an emulated device.

@@ -10,17 +10,19 @@ use clap::Args;
 use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
 use palpate_analysis::report::haptics::slave_text;
 use palpate_drivers::Rig;
-use palpate_protocols::base::FoundBase;
+use palpate_model::about::About;
+use palpate_model::about::Labels;
 use palpate_protocols::engine::{EndingKind, Operator};
-use palpate_protocols::haptics::slave::{SlaveLeader, Slaved};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
-use palpate_protocols::runner::{
-    AfterStop, Answers, Labels, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
+use palpate_runner::base::FoundBase;
+use palpate_runner::haptics::slave::{SlaveLeader, Slaved};
+use palpate_runner::{
+    AfterStop, Answers, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
     TimeScale, wall_now,
 };
 use palpate_sessions::recover::{Health, Patient, examine};
-use palpate_sessions::{About, Verdict, library_folder};
+use palpate_sessions::{Verdict, library_folder};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};

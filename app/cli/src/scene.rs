@@ -13,7 +13,7 @@ use palpate_analysis::scene_bench::{Bench, bench, made_after, planned, planned_a
 use palpate_analysis::trade::{Extent, measure_scene};
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
-use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 

@@ -7,7 +7,7 @@ use palpate_analysis::edited::{self, Edited};
 pub(super) use palpate_analysis::edits::author;
 use palpate_analysis::report::catalog::one_line;
 use palpate_model::units::Position;
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::edits::{Change, Edit, Verdict, add_edit};
 use std::path::{Path, PathBuf};
 

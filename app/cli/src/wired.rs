@@ -11,7 +11,7 @@ use palpate_drivers::{Rig, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
-use palpate_protocols::runner::driver_clock;
+use palpate_runner::driver_clock;
 use serde::Serialize;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};

@@ -10,11 +10,11 @@ use eframe::egui::{
 };
 use eframe::egui::{pos2, vec2};
 use egui_plot::{Line, Plot, PlotPoint, PlotPoints};
+use palpate_model::about::About;
 use palpate_model::rig::{Limits, Phase, RigDescription};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
 use palpate_sessions::{
-    About, EndRecord, Manifest, Pace, RECORD_VERSION, Row, SessionFolder, SessionWriter,
-    new_session_id,
+    EndRecord, Manifest, Pace, RECORD_VERSION, Row, SessionFolder, SessionWriter, new_session_id,
 };
 use palpate_window::command::Commands;
 use palpate_window::screens::review::{ReviewScreen, View};

@@ -34,7 +34,7 @@ use palpate_drivers::serial::list_ports;
 use palpate_drivers::sim::SimSettings;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
 

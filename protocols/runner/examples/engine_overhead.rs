@@ -12,7 +12,7 @@ use palpate_protocols::engine::{Config, Effect, Input, Operator, State, step};
 use palpate_protocols::file::built_in;
 use palpate_protocols::plans::{Hold, HoldRate, Plan, Rest, SelfTest, Step, Tare};
 use palpate_protocols::preview::preview;
-use palpate_protocols::runner::Stopwatch;
+use palpate_runner::Stopwatch;
 use std::collections::BTreeMap;
 use std::sync::Arc;
 

@@ -1,6 +1,6 @@
 //! The base behind a specimen and how thick the specimen is, as a run found them.
 
-use crate::engine::Record;
+use palpate_protocols::engine::Record;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::EntryKind;
 use serde::Serialize;

@@ -3,14 +3,14 @@
 
 use super::snapshot::{Lateness, LogLine, PromptView, RunView, ToWeigh, Touch};
 use crate::base::FoundBase;
-use crate::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
-use crate::plans::Step;
-use crate::preview::StepPreview;
-use crate::weighed::{Readings, Weighed};
 use palpate_model::Nanos;
 use palpate_model::rig::Phase;
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_protocols::engine::{Config, Contact, EndingKind, Input, Outcome, Record, State};
+use palpate_protocols::plans::Step;
+use palpate_protocols::preview::StepPreview;
+use palpate_protocols::weighed::{Readings, Weighed};
 use palpate_sessions::edits::Verdict;
 use std::collections::VecDeque;
 use std::path::PathBuf;

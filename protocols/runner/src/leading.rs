@@ -1,9 +1,9 @@
 //! What leads a slave from outside, and what it is told: the newest of each, at the runner's own pace.
 
-use crate::engine::State;
 use palpate_model::Nanos;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons};
+use palpate_protocols::engine::State;
 use std::fmt::Debug;
 use std::sync::{Arc, Mutex, PoisonError};
 

@@ -5,23 +5,27 @@
 //! no experiment logic.
 
 mod active_run;
+pub mod base;
 mod board;
 mod clock;
+pub mod fidelity;
+pub mod haptics;
 mod leading;
 mod live_feed;
 mod main_loop;
+pub mod programme;
+pub mod replay;
 mod snapshot;
 mod start;
 #[cfg(test)]
 mod tests;
 mod watch;
 
-pub(crate) use active_run::to_json;
-pub(crate) use board::{Board, LogState};
+use active_run::to_json;
+use board::{Board, LogState};
 pub use clock::{Metronome, Stopwatch, TimeScale, driver_clock, wall_now};
 pub use leading::{Felt, Leader, Leading};
-pub(crate) use live_feed::LiveFeed;
+use live_feed::LiveFeed;
 pub use main_loop::{Request, Runner};
-pub use palpate_sessions::Labels;
 pub use snapshot::{Lateness, LogLine, PromptView, RigView, RunView, Snapshot, ToWeigh, Touch};
 pub use start::{AfterStop, Answers, RunRequest, StartError};

@@ -1,9 +1,9 @@
 //! The live fit of a run, fed sample by sample. Should it ever panic, it is off, and nothing else is.
 
-use crate::engine::{Config, State};
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons, Seconds};
+use palpate_protocols::engine::{Config, State};
 use palpate_rheology::fit::LiveFit;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind};

@@ -1,15 +1,15 @@
 //! What the runner shows the world: one immutable value, swapped as a whole.
 
 use crate::base::FoundBase;
-use crate::engine::{Contact, Derived, Outcome, PauseView, Power, UnloadedSignal};
-use crate::preview::StepPreview;
-use crate::weighed::Weighed;
 use palpate_model::Nanos;
 use palpate_model::calibration::SettlingNow;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading, RigDescription};
 use palpate_model::signal::LiveTrace;
 use palpate_model::units::{Newtons, Position, Seconds};
+use palpate_protocols::engine::{Contact, Derived, Outcome, PauseView, Power, UnloadedSignal};
+use palpate_protocols::preview::StepPreview;
+use palpate_protocols::weighed::Weighed;
 use palpate_sessions::edits::Verdict;
 use std::path::PathBuf;
 use std::sync::Arc;

@@ -4,15 +4,16 @@ use super::active_run::ActiveRun;
 use super::clock::wall_now;
 use super::leading::Leader;
 use super::watch::HostWatch;
-use crate::engine::{Config, ENGINE_VERSION};
-use crate::plans::Plan;
-use crate::preview::preview;
 use palpate_model::Nanos;
+use palpate_model::about::Labels;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
+use palpate_protocols::engine::{Config, ENGINE_VERSION};
+use palpate_protocols::plans::Plan;
+use palpate_protocols::preview::preview;
 use palpate_sessions::{
-    Labels, Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space,
-    library_folder, new_session_folder, new_session_id, spare_folder,
+    Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space, library_folder,
+    new_session_folder, new_session_id, spare_folder,
 };
 use std::path::PathBuf;
 use std::sync::Arc;

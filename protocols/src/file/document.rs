@@ -151,7 +151,7 @@ fn ask(root: &Table, problems: &mut Problems) -> Vec<String> {
         );
         return Vec::new();
     };
-    let known: Vec<&str> = palpate_sessions::about::KEYS
+    let known: Vec<&str> = palpate_model::about::KEYS
         .iter()
         .map(|key| key.name)
         .collect();

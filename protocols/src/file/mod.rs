@@ -9,12 +9,12 @@ mod check;
 mod document;
 mod order;
 mod parameter;
-pub(crate) mod problem;
+pub mod problem;
 mod procedure;
 mod quantity;
 mod reference;
 mod scope;
-pub(crate) mod tree;
+pub mod tree;
 mod watch;
 mod words;
 
@@ -28,8 +28,8 @@ pub use reference::reference;
 pub(crate) use words::Key;
 
 use crate::plans::{Plan, PlanSource};
-use palpate_sessions::Labels;
-use palpate_sessions::about::{self, KEYS};
+use palpate_model::about::Labels;
+use palpate_model::about::{self, KEYS};
 use problem::{Problems, suggestion};
 use scope::Scope;
 use std::collections::BTreeMap;

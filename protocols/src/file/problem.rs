@@ -68,7 +68,7 @@ impl fmt::Display for Problem {
 
 /// The problems found so far: each once, and not too many.
 #[derive(Debug, Default)]
-pub(crate) struct Problems {
+pub struct Problems {
     found: Vec<Problem>,
     dropped: usize,
     /// How often something was wrong, repeats included.
@@ -124,7 +124,7 @@ impl Problems {
 }
 
 /// The known word nearest to one that is not known, if it is near.
-pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) -> Option<&'a str> {
     let near = known
         .into_iter()
         .map(|candidate| (distance(word, candidate), candidate));
@@ -134,7 +134,7 @@ pub(crate) fn nearest<'a>(word: &str, known: impl IntoIterator<Item = &'a str>) 
 }
 
 /// "; did you mean 'x'?" or, with nothing near, the list of what is known.
-pub(crate) fn suggestion(word: &str, known: &[&str]) -> String {
+pub fn suggestion(word: &str, known: &[&str]) -> String {
     match nearest(word, known.iter().copied()) {
         Some(near) => format!("did you mean '{near}'?"),
         None if known.is_empty() => "there is none here".into(),

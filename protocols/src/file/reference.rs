@@ -5,7 +5,7 @@ use super::quantity::Kind;
 use super::watch::MONITOR_KEYS;
 use super::words::{COMMON, Key, KeyNeed};
 use crate::steps::KINDS;
-use palpate_sessions::about::KEYS;
+use palpate_model::about::KEYS;
 use std::fmt::Write;
 
 /// Every step with its keys, units and usual values, then loops, monitors, units and what can be asked, in Markdown.

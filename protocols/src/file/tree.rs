@@ -7,14 +7,14 @@ use toml::de::{DeTable, DeValue};
 
 /// A value at its line.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Node {
+pub struct Node {
     pub line: u32,
     pub value: Value,
 }
 
 /// What can stand behind a key.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) enum Value {
+pub enum Value {
     Text(String),
     /// A number without a unit, as it was written.
     Number(String),
@@ -25,14 +25,14 @@ pub(crate) enum Value {
 
 /// Keys and values in the order of the text.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub(crate) struct Table {
+pub struct Table {
     pub line: u32,
     pub entries: Vec<Entry>,
 }
 
 /// A key with its value.
 #[derive(Clone, Debug, PartialEq)]
-pub(crate) struct Entry {
+pub struct Entry {
     pub key: String,
     pub line: u32,
     pub node: Node,
@@ -73,7 +73,7 @@ impl Node {
 }
 
 /// Reads a text. A mistake of writing makes everything behind it doubtful, so only the first is told.
-pub(crate) fn read(text: &str) -> Result<Table, Problem> {
+pub fn read(text: &str) -> Result<Table, Problem> {
     let lines = Lines::of(text);
     match DeTable::parse(text) {
         Ok(document) => Ok(lines.table(document.get_ref(), 0)),

@@ -34,7 +34,8 @@ mod weigh;
 
 pub(crate) use known::{Known, Need};
 pub use table::*;
-pub(crate) use target::{Done, FORCE_FLOOR, MeterSample, StepMeter, Target};
+pub(crate) use target::{Done, FORCE_FLOOR};
+pub use target::{MeterSample, StepMeter, Target};
 
 use crate::engine::{Answer, Context};
 use crate::file::{Args, Key};

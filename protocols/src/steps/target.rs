@@ -18,7 +18,7 @@ const CRUISE_MS_MIN: u64 = 20;
 
 /// One sample as it was recorded.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct MeterSample {
+pub struct MeterSample {
     pub tick: u64,
     pub status: AxisStatus,
     pub pulses: Option<i64>,
@@ -37,7 +37,7 @@ impl MeterSample {
 
 /// One target, and what became of it.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Target {
+pub struct Target {
     pub quantity: &'static str,
     pub unit: &'static str,
     pub target: f64,
@@ -78,7 +78,7 @@ impl Slope {
 
 /// Follows a step while it runs.
 #[derive(Clone, Debug)]
-pub(crate) struct StepMeter {
+pub struct StepMeter {
     step: Step,
     rig: RigDescription,
     first: Option<MeterSample>,

@@ -3,12 +3,13 @@
 
 use crate::support::{MemorySink, Random, end, manifest, rows};
 use chrono::{Duration, TimeZone, Utc};
+use palpate_model::about::Labels;
 use palpate_sessions::analyses::{Analysed, Analysis, add_analysis};
 use palpate_sessions::catalog::{
     CATALOG_FILE, Catalog, Condition, Entry, Order, Query, ReviewIs, VerdictIs,
 };
 use palpate_sessions::edits::{Change, Decision, Edit, Verdict, add_edit};
-use palpate_sessions::{LOG_FILE, Labels, LogWriter, Manifest};
+use palpate_sessions::{LOG_FILE, LogWriter, Manifest};
 use std::fs;
 use std::path::Path;
 

@@ -3,8 +3,9 @@
 //! The numbers are known by construction; the layouts are those cited in `docs/guide/import.md`.
 
 use chrono::{TimeZone, Utc};
+use palpate_model::about::Labels;
 use palpate_model::rig::Phase;
-use palpate_sessions::{Labels, ORIGINAL_FOLDER, Session};
+use palpate_sessions::{ORIGINAL_FOLDER, Session};
 use palpate_tables::import::{
     Foreign, ForeignPart, Kept, Sample, Told, folder_name, keep, open_foreign, parse_foreign,
 };

@@ -1,11 +1,12 @@
 //! Sessions to test with, and sinks that remember or fail.
 
 use chrono::{TimeZone, Utc};
+use palpate_model::about::{About, Labels};
 use palpate_model::rig::{AdcDescription, Limits, Phase, RawBytes, RigDescription, SignalFacts};
 use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Volts};
 use palpate_sessions::{
-    About, EndRecord, Entry, EntryKind, Labels, LogWriter, Manifest, Part, Parts, RECORD_VERSION,
-    ReadError, Row, Session, Sink,
+    EndRecord, Entry, EntryKind, LogWriter, Manifest, Part, Parts, RECORD_VERSION, ReadError, Row,
+    Session, Sink,
 };
 use std::io;
 use std::sync::{Arc, Mutex};

@@ -2,7 +2,7 @@
 use eframe::egui::{Key, Modifiers, Role};
 use egui_kittest::kittest::Queryable;
 use palpate_analysis::edited;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_sessions::edits::{Change, Edits, Verdict};
 use palpate_tests::flow::{Flow, Window};
 use palpate_tests::many::{original, write};

@@ -4,7 +4,7 @@ use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigError, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RigCommand, RigDescription};
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_tests::flow::Flow;
 use palpate_window::window::WindowOptions;
 

@@ -10,7 +10,7 @@ use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_test_support::skip::{Need, skip};
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;

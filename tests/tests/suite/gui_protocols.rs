@@ -4,7 +4,7 @@ use eframe::egui::Key;
 use egui_kittest::kittest::Queryable;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{EndingKind, PauseView};
-use palpate_protocols::runner::{RunView, TimeScale};
+use palpate_runner::{RunView, TimeScale};
 use palpate_sessions::{Session, Shelf};
 use palpate_tests::flow::Flow;
 

@@ -1,6 +1,6 @@
 //! The review screen, driven by accessible name: sessions closely and beside each other.
 use eframe::egui::{Key, Modifiers};
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_sessions::Session;
 use palpate_tests::flow::Flow;
 use palpate_tests::workspace;

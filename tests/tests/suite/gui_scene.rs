@@ -3,7 +3,7 @@
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_haptics::scene::WhyNoForce;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
 use std::path::Path;
 

@@ -2,7 +2,7 @@
 use eframe::App;
 use eframe::egui::{DroppedFile, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;

@@ -3,7 +3,7 @@
 //! Press, Type and Wait at the beginning of a sentence are done; what they name is found by its accessible name.
 use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::{NodeT, Queryable};
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 use palpate_tests::flow::{Flow, Window};
 use palpate_tests::workspace;
 

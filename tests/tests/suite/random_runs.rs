@@ -13,8 +13,8 @@ use palpate_protocols::plans::{
     Jog, LoadTo, Monitor, OnFailure, OnTimeout, Plan, PlannedStep, Press, Prompt, Ramp, Rest,
     Retract, SelfTest, Settle, Side, Sine, Source, Step, Tare, Unload, Weigh,
 };
-use palpate_protocols::replay::replay;
-use palpate_protocols::runner::StartError;
+use palpate_runner::StartError;
+use palpate_runner::replay::replay;
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
 use std::collections::VecDeque;

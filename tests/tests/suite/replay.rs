@@ -1,7 +1,7 @@
 //! Recorded sessions give the same decisions, and a difference is found where it is.
 use palpate_model::Nanos;
-use palpate_protocols::replay::{Blessing, Player, blessings_of, replay};
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
+use palpate_runner::replay::{Blessing, Player, blessings_of, replay};
 use palpate_sessions::{EntryKind, Session};
 use palpate_tests::workspace;
 use serde_json::json;
@@ -220,7 +220,7 @@ fn a_played_session_shows_what_was_recorded() {
         ] {
             assert_eq!(shown.is_some(), recorded.is_some());
             let apart = shown.unwrap_or(0.0) - recorded.unwrap_or(0.0);
-            assert!(apart.abs() <= palpate_protocols::replay::TOLERANCE_DERIVED);
+            assert!(apart.abs() <= palpate_runner::replay::TOLERANCE_DERIVED);
         }
     }
     let end = session.end.unwrap();

@@ -7,8 +7,8 @@ use palpate_haptics::simulation::SimulationSettings;
 use palpate_model::Nanos;
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
-use palpate_protocols::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
-use palpate_protocols::runner::{Felt, Leading};
+use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings, Slaved};
+use palpate_runner::{Felt, Leading};
 
 const BODY: ModifiedKelvin = ModifiedKelvin::THESIS;
 

@@ -9,7 +9,7 @@ use palpate_protocols::engine::{EndingKind, Operator, Record};
 use palpate_protocols::file::Protocol;
 use palpate_protocols::plans::{OnTimeout, Plan, SelfTest, WaitCondition, WaitUntil};
 use palpate_protocols::preview::preview;
-use palpate_protocols::replay::replay;
+use palpate_runner::replay::replay;
 use palpate_tests::lab::Lab;
 use palpate_tests::recorded;
 

@@ -9,8 +9,8 @@ use crate::report::dossier::{Wanted, name_of};
 use crate::report::fit_json::{Beside, FitObject, Overlay};
 use crate::report::kept;
 use crate::source::{self, FitSource, Stretch};
-use palpate_protocols::runner::Stopwatch;
 use palpate_rheology::fit::{self, FitOptions, FitReport, FitSample, Parameter, systematic_joint};
+use palpate_runner::Stopwatch;
 use serde_json::{Value, json};
 use std::path::Path;
 

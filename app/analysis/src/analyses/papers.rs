@@ -4,7 +4,7 @@ use super::{Done, step};
 use crate::progress::Progress;
 use crate::report::dossier::{self, Ending, Figure, Wanted};
 use crate::report::figures::{Align, Window};
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use std::path::Path;
 
 /// What is written.

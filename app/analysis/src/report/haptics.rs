@@ -12,9 +12,9 @@ use palpate_haptics::check::CheckSample;
 use palpate_haptics::margin::Margin;
 use palpate_model::rig::Phase;
 use palpate_model::units::Seconds;
-use palpate_protocols::haptics::slave::{Difference, MasterLoop, Slaved};
-use palpate_protocols::haptics::timing::Spread;
 use palpate_rheology::fit::FitReport;
+use palpate_runner::haptics::slave::{Difference, MasterLoop, Slaved};
+use palpate_runner::haptics::timing::Spread;
 
 /// A check in words.
 #[must_use]

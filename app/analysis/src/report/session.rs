@@ -1,7 +1,7 @@
 //! What happened in a run, as text: how it ended, what it is worth, what was kept, what the time went to.
 
 use super::text::in_columns;
-use palpate_protocols::fidelity::{Achieved, Fidelity};
+use palpate_runner::fidelity::{Achieved, Fidelity};
 use palpate_sessions::{EndRecord, Verdict};
 
 /// Rigs that report every tick of a millisecond are never further apart, in s, unless a sample is missing.

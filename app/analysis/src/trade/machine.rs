@@ -1,8 +1,8 @@
 //! The machine at hand.
 
 use chrono::{DateTime, Utc};
-use palpate_protocols::runner::wall_now;
 use palpate_rheology::trade::{Machine, TradeCurves};
+use palpate_runner::wall_now;
 
 /// Version of this program.
 #[must_use]

@@ -20,8 +20,8 @@ pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 pub use text::text;
 
 use chrono::{DateTime, SecondsFormat, Utc};
-use palpate_protocols::runner::wall_now;
 use palpate_rheology::trade::{Cost, TRADE_FORMAT, TradeCurves};
+use palpate_runner::wall_now;
 use std::ops::ControlFlow;
 use timing::Job;
 

@@ -5,8 +5,8 @@
 //! same, and their difference says how far a time can be repeated.
 
 use super::Extent;
-use palpate_protocols::runner::Stopwatch;
 use palpate_rheology::trade::Cost;
+use palpate_runner::Stopwatch;
 use std::ops::ControlFlow;
 
 /// Something to be timed.

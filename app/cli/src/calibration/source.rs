@@ -2,7 +2,7 @@
 
 use super::super::Failure;
 use palpate_model::calibration::{Bench, Calibration};
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::calibrations::{Kept, Shelf, read_calibration};
 use palpate_sessions::library_folder;
 use palpate_sessions::shelf::{self, LibraryError};

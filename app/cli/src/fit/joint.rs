@@ -6,10 +6,10 @@ use super::{FitArgs, Recipe, intervals};
 use palpate_analysis::fit::Intervals;
 use palpate_analysis::report::fit_json::{Beside, JointObject, Overlay};
 use palpate_analysis::report::{family, text};
-use palpate_protocols::runner::Stopwatch;
 use palpate_rheology::fit::{
     FitError, FitSample, Fitted, JointReport, NamedReport, Parameter, Traced, systematic_joint,
 };
+use palpate_runner::Stopwatch;
 
 /// Stands for all parameters of the specimen.
 const BODY: &str = "body";

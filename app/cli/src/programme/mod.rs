@@ -12,10 +12,8 @@ use before::{Ahead, ask, contents, look_ahead, parse, refusal, refuse, tell, wit
 use palpate_analysis::report::programme::Page;
 use palpate_protocols::file::Problem;
 use palpate_protocols::plans::Plan;
-use palpate_protocols::programme::{
-    Done, Event, Laboratory, Programme, RunError, run as carry_out,
-};
-use palpate_protocols::runner::{Answers, RunView, Runner, wall_now};
+use palpate_runner::programme::{Done, Event, Laboratory, Programme, RunError, run as carry_out};
+use palpate_runner::{Answers, RunView, Runner, wall_now};
 use palpate_sessions::text::{checksum, read};
 use palpate_sessions::{library_folder, new_programme_folder};
 use serde::Serialize;

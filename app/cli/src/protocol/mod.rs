@@ -12,7 +12,7 @@ use palpate_protocols::file::{
 };
 use palpate_protocols::plans::PlannedStep;
 use palpate_protocols::preview::{Preview, outline};
-use palpate_protocols::runner::Stopwatch;
+use palpate_runner::Stopwatch;
 use palpate_sessions::text::read_if_present;
 use serde::Serialize;
 use std::collections::BTreeMap;

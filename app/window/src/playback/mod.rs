@@ -22,7 +22,7 @@ use eframe::egui::{
 use palpate_analysis::opening::PlaybackRequest;
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Seconds};
-use palpate_protocols::runner::Snapshot;
+use palpate_runner::Snapshot;
 use std::sync::Arc;
 use std::time::Duration;
 use transport::Transport;

@@ -3,7 +3,7 @@
 use crate::theme::Tokens;
 use eframe::egui::{Button, Context, Key, RichText, Slider, Ui, vec2};
 use palpate_figures::uncertain::clock;
-use palpate_protocols::runner::TimeScale;
+use palpate_runner::TimeScale;
 
 /// Speeds to choose from: slow motion for a trigger, a day's rest in minutes, and as fast as it goes.
 const SPEEDS: [(&str, TimeScale); 6] = [

@@ -9,7 +9,7 @@ use eframe::egui::{Align2, Color32, RichText, Ui, Vec2b};
 use egui_plot::{HLine, Line, LineStyle, Plot, PlotPoint, PlotPoints, Span, Text};
 use palpate_model::rig::Phase;
 use palpate_model::units::Newtons;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use std::ops::RangeInclusive;
 
 /// How much of the run is shown.

@@ -5,7 +5,7 @@ use palpate_model::calibration::{Calibration, ForceUncertainty};
 use palpate_model::rig::Phase;
 use palpate_model::signal::{LiveTrace, TracePoint};
 use palpate_model::units::Newtons;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use std::ops::Range;
 use std::sync::Arc;
 

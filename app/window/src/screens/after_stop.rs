@@ -7,7 +7,7 @@ use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 use palpate_protocols::engine::Outcome;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 
 /// Draws nothing while the run goes on as planned.
 pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {

@@ -5,7 +5,7 @@ use crate::theme::Tokens;
 use eframe::egui::{RichText, Ui};
 use egui_plot::{Line, MarkerShape, Plot, PlotPoint, PlotPoints, Points, VLine};
 use palpate_model::signal::LiveTrace;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use std::sync::Arc;
 
 /// Air shown in front of the first touch, in mm.

@@ -5,7 +5,7 @@ use eframe::egui::{Align, Layout, RichText, Ui, vec2};
 use palpate_analysis::report::text::{ParameterText, typeset};
 use palpate_model::estimate::{LiveEstimate, Parameter};
 use palpate_model::rig::Phase;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 
 /// The parameters shown, in this order, with their units where no fit names them yet.
 const SHOWN: [(&str, &str); 7] = [

@@ -11,7 +11,7 @@ use crate::widgets::step_mark::{StepState, step_ui};
 use crate::workers::fit::Refit;
 use eframe::egui::{Label, RichText, Ui};
 use palpate_protocols::engine::EndingKind;
-use palpate_protocols::runner::{RunView, Snapshot};
+use palpate_runner::{RunView, Snapshot};
 
 /// Cycles listed; the session has them all.
 const CYCLES_SHOWN: usize = 12;

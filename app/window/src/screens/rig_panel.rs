@@ -7,7 +7,7 @@ use crate::workers::ports::Ports;
 use eframe::egui::{Button, RichText, Ui};
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::rig::{AxisStatus, Reading};
-use palpate_protocols::runner::{RigView, Snapshot};
+use palpate_runner::{RigView, Snapshot};
 
 /// Draws the panel.
 pub fn rig_ui(ui: &mut Ui, snapshot: &Snapshot, ports: &Ports, commands: &mut Commands) {

@@ -12,7 +12,7 @@ use eframe::egui::{Button, Context, Label, RichText, ScrollArea, TextEdit, Ui, v
 use palpate_model::rig::Phase;
 use palpate_protocols::file::{BUILT_IN, Protocol};
 use palpate_protocols::plans::{Plan, Step};
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use palpate_sessions::text::read_if_present;
 use std::path::{Path, PathBuf};
 

@@ -12,8 +12,8 @@ use eframe::egui::{Label, ProgressBar, RichText, Ui, vec2};
 use egui_plot::{HLine, MarkerShape, Plot, PlotPoints, Points};
 use palpate_model::calibration::{Curve, Direction, SettlingNow, newtons_of};
 use palpate_model::units::Volts;
-use palpate_protocols::runner::{RunView, ToWeigh};
 use palpate_protocols::weighed::Weighed;
+use palpate_runner::{RunView, ToWeigh};
 
 /// Height of the table in points.
 const TABLE_HEIGHT: f32 = 250.0;

@@ -2,7 +2,7 @@
 
 use palpate_model::rig::AxisStatus;
 use palpate_protocols::engine::{EndingKind, PauseView};
-use palpate_protocols::runner::{RunView, Snapshot};
+use palpate_runner::{RunView, Snapshot};
 
 /// Drawn beside the word, so that the state is read without colour.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -4,7 +4,7 @@ use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
 use eframe::egui::{Align, Label, Layout, RichText, ScrollArea, TextEdit, TextStyle, Ui};
-use palpate_protocols::runner::{LogLine, Snapshot};
+use palpate_runner::{LogLine, Snapshot};
 
 /// The filter as typed.
 #[derive(Clone, Debug, Default)]

@@ -1,6 +1,6 @@
 //! Measures frames, start-up and how a run kept pace for those who ask with `PALPATE_FRAME_REPORT=path`.
 
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use serde::Serialize;
 use std::path::PathBuf;
 

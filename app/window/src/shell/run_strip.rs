@@ -10,7 +10,7 @@ use eframe::egui::{
 use palpate_figures::uncertain::clock;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::{Operator, PauseView};
-use palpate_protocols::runner::{PromptView, RunView};
+use palpate_runner::{PromptView, RunView};
 
 /// Something to ask of a run that goes on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -7,7 +7,7 @@ use crate::widgets::state_badge::badge_ui;
 use eframe::egui::{Align, Button, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2};
 use palpate_figures::uncertain::clock;
 use palpate_model::rig::command::position_from_pulses;
-use palpate_protocols::runner::{RunView, Snapshot};
+use palpate_runner::{RunView, Snapshot};
 
 /// Height of the bar's content in points.
 pub const HEIGHT: f32 = 52.0;

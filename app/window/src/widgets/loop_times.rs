@@ -4,7 +4,7 @@ use super::fact_row::fact_ui;
 use crate::theme::Tokens;
 use eframe::egui::{Grid, RichText, Ui};
 use palpate_model::units::Seconds;
-use palpate_protocols::haptics::timing::Kept;
+use palpate_runner::haptics::timing::Kept;
 
 /// Draws overruns, and the percentiles of period, lateness and work.
 pub fn loop_times_ui(ui: &mut Ui, kept: &Kept) {

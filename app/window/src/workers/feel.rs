@@ -4,9 +4,9 @@ use super::trail::{LOOK_S, forget_old};
 use palpate_haptics::Flags;
 use palpate_haptics::simulation::{SimulationSettings, SimulationTick};
 use palpate_model::units::MmPerS;
-use palpate_protocols::haptics::taped::{LedRecorder, TapedLed};
-use palpate_protocols::haptics::timing::Kept;
-use palpate_protocols::haptics::{Beat, Lead, Led, TrailPoint};
+use palpate_runner::haptics::taped::{LedRecorder, TapedLed};
+use palpate_runner::haptics::timing::Kept;
+use palpate_runner::haptics::{Beat, Lead, Led, TrailPoint};
 use std::collections::VecDeque;
 
 /// For how long a cause of less force stays on the screen, in s.

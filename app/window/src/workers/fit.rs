@@ -7,8 +7,8 @@ use palpate_analysis::fit::fit_source;
 use palpate_analysis::source::Wanted;
 use palpate_figures::thin::thin;
 use palpate_model::rig::Phase;
-use palpate_protocols::runner::{RunView, Stopwatch};
 use palpate_rheology::fit::{FitOptions, FitReport};
+use palpate_runner::{RunView, Stopwatch};
 use std::path::{Path, PathBuf};
 
 /// Columns for which the curves of a plot are thinned: more than a screen is wide.

@@ -1,8 +1,8 @@
 //! A recorded session on a thread of its own: asked for a moment, it shows the run as it was then.
 
 use palpate_model::Nanos;
-use palpate_protocols::replay::Player;
-use palpate_protocols::runner::Snapshot;
+use palpate_runner::Snapshot;
+use palpate_runner::replay::Player;
 use std::sync::mpsc::{Receiver, SyncSender, sync_channel};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 

@@ -2,7 +2,7 @@
 
 use super::Job;
 use eframe::egui::Context;
-use palpate_protocols::runner::wall_now;
+use palpate_runner::wall_now;
 use palpate_sessions::recover::recover_library;
 use std::path::PathBuf;
 

@@ -3,7 +3,7 @@
 use super::Job;
 use eframe::egui::Context;
 use palpate_analysis::progress::Progress;
-use palpate_protocols::runner::Stopwatch;
+use palpate_runner::Stopwatch;
 use std::sync::Arc;
 
 /// How far a task is, for drawing.

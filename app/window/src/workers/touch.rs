@@ -6,9 +6,9 @@ use palpate_haptics::margin::{Device, Margin, Watch};
 use palpate_haptics::scene::{Hand6, LedScene, Scene, ScenePath, SceneSettings, SceneTick};
 use palpate_haptics::surface::{Grid, Heights, MeshError};
 use palpate_model::units::{Depth, MmPerS, Newtons};
-use palpate_protocols::haptics::SceneLoop;
-use palpate_protocols::haptics::scene::SceneRecorder;
-use palpate_protocols::haptics::timing::Kept;
+use palpate_runner::haptics::SceneLoop;
+use palpate_runner::haptics::scene::SceneRecorder;
+use palpate_runner::haptics::timing::Kept;
 use std::collections::VecDeque;
 
 /// Ticks between two looks at a scene that is computed ahead.

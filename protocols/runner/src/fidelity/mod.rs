@@ -8,10 +8,10 @@ mod verdict;
 
 pub use verdict::first_verdict;
 
-use crate::engine::{Effect, EndingKind, Record};
-use crate::plans::Plan;
-use crate::steps::{MeterSample, StepMeter, Target};
 use palpate_model::rig::{AxisStatus, Phase, RigDescription};
+use palpate_protocols::engine::{Effect, EndingKind, Record};
+use palpate_protocols::plans::Plan;
+use palpate_protocols::{MeterSample, StepMeter, Target};
 use palpate_sessions::record::Row;
 use serde::Serialize;
 

@@ -1,7 +1,7 @@
 //! The first verdict on a session, given by the program when the run ends. People may change it.
 
 use super::{Achieved, Fidelity};
-use crate::engine::{EndingKind, Outcome};
+use palpate_protocols::engine::{EndingKind, Outcome};
 use palpate_sessions::edits::Verdict;
 
 /// Reasons that stand in a verdict; the report has all.

@@ -1,7 +1,7 @@
 //! The thread of the loop.
 
 use super::timing::{Kept, Timing};
-use crate::runner::Metronome;
+use crate::Metronome;
 use palpate_drivers::priority::{Granted, ask};
 use palpate_haptics::Period;
 use std::sync::Arc;

@@ -1,9 +1,9 @@
 //! From a session of weight steps to the calibration it measured.
 
-use crate::engine::{Effect, PLAN_COMPLETE, Record};
-use crate::weighed::Readings;
 use palpate_model::calibration::{CALIBRATION_FORMAT, Calibration, CalibrationError, Series};
 use palpate_model::units::Volts;
+use palpate_protocols::engine::{Effect, PLAN_COMPLETE, Record};
+use palpate_protocols::weighed::Readings;
 use palpate_sessions::{EntryKind, Session};
 use thiserror::Error;
 

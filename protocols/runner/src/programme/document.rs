@@ -1,11 +1,11 @@
 //! What a programme is; its text is read by `read`.
 
 use super::told::Told;
-use crate::file::{Problem, Protocol};
-use crate::plans::{OnTimeout, Plan, Prompt, Rest, Step};
+use palpate_model::about::Labels;
 use palpate_model::rig::HandAction;
 use palpate_model::units::Seconds;
-use palpate_sessions::Labels;
+use palpate_protocols::file::{Problem, Protocol};
+use palpate_protocols::plans::{OnTimeout, Plan, Prompt, Rest, Step};
 use std::collections::BTreeMap;
 use thiserror::Error;
 

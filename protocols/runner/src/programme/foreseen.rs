@@ -1,11 +1,11 @@
 //! What a programme will do, task by task, before anything moves.
 
 use super::document::{Programme, ProgrammeError};
-use crate::file::Problem;
-use crate::preview::preview;
 use palpate_model::calibration::Curve;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::{Newtons, Seconds};
+use palpate_protocols::file::Problem;
+use palpate_protocols::preview::preview;
 
 /// One task as it is expected to go.
 #[derive(Clone, Debug, PartialEq)]

@@ -3,11 +3,11 @@
 use super::document::{Programme, ProgrammeError, Task, Validates};
 use super::sound::doubts;
 use super::told::Told;
-use crate::file::problem::{Problems, nearest, suggestion};
-use crate::file::tree::{self, Entry, Node, Table, Value};
-use crate::file::{Protocol, built_in};
+use palpate_model::about::Labels;
 use palpate_model::units::Seconds;
-use palpate_sessions::Labels;
+use palpate_protocols::file::problem::{Problems, nearest, suggestion};
+use palpate_protocols::file::tree::{self, Entry, Node, Table, Value};
+use palpate_protocols::file::{Protocol, built_in};
 use std::collections::BTreeMap;
 
 /// Version of the language that is read.

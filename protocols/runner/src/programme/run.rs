@@ -4,15 +4,13 @@ use super::calibrating::{CalibratingError, calibration_of};
 use super::conditions::Conditions;
 use super::document::Programme;
 use super::progress::{Entry, FINISHED, Place, Progress, ProgressError, REFUSED};
-use crate::engine::{EndingKind, PLAN_COMPLETE};
-use crate::plans::Plan;
-use crate::preview::preview;
-use crate::runner::{
-    AfterStop, Answers, Request, RunRequest, RunView, Runner, StartError, wall_now,
-};
+use crate::{AfterStop, Answers, Request, RunRequest, RunView, Runner, StartError, wall_now};
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_model::units::Seconds;
+use palpate_protocols::engine::{EndingKind, PLAN_COMPLETE};
+use palpate_protocols::plans::Plan;
+use palpate_protocols::preview::preview;
 use palpate_sessions::journal::{Journal, JournalError, stamp};
 use palpate_sessions::{HolderLock, LOCK_FILE, LOG_FILE, ReadError, Session};
 use std::path::{Path, PathBuf};

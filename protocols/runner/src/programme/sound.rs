@@ -1,7 +1,7 @@
 //! What of a programme could never work, though every part of it can be read: told before anything moves.
 
 use super::document::Task;
-use crate::plans::{Plan, Step};
+use palpate_protocols::plans::{Plan, Step};
 use std::collections::BTreeSet;
 
 /// Why a task can do nothing of what it says it does; `before` are the tasks ahead of it.

@@ -2,13 +2,13 @@
 //! both what the command line says.
 
 use super::document::Programme;
-use crate::file::Problem;
-use crate::file::problem::Problems;
-use crate::file::tree::{Entry, Table, Value};
-use palpate_sessions::{AboutError, Labels};
+use palpate_model::about::{AboutError, Labels};
+use palpate_protocols::file::Problem;
+use palpate_protocols::file::problem::Problems;
+use palpate_protocols::file::tree::{Entry, Table, Value};
 use std::collections::BTreeMap;
 
-/// A key of [`palpate_sessions::about::KEYS`] with its value.
+/// A key of [`palpate_model::about::KEYS`] with its value.
 type Pair = (String, String);
 
 /// The label that says what is indented.

@@ -3,10 +3,10 @@
 //! Decisions (commands, records, endings) must be equal where the engine version is; derived
 //! numbers must agree within a stated tolerance whatever the version.
 
-use crate::engine::{self, ENGINE_VERSION, Effect, Input, State};
-use crate::runner::{LiveFeed, to_json};
+use crate::{LiveFeed, to_json};
 use palpate_model::Nanos;
 use palpate_model::estimate::LiveEstimate;
+use palpate_protocols::engine::{self, ENGINE_VERSION, Effect, Input, State};
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{Entry, EntryKind, Row};
 use serde::{Deserialize, Serialize};

@@ -2,10 +2,10 @@
 
 use super::ReplayError;
 use super::source::{RecordedInput, config_of, inputs_of, reading_of};
-use crate::engine::{self, Effect, Input, State};
-use crate::preview::preview;
-use crate::runner::{Board, LogState, RigView, Snapshot};
+use crate::{Board, LogState, RigView, Snapshot};
 use palpate_model::Nanos;
+use palpate_protocols::engine::{self, Effect, Input, State};
+use palpate_protocols::preview::preview;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::Row;
 use std::path::PathBuf;

@@ -1,12 +1,12 @@
 //! What a session holds for the engine: its configuration and every input with its time.
 
 use super::ReplayError;
-use crate::engine::{Config, Input};
-use crate::plans::Plan;
 use palpate_model::Nanos;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{AxisStatus, Reading};
 use palpate_model::units::Volts;
+use palpate_protocols::engine::{Config, Input};
+use palpate_protocols::plans::Plan;
 use palpate_sessions::log::Session;
 use palpate_sessions::record::{EntryKind, Row};
 use serde_json::Value;

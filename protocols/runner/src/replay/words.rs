@@ -1,7 +1,7 @@
 //! Differences in the words of the protocol and its records.
 
-use crate::engine::{Effect, State};
 use palpate_model::rig::{HandAction, RigCommand};
+use palpate_protocols::engine::{Effect, State};
 use serde_json::Value;
 
 /// Where in the plan a run is.

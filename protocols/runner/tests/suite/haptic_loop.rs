@@ -10,7 +10,7 @@ use palpate_haptics::surface::{
 use palpate_model::Seconds;
 use palpate_model::units::MmPerS;
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_protocols::haptics::{Beat, Led, Simulated, Ticking};
+use palpate_runner::haptics::{Beat, Led, Simulated, Ticking};
 use palpate_test_support::wait::{Deadline, until};
 
 fn device(period: Period) -> Simulated {

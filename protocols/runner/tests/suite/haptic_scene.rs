@@ -5,12 +5,12 @@ use palpate_haptics::device::HapticDevice;
 use palpate_haptics::scene::{
     DeviceSettings, Hand6, LedScene, Pose, Scene, ScenePath, SceneSettings,
 };
-use palpate_protocols::haptics::scene::{
+use palpate_runner::haptics::scene::{
     COLUMNS, FRAME_NODES_MAX, SENSED_COLUMNS, SceneFrame, SceneRecorder, SceneRow, SceneTask,
     scene_input, scene_row,
 };
-use palpate_protocols::haptics::scene_file::SceneFile;
-use palpate_protocols::haptics::{SceneLoop, Stylus, Ticking};
+use palpate_runner::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::{SceneLoop, Stylus, Ticking};
 use palpate_sessions::ticks::{End, Recording};
 use palpate_test_support::wait::until;
 

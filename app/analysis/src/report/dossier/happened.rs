@@ -5,7 +5,7 @@ use super::super::{kept, said};
 use super::Subject;
 use palpate_figures::page::Body;
 use palpate_protocols::engine::{Effect, Record};
-use palpate_protocols::fidelity::{Achieved, Fidelity};
+use palpate_runner::fidelity::{Achieved, Fidelity};
 use palpate_sessions::analyses::Analysed;
 use palpate_sessions::record::EntryKind;
 

@@ -16,7 +16,7 @@ use palpate_analysis::report::calibration::Entry;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
-use palpate_protocols::runner::RunView;
+use palpate_runner::RunView;
 use std::path::{Path, PathBuf};
 
 /// The screen's state.

@@ -1,9 +1,9 @@
 //! A parameter of a protocol as it is typed, and a thing that is told about the session.
 
+use palpate_model::about::Key;
 use palpate_model::rig::RigDescription;
 use palpate_model::units::MmPerS;
 use palpate_protocols::file::{Given, Kind, Parameter, What};
-use palpate_sessions::about::Key;
 
 /// A parameter being typed.
 #[derive(Clone, Debug)]

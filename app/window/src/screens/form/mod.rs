@@ -6,13 +6,14 @@ pub use field::{ParamField, ToldField};
 
 use crate::command::Aside;
 use palpate_analysis::daily::is_gated;
+use palpate_model::about::KEYS;
+use palpate_model::about::Labels;
 use palpate_model::calibration::{Calibration, Curve};
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::file::{Problem, Protocol, built_in};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{OutlinePoint, Preview, outline, preview};
-use palpate_protocols::runner::{AfterStop, Answers, Labels, RigView, RunRequest};
-use palpate_sessions::about::KEYS;
+use palpate_runner::{AfterStop, Answers, RigView, RunRequest};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 

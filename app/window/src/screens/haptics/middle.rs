@@ -9,7 +9,7 @@ use crate::workers::feel::Feel;
 use crate::workers::trail::PAST_S;
 use eframe::egui::{Color32, Label, RichText, Ui, vec2};
 use palpate_analysis::haptics::Tried;
-use palpate_protocols::haptics::TrailPoint;
+use palpate_runner::haptics::TrailPoint;
 
 /// What the middle shows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

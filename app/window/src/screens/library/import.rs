@@ -8,7 +8,7 @@ use crate::workers::path_dialog::FilesDialog;
 use crate::workers::task::Task;
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
 use palpate_analysis::imports::{Request, import_and_tell};
-use palpate_sessions::Labels;
+use palpate_model::about::Labels;
 use std::path::{Path, PathBuf};
 
 /// What parts the paths of several files.

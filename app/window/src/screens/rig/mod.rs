@@ -8,7 +8,7 @@ use eframe::egui::{Button, Grid, Label, RichText, ScrollArea, Ui, vec2};
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::units::{MmPerS, Newtons, Seconds};
-use palpate_protocols::runner::{RigView, Snapshot};
+use palpate_runner::{RigView, Snapshot};
 
 /// Distances that stand ready, in mm; towards the tissue is positive.
 const READY: [f64; 8] = [-10.0, -5.0, -1.0, -0.1, 0.1, 1.0, 5.0, 10.0];

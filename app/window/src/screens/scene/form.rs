@@ -10,7 +10,7 @@ use eframe::egui::Ui;
 use palpate_haptics::Period;
 use palpate_haptics::scene::{ScenePath, SceneSettings};
 use palpate_haptics::surface::INERT;
-use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::scene_file::SceneFile;
 
 /// The path that is chosen first.
 pub(super) const FIRST_PATH: ScenePath = ScenePath::Poke;

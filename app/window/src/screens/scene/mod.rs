@@ -23,8 +23,8 @@ use middle::Side;
 use palpate_analysis::recorded::Replayed;
 use palpate_analysis::scene::{recorded, replay, scene_of};
 use palpate_haptics::scene::{Hand6, SceneSettings};
-use palpate_protocols::haptics::scene::{COLUMNS, SceneRecorder};
-use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::scene::{COLUMNS, SceneRecorder};
+use palpate_runner::haptics::scene_file::SceneFile;
 use plan::Planned;
 use std::path::Path;
 

@@ -11,7 +11,7 @@ use eframe::egui::{Ui, vec2};
 use palpate_analysis::report::scene::plan_text;
 use palpate_analysis::scene_bench::{made_after, planned, planned_again};
 use palpate_haptics::surface::{NoPlan, SceneCurves, ScenePlan};
-use palpate_protocols::haptics::scene_file::SceneFile;
+use palpate_runner::haptics::scene_file::SceneFile;
 
 /// A plan, what it was made of, and what it answers.
 pub(super) struct Planned {

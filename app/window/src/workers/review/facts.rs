@@ -1,10 +1,10 @@
 //! What is known of a session besides its samples.
 
 use palpate_analysis::analysed::Passing;
+use palpate_model::about::About;
 use palpate_model::calibration::Calibration;
 use palpate_model::signal::track::Track;
 use palpate_protocols::engine::{Effect, Record};
-use palpate_sessions::about::About;
 use palpate_sessions::analyses::{Input, inputs_of};
 use palpate_sessions::contacts::contacts;
 use palpate_sessions::edits::Verdict;

@@ -1,8 +1,8 @@
 //! How far a slave is behind, and how well the force at the handle agrees with what its cell felt.
 
 use super::{FILTER_MS, SlaveSettings};
+use crate::Felt;
 use crate::haptics::timing::Kept;
-use crate::runner::Felt;
 use palpate_haptics::margin::{Device, Watch};
 use palpate_model::Nanos;
 use palpate_model::signal::MovingMean;

@@ -11,7 +11,7 @@ use lag::Meter;
 pub use lag::{Difference, MasterLoop, Slaved, Spread};
 
 use super::{Beat, Ticking};
-use crate::runner::{Felt, Leading};
+use crate::{Felt, Leading};
 use palpate_haptics::simulation::{Simulation, SimulationSettings, SimulationTick};
 use palpate_haptics::{ContactSettings, MasterSlaveError, Period};
 use palpate_model::Nanos;

@@ -3,7 +3,7 @@
 use super::{ForeignPart, Sample};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
-use palpate_sessions::about::Labels;
+use palpate_model::about::Labels;
 use palpate_sessions::folder::{FolderError, SessionFolder, check_free_space};
 use palpate_sessions::imported::{Imported, ORIGINAL_FOLDER};
 use palpate_sessions::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
