@@ -95,8 +95,12 @@ fn long_run(neighbour: f64, forgetting: f64) -> f64 {
 
 /// The memory of a record's residuals; `white` is the variance the blocks would have without.
 /// `None` when the record is too short to tell.
-pub(super) fn memory(blocks: &Blocks, white: f64) -> Option<Memory> {
-    let whitened = Whitened::new(blocks)?;
+///
+/// Only unknowns that act on this record `alone` have taken their share out of its residuals. One that several
+/// records share is a compromise between them: a specimen twice as stiff leaves residuals of the very shape of the
+/// shared column, which must count as memory and not as taken out.
+pub(super) fn memory(blocks: &Blocks, alone: &[bool], white: f64) -> Option<Memory> {
+    let whitened = Whitened::new(blocks, alone)?;
     let spare = whitened.spare();
     if white <= 0.0 || !white.is_finite() {
         return Some(Memory::none(white.max(0.0)));
@@ -255,8 +259,13 @@ struct Whitening {
 }
 
 impl Whitened {
-    fn new(blocks: &Blocks) -> Option<Self> {
-        let columns = orthonormal(&blocks.columns);
+    fn new(blocks: &Blocks, alone: &[bool]) -> Option<Self> {
+        let own = blocks.columns.iter().zip(alone);
+        let own: Vec<&[f64]> = own
+            .filter(|(_, alone)| **alone)
+            .map(|(column, _)| column.as_slice())
+            .collect();
+        let columns = orthonormal(&own);
         let columns = &columns[..columns.len().min(COLUMNS_MAX - 1)];
         let count = blocks.residuals.len();
         if count < columns.len() + SPARE_MIN {
@@ -361,10 +370,10 @@ fn moving_average(forgetting: f64, neighbour: f64) -> Option<f64> {
 
 /// An orthonormal basis of the columns (Gram-Schmidt, twice); columns that depend on the others, or
 /// touch other records only, are left out.
-fn orthonormal(columns: &[Vec<f64>]) -> Vec<Vec<f64>> {
+fn orthonormal(columns: &[&[f64]]) -> Vec<Vec<f64>> {
     let mut basis: Vec<Vec<f64>> = Vec::with_capacity(columns.len());
     for column in columns {
-        let mut column = column.clone();
+        let mut column = column.to_vec();
         let length = norm(&column);
         // Twice is enough (Kahan; Parlett, "The Symmetric Eigenvalue Problem", section 6.9).
         for _ in 0..2 {

@@ -58,6 +58,7 @@ impl Uncertainty {
         // What is left of a record without noise is rounding, whose memory means nothing.
         let is_rounding = white <= ROUNDING * forces;
         let block_factor = noise::triangle(blocks.iter(), unknowns).finish();
+        let alone: Vec<bool> = (0..unknowns).map(|k| is_of_one(&blocks, k)).collect();
         let records = blocks
             .into_iter()
             .enumerate()
@@ -66,7 +67,7 @@ impl Uncertainty {
                 let own = own_variance(system, refined, record).unwrap_or(white);
                 let memory = match is_rounding {
                     true => Some(Memory::none(white)),
-                    false => noise::memory(&blocks, own),
+                    false => noise::memory(&blocks, &alone, own),
                 };
                 (blocks, memory, own)
             })
@@ -123,6 +124,12 @@ impl Uncertainty {
             freedom,
         })
     }
+}
+
+/// Whether an unknown acts on no more than one record.
+fn is_of_one(blocks: &[Blocks], unknown: usize) -> bool {
+    let acts = |blocks: &&Blocks| blocks.columns[unknown].iter().any(|&value| value != 0.0);
+    blocks.iter().filter(acts).count() < 2
 }
 
 /// Variance of the weighted residuals of one of several records; `None` for the only one, where

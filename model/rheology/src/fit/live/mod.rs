@@ -247,7 +247,7 @@ impl LiveFit {
         if white * self.samples as f64 <= ROUNDING * ROUNDING * self.bank.shared()[2] {
             return inflations;
         }
-        let memory = noise::memory(&blocks, white);
+        let memory = noise::memory(&blocks, &vec![true; seen.len()], white);
         let factor = noise::triangle(std::iter::once(&blocks), seen.len()).finish();
         let records = [(blocks, memory, white)];
         for (place, &k) in seen.iter().enumerate() {
