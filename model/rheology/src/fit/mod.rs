@@ -8,7 +8,6 @@ mod block_sums;
 mod bootstrap;
 mod columns;
 mod design;
-mod design_blocks;
 mod identify;
 mod live;
 mod noise;

@@ -1,137 +1,23 @@
 //! One tick of the whole: encoder counts and the cell's force in, slave pulses and a bias voltage out.
 
-use super::Flags;
-use super::buzz::{Buzz, BuzzDetector, BuzzSettings};
-use super::contact::{ContactDetector, ContactError, ContactSettings};
-use super::controller::{ControllerSettings, PassivityController};
-use super::force::{ForceLaw, LawError, LawSettings};
-use super::guard::{ForceGuard, GuardSettings};
-use super::margin::{Device, Margin, Watch};
-use super::observer::{DELAY_MAX, PassivityObserver};
-use super::rig::{
-    Encoder, EncoderCounter, EncoderError, Gear, GearError, GearRatio, MotorError, SlaveDrive,
-    ThermalState,
-};
-use super::torque::{TorqueError, TorqueSettings};
+mod settings;
+mod snapshot;
+
+use crate::buzz::{BuzzDetector, BuzzSettings};
+use crate::contact::ContactDetector;
+use crate::controller::{ControllerSettings, PassivityController};
+use crate::flags::Flags;
+use crate::force::ForceLaw;
+use crate::guard::ForceGuard;
+use crate::margin::Watch;
+use crate::observer::{DELAY_MAX, PassivityObserver};
+use crate::rig::{EncoderCounter, Gear, GearRatio, ThermalState};
+use crate::torque::TorqueSettings;
 use palpate_model::time::Nanos;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
-use thiserror::Error;
-
-/// Everything a master-slave system is made of.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct MasterSlaveSettings {
-    /// The force law and the tick.
-    pub law: LawSettings,
-    /// Bounds of the force.
-    pub guard: GuardSettings,
-    /// The passivity controller; `None` for none. Its delay is that of the system.
-    pub controller: Option<ControllerSettings>,
-    /// What counts as a buzz; `None` for two counts above 8 Hz.
-    pub buzz: Option<BuzzSettings>,
-    /// Thresholds of contact.
-    pub contact: ContactSettings,
-    /// The master's encoder.
-    pub encoder: Encoder,
-    /// The slave's drive.
-    pub slave: SlaveDrive,
-    /// The master's motor and what drives it.
-    pub torque: TorqueSettings,
-    /// The master's own damping without its motor, in N s/mm, for the margin.
-    pub damping: f64,
-    /// Ticks from a count to the force made of it, for the margin; the controller takes the nearest whole number.
-    pub delay_ticks: f64,
-    /// Way of the slave from its start to the surface, in mm.
-    pub surface_mm: f64,
-}
-
-impl MasterSlaveSettings {
-    /// The source's hardware for a law, with the guards as they are by default, contact at 50 mN, the surface where the
-    /// slave starts, and a count's force made within its tick.
-    #[must_use]
-    pub fn of(law: LawSettings) -> Self {
-        let torque = TorqueSettings::default();
-        let radius = torque.pinion.radius_mm();
-        Self {
-            law,
-            guard: GuardSettings::default(),
-            controller: Some(ControllerSettings::of(
-                torque.motor.inertia_kg_mm2 / (radius * radius),
-            )),
-            buzz: None,
-            contact: ContactSettings {
-                on: Newtons(0.05),
-                off: Newtons(0.02),
-            },
-            encoder: Encoder::default(),
-            slave: SlaveDrive::default(),
-            torque,
-            damping: 0.0,
-            delay_ticks: 0.0,
-            surface_mm: 0.0,
-        }
-    }
-
-    /// Way of the master per count, in mm.
-    #[must_use]
-    pub fn count_mm(&self) -> f64 {
-        self.encoder.count_mm(&self.torque.pinion)
-    }
-
-    /// The margin of these settings, for before play and during it.
-    #[must_use]
-    pub fn watch(&self) -> Watch {
-        Watch {
-            body: self.law.body,
-            scheme: self.law.scheme,
-            period: self.law.period,
-            device: Device {
-                damping: self.damping + self.torque.damping(),
-                friction: self.torque.friction(),
-                count_mm: self.count_mm(),
-                delay_ticks: self.delay_ticks,
-            },
-        }
-    }
-}
-
-/// Settings that make no system.
-#[derive(Clone, Debug, PartialEq, Error)]
-pub enum MasterSlaveError {
-    /// The law.
-    #[error(transparent)]
-    Law(#[from] LawError),
-    /// The thresholds.
-    #[error(transparent)]
-    Contact(#[from] ContactError),
-    /// The encoder.
-    #[error(transparent)]
-    Encoder(#[from] EncoderError),
-    /// The gear.
-    #[error(transparent)]
-    Gear(#[from] GearError),
-    /// The motor.
-    #[error(transparent)]
-    Motor(#[from] MotorError),
-    /// Its drive.
-    #[error(transparent)]
-    Torque(#[from] TorqueError),
-    /// The device's own numbers.
-    #[error("a master with {name} = {value} {unit} is not possible; it is from 0 to {most} {unit}")]
-    Device {
-        /// Which.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// Its unit.
-        unit: &'static str,
-        /// The largest there is.
-        most: f64,
-    },
-    /// The surface.
-    #[error("the surface cannot be {0} mm from where the slave starts; give a finite distance")]
-    Surface(f64),
-}
+pub use settings::{MasterSlaveError, MasterSlaveSettings};
+pub use snapshot::Snapshot;
 
 /// What comes in with a tick; the same inputs give the same outputs, bit by bit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -159,106 +45,6 @@ pub struct Output {
     pub force: Newtons,
     /// What was special.
     pub flags: Flags,
-}
-
-/// The state of everything after a tick, as screens and records take it.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-pub struct Snapshot {
-    /// Ticks since the start, those away included.
-    pub tick: u64,
-    /// The time of that.
-    pub time: Nanos,
-    /// The master's encoder.
-    pub counts: i64,
-    /// Way of the master from its start, in mm.
-    pub master_mm: f64,
-    /// Speed of the master.
-    pub master_speed: MmPerS,
-    /// Pulses sent to the slave since the start.
-    pub pulses: i64,
-    /// Pulses that wait for the slave's drive.
-    pub behind: i64,
-    /// Depth of the slave.
-    pub depth: Depth,
-    /// Speed of the slave.
-    pub speed: MmPerS,
-    /// Force on the cell.
-    pub cell: Newtons,
-    /// Whether it touches.
-    pub is_touching: bool,
-    /// Force of the model.
-    pub model: Newtons,
-    /// Force that the guard let through.
-    pub guarded: Newtons,
-    /// Force rendered, with the controller's damping.
-    pub force: Newtons,
-    /// Damping that the controller added, in N s/mm.
-    pub damping: f64,
-    /// Energy that the rendered force has absorbed, in N mm.
-    pub energy: f64,
-    /// Torque commanded, in N mm.
-    pub torque: f64,
-    /// Bias voltage.
-    pub bias: Volts,
-    /// Temperature of the motor's winding as its commands let expect, in degrees Celsius.
-    pub winding_c: f64,
-    /// A buzz, if there is one.
-    pub buzz: Option<Buzz>,
-    /// The margin at this depth.
-    pub margin: Margin,
-    /// What was special.
-    pub flags: Flags,
-    /// Of all before, so that a torn copy is told.
-    pub checksum: u64,
-}
-
-impl Snapshot {
-    /// FNV-1a over the bits of every field but the checksum.
-    #[must_use]
-    pub fn sum(&self) -> u64 {
-        let floats = [
-            self.master_mm,
-            self.master_speed.0,
-            self.depth.0,
-            self.speed.0,
-            self.cell.0,
-            self.model.0,
-            self.guarded.0,
-            self.force.0,
-            self.damping,
-            self.energy,
-            self.torque,
-            self.bias.0,
-            self.winding_c,
-            self.buzz.map_or(-1.0, |buzz| buzz.frequency_hz),
-            self.buzz.map_or(-1.0, |buzz| buzz.amplitude_mm),
-            self.margin.depth.0,
-            self.margin.needed,
-            self.margin.has,
-            self.margin.friction_needed.0,
-            self.margin.friction.0,
-        ];
-        let others = [
-            self.tick,
-            self.time.0,
-            self.counts as u64,
-            self.pulses as u64,
-            self.behind as u64,
-            u64::from(self.is_touching),
-            u64::from(self.flags.bits()),
-            self.margin.cause as u64,
-        ];
-        let words = others.into_iter().chain(floats.map(f64::to_bits));
-        words.fold(0xCBF2_9CE4_8422_2325, |sum, word| {
-            (sum ^ word).wrapping_mul(0x0000_0100_0000_01B3)
-        })
-    }
-
-    /// Whether every field is of the same tick.
-    #[must_use]
-    pub fn is_whole(&self) -> bool {
-        self.sum() == self.checksum
-    }
 }
 
 /// The system with its state.
