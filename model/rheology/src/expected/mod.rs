@@ -21,7 +21,7 @@
 //! assert_eq!(tau.name, "tau_eps");
 //! // 1.96 standard deviations of 0.166 %.
 //! assert!((tau.percent.unwrap() - 0.325).abs() < 0.002);
-//! # Ok::<(), crate::expected::ExpectedError>(())
+//! # Ok::<(), palpate_rheology::expected::ExpectedError>(())
 //! ```
 
 mod curves;

@@ -185,7 +185,7 @@ pub struct Selection {
 /// };
 /// let found = select(&[("slow", &slow), ("fast", &fast)], &families, &|_| ControlFlow::Continue(()))?;
 /// assert_eq!(found.verdict.family.as_deref(), Some("kelvin"));
-/// # Ok::<(), crate::select::SelectError>(())
+/// # Ok::<(), palpate_rheology::select::SelectError>(())
 /// ```
 pub fn select(
     records: &[(&str, &[FitSample])],
