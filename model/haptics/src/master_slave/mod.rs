@@ -5,15 +5,14 @@ mod snapshot;
 
 use crate::buzz::{BuzzDetector, BuzzSettings};
 use crate::contact::ContactDetector;
-use crate::controller::{ControllerSettings, PassivityController};
+use crate::controller::{ControllerSettings, ControllerTick, PassivityController};
 use crate::flags::Flags;
-use crate::force::ForceLaw;
+use crate::force::{ForceLaw, LawTick};
 use crate::guard::ForceGuard;
 use crate::margin::Watch;
-use crate::observer::{DELAY_MAX, PassivityObserver};
+use crate::observer::PassivityObserver;
 use crate::rig::{EncoderCounter, Gear, GearRatio, ThermalState};
 use crate::torque::TorqueSettings;
-use palpate_model::time::Nanos;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::{Deserialize, Serialize};
 pub use settings::{MasterSlaveError, MasterSlaveSettings};
@@ -77,31 +76,22 @@ const CAUGHT_UP: u64 = 64;
 /// A count in 0.1 s is 0.15 mm/s with the source's encoder, a fifth of its slowest check.
 const HEADING_S: f64 = 0.1;
 
+/// What the controller sees of a tick.
+struct Touch {
+    is_touching: bool,
+    is_on: bool,
+    has_buzz: bool,
+    /// Counts since the tick before.
+    moved: i64,
+    /// Ticks since then.
+    elapsed: u64,
+}
+
 impl MasterSlave {
     /// At the start: the first counts are where master and slave are.
     pub fn new(settings: &MasterSlaveSettings) -> Result<Self, MasterSlaveError> {
         let period = settings.law.period;
-        settings.contact.checked()?;
-        settings.encoder.checked()?;
-        settings.torque.motor.checked()?;
-        settings.torque.checked()?;
-        let device = [
-            ("damping", settings.damping, "N s/mm", f64::MAX),
-            ("delay", settings.delay_ticks, "ticks", DELAY_MAX as f64),
-        ];
-        for (name, value, unit, most) in device {
-            if !(0.0..=most).contains(&value) {
-                return Err(MasterSlaveError::Device {
-                    name,
-                    value,
-                    unit,
-                    most,
-                });
-            }
-        }
-        if !settings.surface_mm.is_finite() {
-            return Err(MasterSlaveError::Surface(settings.surface_mm));
-        }
+        settings.checked()?;
         let pinion = &settings.torque.pinion;
         let mm_per_pulse = settings.slave.mm_per_pulse;
         let ratio = GearRatio::one_to_one(pinion, &settings.encoder, mm_per_pulse)?;
@@ -134,31 +124,7 @@ impl MasterSlave {
             direction: 0,
             still: 0,
             thermal,
-            snapshot: Snapshot {
-                tick: 0,
-                time: Nanos::ZERO,
-                counts: 0,
-                master_mm: 0.0,
-                master_speed: MmPerS(0.0),
-                pulses: 0,
-                behind: 0,
-                depth,
-                speed: MmPerS(0.0),
-                cell: Newtons(0.0),
-                is_touching: false,
-                model: Newtons(0.0),
-                guarded: Newtons(0.0),
-                force: Newtons(0.0),
-                damping: 0.0,
-                energy: 0.0,
-                torque: 0.0,
-                bias: Volts(0.0),
-                winding_c: thermal.winding_c,
-                buzz: None,
-                margin: watch.at(depth, MmPerS(0.0)),
-                flags: Flags::NONE,
-                checksum: 0,
-            },
+            snapshot: Snapshot::at_start(&watch, depth, thermal.winding_c),
         })
     }
 
@@ -169,13 +135,6 @@ impl MasterSlave {
             checksum: self.snapshot.sum(),
             ..self.snapshot
         }
-    }
-
-    /// The largest force that the controller's damping took.
-    #[must_use]
-    pub fn worst_damping_force(&self) -> Newtons {
-        self.controller
-            .map_or(Newtons(0.0), |one| one.worst_force())
     }
 
     /// Which way the master goes, for what helps against friction: slow motion has many ticks without a count, so that a
@@ -195,6 +154,60 @@ impl MasterSlave {
         })
     }
 
+    /// Leads the model straight from depth to depth through what was missed.
+    fn lead(&mut self, from: Depth, to: Depth, elapsed: u64) -> (LawTick, Flags) {
+        let steps = elapsed.min(CAUGHT_UP);
+        let span = to.0 - from.0;
+        let mut law = self.law.tick(Depth(from.0 + span / steps as f64));
+        let mut flags = law.flags;
+        for step in 2..=steps {
+            let share = step as f64 / steps as f64;
+            law = self.law.tick(Depth(from.0 + span * share));
+            flags |= law.flags;
+        }
+        (law, flags)
+    }
+
+    /// What of the model's force is asked for: a winding too hot gets no more than it may have for ever, until it
+    /// has cooled.
+    fn asked(&self, model: Newtons, is_on: bool, is_hot: bool) -> Newtons {
+        let lasting = if is_hot {
+            self.torque.motor.continuous / self.torque.pinion.radius_mm()
+        } else {
+            f64::MAX
+        };
+        let asked = if is_on { model.0 } else { 0.0 };
+        Newtons(asked.clamp(-lasting, lasting))
+    }
+
+    /// What the passivity controller makes of the guarded force.
+    fn damp(&mut self, guarded: Newtons, touch: &Touch) -> ControllerTick {
+        let mut damped = ControllerTick {
+            force: guarded,
+            damping: 0.0,
+            energy: 0.0,
+            flags: Flags::NONE,
+        };
+        let Some(controller) = &mut self.controller else {
+            return damped;
+        };
+        // While what made it buzz lasts, so does the caution.
+        let is_close = touch.is_touching && !self.snapshot.margin.is_enough();
+        if touch.has_buzz || (controller.is_hushed() && is_close) {
+            controller.heard_buzz();
+        }
+        let moved = (touch.moved, self.count_mm);
+        let one = controller.tick(moved, touch.elapsed, guarded, touch.is_touching);
+        if touch.is_on {
+            damped = ControllerTick {
+                force: Newtons(one.force.0.clamp(-self.force_max, self.force_max)),
+                ..one
+            };
+        }
+        controller.rendered(damped.force);
+        damped
+    }
+
     /// Takes one input and gives one output.
     #[must_use]
     pub fn tick(&mut self, input: &Input) -> Output {
@@ -209,29 +222,10 @@ impl MasterSlave {
         let wanted = Depth(slave - self.surface_mm);
         flags |= gear.flags | self.contact.tick(input.cell);
         let is_touching = self.contact.is_touching();
-        // The model, led straight through what was missed.
-        let steps = elapsed.min(CAUGHT_UP);
-        let mut law = self.law.tick(Depth(
-            before.depth.0 + (wanted.0 - before.depth.0) / steps as f64,
-        ));
-        flags |= law.flags;
-        for step in 2..=steps {
-            let share = step as f64 / steps as f64;
-            law = self
-                .law
-                .tick(Depth(before.depth.0 + (wanted.0 - before.depth.0) * share));
-            flags |= law.flags;
-        }
-        // A winding too hot gets no more than it may have for ever, until it has cooled.
-        let motor = &self.torque.motor;
-        let is_hot = self.thermal.winding_c > motor.thermal.winding_max_c;
-        let lasting = if is_hot {
-            motor.continuous / self.torque.pinion.radius_mm()
-        } else {
-            f64::MAX
-        };
-        let asked = if input.is_on { law.force.0 } else { 0.0 };
-        let asked = Newtons(asked.clamp(-lasting, lasting));
+        let (law, law_flags) = self.lead(before.depth, wanted, elapsed);
+        flags |= law_flags;
+        let is_hot = self.thermal.winding_c > self.torque.motor.thermal.winding_max_c;
+        let asked = self.asked(law.force, input.is_on, is_hot);
         flags |= Flags::OFF.when(!input.is_on) | Flags::HOT.when(is_hot);
         if input.is_on && before.flags.has(Flags::OFF) {
             self.guard.restart();
@@ -244,23 +238,16 @@ impl MasterSlave {
         let energy = self.observer.energy();
         let buzz = self.buzz.tick(master_mm, elapsed, energy);
         flags |= Flags::BUZZ.when(buzz.is_some());
-        let mut damping = 0.0;
-        let mut force = guarded.force.0;
-        if let Some(controller) = &mut self.controller {
-            // While what made it buzz lasts, so does the caution.
-            let lasts = controller.is_hushed() && is_touching && !before.margin.is_enough();
-            if buzz.is_some() || lasts {
-                controller.heard_buzz();
-            }
-            let moved = (moved, self.count_mm);
-            let one = controller.tick(moved, elapsed, guarded.force, is_touching);
-            if input.is_on {
-                damping = one.damping;
-                flags |= one.flags;
-                force = one.force.0.clamp(-self.force_max, self.force_max);
-            }
-            controller.rendered(Newtons(force));
-        }
+        let touch = Touch {
+            is_touching,
+            is_on: input.is_on,
+            has_buzz: buzz.is_some(),
+            moved,
+            elapsed,
+        };
+        let damped = self.damp(guarded.force, &touch);
+        let force = damped.force.0;
+        flags |= damped.flags;
         self.observer.hold(force);
         let master_speed = MmPerS(moved as f64 * self.count_mm / span);
         let heading = self.heading(moved, elapsed);
@@ -286,7 +273,7 @@ impl MasterSlave {
             model: law.model,
             guarded: guarded.force,
             force: Newtons(force),
-            damping,
+            damping: damped.damping,
             energy,
             torque: torque.torque,
             bias: torque.bias,

@@ -6,6 +6,7 @@ use crate::controller::ControllerSettings;
 use crate::force::{LawError, LawSettings};
 use crate::guard::GuardSettings;
 use crate::margin::{Device, Watch};
+use crate::observer::DELAY_MAX;
 use crate::rig::{Encoder, EncoderError, GearError, MotorError, SlaveDrive};
 use crate::torque::{TorqueError, TorqueSettings};
 use palpate_model::units::Newtons;
@@ -70,6 +71,32 @@ impl MasterSlaveSettings {
     #[must_use]
     pub fn count_mm(&self) -> f64 {
         self.encoder.count_mm(&self.torque.pinion)
+    }
+
+    /// Whether they make a system.
+    pub(super) fn checked(&self) -> Result<(), MasterSlaveError> {
+        self.contact.checked()?;
+        self.encoder.checked()?;
+        self.torque.motor.checked()?;
+        self.torque.checked()?;
+        let device = [
+            ("damping", self.damping, "N s/mm", f64::MAX),
+            ("delay", self.delay_ticks, "ticks", DELAY_MAX as f64),
+        ];
+        for (name, value, unit, most) in device {
+            if !(0.0..=most).contains(&value) {
+                return Err(MasterSlaveError::Device {
+                    name,
+                    value,
+                    unit,
+                    most,
+                });
+            }
+        }
+        if !self.surface_mm.is_finite() {
+            return Err(MasterSlaveError::Surface(self.surface_mm));
+        }
+        Ok(())
     }
 
     /// The margin of these settings, for before play and during it.

@@ -2,7 +2,7 @@
 
 use crate::buzz::Buzz;
 use crate::flags::Flags;
-use crate::margin::Margin;
+use crate::margin::{Margin, Watch};
 use palpate_model::time::Nanos;
 use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
 use serde::Serialize;
@@ -59,6 +59,35 @@ pub struct Snapshot {
 }
 
 impl Snapshot {
+    /// Before the first tick.
+    pub(super) fn at_start(watch: &Watch, depth: Depth, winding_c: f64) -> Self {
+        Self {
+            tick: 0,
+            time: Nanos::ZERO,
+            counts: 0,
+            master_mm: 0.0,
+            master_speed: MmPerS(0.0),
+            pulses: 0,
+            behind: 0,
+            depth,
+            speed: MmPerS(0.0),
+            cell: Newtons(0.0),
+            is_touching: false,
+            model: Newtons(0.0),
+            guarded: Newtons(0.0),
+            force: Newtons(0.0),
+            damping: 0.0,
+            energy: 0.0,
+            torque: 0.0,
+            bias: Volts(0.0),
+            winding_c,
+            buzz: None,
+            margin: watch.at(depth, MmPerS(0.0)),
+            flags: Flags::NONE,
+            checksum: 0,
+        }
+    }
+
     /// FNV-1a over the bits of every field but the checksum.
     #[must_use]
     pub fn sum(&self) -> u64 {
