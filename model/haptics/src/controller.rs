@@ -66,7 +66,6 @@ pub struct PassivityController {
     force_max: f64,
     kept: f64,
     tick_s: f64,
-    worst: f64,
     injected: f64,
     hush: u64,
     hush_left: u64,
@@ -89,17 +88,10 @@ impl PassivityController {
             force_max: settings.force_max.0.max(0.0),
             kept: (-tick_s / settings.leak.0.max(tick_s)).exp(),
             tick_s,
-            worst: 0.0,
             injected: 0.0,
             hush: period.ticks_in(settings.hush),
             hush_left: 0,
         }
-    }
-
-    /// The largest force that damping took, in N.
-    #[must_use]
-    pub fn worst_force(&self) -> Newtons {
-        Newtons(self.worst)
     }
 
     /// Energy that damping has taken, in N mm.
@@ -155,7 +147,6 @@ impl PassivityController {
         }
         let added = (damping * speed).clamp(-self.force_max, self.force_max);
         let added = if added.is_finite() { added } else { 0.0 };
-        self.worst = self.worst.max(added.abs());
         self.injected += added * speed * self.tick_s;
         let wanted = if force.0.is_finite() { force.0 } else { 0.0 };
         let total = wanted + added;

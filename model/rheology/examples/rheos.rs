@@ -1,14 +1,13 @@
 //! Draws `docs/pictures/rheos.svg`: a published Maxwell fit and its discretisation bias.
 //!
-//! `cargo run -p palpate-model --example rheos -- example1_data.csv docs/pictures/rheos.svg`
+//! `cargo run -p palpate-rheology --example rheos -- example1_data.csv docs/pictures/rheos.svg`
 
 mod drawing;
 mod maxwell_fit;
 
 use drawing::{Axes, BLUE, RED};
-use maxwell_fit::{MaxwellFit, StrainSample, fit_maxwell};
+use maxwell_fit::{Integrator, Maxwell, MaxwellFit, MaxwellState, StrainSample, fit_maxwell};
 use palpate_model::Seconds;
-use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellState};
 use std::error::Error;
 
 /// Plot area of a panel in px: left, top, width, height.

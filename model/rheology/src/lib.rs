@@ -9,10 +9,12 @@
 
 pub mod cycles;
 pub mod expected;
+#[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod families;
 pub mod fit;
 pub mod integrators;
+#[cfg(feature = "extremes")]
 pub mod reference;
 pub mod select;
 pub mod tolerance;

@@ -3,11 +3,9 @@
 pub mod admissibility;
 mod exact_step;
 mod kelvin;
-mod maxwell;
 mod psi;
 
 pub use exact_step::{Compensated, NEGLIGIBLE, Pieces, StepWeights, forcing};
 pub use kelvin::{BodyError, KelvinState, ModifiedKelvin};
-pub use maxwell::{Integrator, Maxwell, MaxwellState, MaxwellStep};
 pub use psi::{PSI_COUNT, psi_all, psi_derivatives, psi_first};
 pub use psi::{psi, psi_derivative};

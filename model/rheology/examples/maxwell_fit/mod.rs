@@ -6,11 +6,14 @@
 
 #![allow(
     dead_code,
+    unused_imports,
     reason = "the example and its test each take their own part"
 )]
 
+mod body;
+
+pub use body::{Integrator, Maxwell, MaxwellState, MaxwellStep};
 use palpate_model::units::Seconds;
-use palpate_model::viscoelastic::{Integrator, Maxwell, MaxwellStep};
 use palpate_rheology::fit::FitError;
 
 /// Relaxation times tried by the scan.

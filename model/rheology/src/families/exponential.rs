@@ -3,6 +3,8 @@
 use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F + tau_eps F' = T + tau_sig dT/dt` with `T = A (e^(B x) - 1)`: the Kelvin body with its spring
 /// made exponential.
@@ -15,6 +17,12 @@ pub struct ExponentialKelvin;
 /// Range of `B` times the greatest depth: below, the response is straight to 5 % and `A` and `B`
 /// become one number; above, force grows by e^20 = 5e8 over the stroke.
 pub(super) const CURVATURE: OuterRange = OuterRange::PerDepth(0.05, 20.0);
+
+pub(super) const KIND: Kind = Kind {
+    word: "exponential",
+    of: |number| number.is_none().then(|| Arc::new(ExponentialKelvin) as _),
+    compared: None,
+};
 
 impl Family for ExponentialKelvin {
     fn key(&self) -> String {
@@ -33,18 +41,14 @@ impl Family for ExponentialKelvin {
         "more than one relaxation time; stiffness that grows other than in proportion to force; unloading that differs from loading"
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        vec![("kelvin".into(), "stiffness that grows with force")]
+    }
+
     fn outer(&self) -> Vec<Outer> {
         vec![
-            Outer {
-                name: "tau_eps".into(),
-                unit: "s",
-                range: OuterRange::Time,
-            },
-            Outer {
-                name: "B".into(),
-                unit: "1/mm",
-                range: CURVATURE,
-            },
+            Outer::new("tau_eps", "s", OuterRange::Time),
+            Outer::new("B", "1/mm", CURVATURE),
         ]
     }
 
@@ -54,16 +58,8 @@ impl Family for ExponentialKelvin {
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
         let (tau, spring) = (outer[0], Drive::exponential(1.0, outer[1]));
-        let elastic = Relaxation {
-            tau,
-            elastic: spring,
-            rate: Drive::default(),
-        };
-        let viscous = Relaxation {
-            tau,
-            elastic: Drive::default(),
-            rate: spring,
-        };
+        let elastic = Relaxation::settling(spring, tau);
+        let viscous = Relaxation::driven(spring, tau);
         vec![vec![elastic], vec![viscous]]
     }
 
@@ -72,10 +68,6 @@ impl Family for ExponentialKelvin {
     }
 
     fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter {
-            name: "tau_sig".into(),
-            value: linear[1] / linear[0],
-            unit: "s".into(),
-        }]
+        vec![ModelParameter::new("tau_sig", linear[1] / linear[0], "s")]
     }
 }

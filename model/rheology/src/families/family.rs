@@ -23,6 +23,11 @@ pub trait Family: Debug + Send + Sync {
     /// What no choice of parameters can represent, in one sentence.
     fn cannot_represent(&self) -> &'static str;
 
+    /// Families that it is with something more, and that in words.
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        Vec::new()
+    }
+
     /// Whether it can be fitted while a run goes on.
     fn live(&self) -> Live {
         Live::No(
@@ -94,6 +99,16 @@ pub struct Outer {
     pub unit: &'static str,
     /// Where it is searched.
     pub range: OuterRange,
+}
+
+impl Outer {
+    pub(super) fn new(name: impl Into<String>, unit: &'static str, range: OuterRange) -> Self {
+        Self {
+            name: name.into(),
+            unit,
+            range,
+        }
+    }
 }
 
 /// Where an outer parameter is searched.

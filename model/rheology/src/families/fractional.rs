@@ -3,6 +3,7 @@
 use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
 use std::f64::consts::PI;
 use std::sync::Arc;
 
@@ -69,6 +70,18 @@ impl FractionalZener {
     }
 }
 
+pub(super) const KIND: Kind = Kind {
+    word: "fractional",
+    of: |number| match number {
+        None => Some(Arc::new(FractionalZener::default())),
+        Some(digits) => {
+            let digits = u32::try_from(digits).ok()?;
+            Some(Arc::new(FractionalZener::of_digits(digits)?))
+        }
+    },
+    compared: None,
+};
+
 impl Family for FractionalZener {
     fn key(&self) -> String {
         if self.digits == FRACTIONAL_DIGITS {
@@ -90,18 +103,14 @@ impl Family for FractionalZener {
         "stiffness that grows with depth; unloading that differs from loading; alpha above 0.95, which is a Kelvin body"
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        vec![("kelvin".into(), "a continuous spread of relaxation times")]
+    }
+
     fn outer(&self) -> Vec<Outer> {
         vec![
-            Outer {
-                name: "tau".into(),
-                unit: "s",
-                range: OuterRange::Time,
-            },
-            Outer {
-                name: "alpha".into(),
-                unit: "",
-                range: OuterRange::Share(0.1, 0.95),
-            },
+            Outer::new("tau", "s", OuterRange::Time),
+            Outer::new("alpha", "", OuterRange::Share(0.1, 0.95)),
         ]
     }
 
@@ -131,10 +140,10 @@ impl Family for FractionalZener {
     }
 
     fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter {
-            name: "k_instant".into(),
-            value: linear[0] + linear[1],
-            unit: "N/mm".into(),
-        }]
+        vec![ModelParameter::new(
+            "k_instant",
+            linear[0] + linear[1],
+            "N/mm",
+        )]
     }
 }

@@ -3,6 +3,8 @@
 use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + eta x'`, with `eta = mu1 tau_sig`.
 ///
@@ -10,6 +12,12 @@ use super::relaxation::{Drive, Relaxation};
 /// ed., section 2.11. The same body as a spring beside one spring in series with a dashpot.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Kelvin;
+
+pub(super) const KIND: Kind = Kind {
+    word: "kelvin",
+    of: |number| number.is_none().then(|| Arc::new(Kelvin) as _),
+    compared: None,
+};
 
 impl Family for Kelvin {
     fn key(&self) -> String {
@@ -28,12 +36,18 @@ impl Family for Kelvin {
         "stiffness that grows with depth; more than one relaxation time; unloading that differs from loading"
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        vec![
+            (
+                "voigt".into(),
+                "relaxation of the spring beside the dashpot",
+            ),
+            ("maxwell".into(), "a spring that holds"),
+        ]
+    }
+
     fn outer(&self) -> Vec<Outer> {
-        vec![Outer {
-            name: "tau_eps".into(),
-            unit: "s",
-            range: OuterRange::Time,
-        }]
+        vec![Outer::new("tau_eps", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
@@ -42,16 +56,8 @@ impl Family for Kelvin {
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
         let tau = outer[0];
-        let elastic = Relaxation {
-            tau,
-            elastic: Drive::power(1, 1.0),
-            rate: Drive::default(),
-        };
-        let viscous = Relaxation {
-            tau,
-            elastic: Drive::default(),
-            rate: Drive::power(1, 1.0),
-        };
+        let elastic = Relaxation::settling(Drive::power(1, 1.0), tau);
+        let viscous = Relaxation::driven(Drive::power(1, 1.0), tau);
         vec![vec![elastic], vec![viscous]]
     }
 
@@ -60,10 +66,6 @@ impl Family for Kelvin {
     }
 
     fn derived(&self, _outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter {
-            name: "tau_sig".into(),
-            value: linear[1] / linear[0],
-            unit: "s".into(),
-        }]
+        vec![ModelParameter::new("tau_sig", linear[1] / linear[0], "s")]
     }
 }

@@ -3,12 +3,20 @@
 use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F + (eta / k) F' = eta x'`, as the spring `k` and its relaxation time `tau = eta / k`.
 ///
 /// Fung, "Biomechanics: Mechanical Properties of Living Tissues", 2nd ed., section 2.11.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Maxwell;
+
+pub(super) const KIND: Kind = Kind {
+    word: "maxwell",
+    of: |number| number.is_none().then(|| Arc::new(Maxwell) as _),
+    compared: None,
+};
 
 impl Family for Maxwell {
     fn key(&self) -> String {
@@ -28,11 +36,7 @@ impl Family for Maxwell {
     }
 
     fn outer(&self) -> Vec<Outer> {
-        vec![Outer {
-            name: "tau".into(),
-            unit: "s",
-            range: OuterRange::Time,
-        }]
+        vec![Outer::new("tau", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
@@ -48,10 +52,6 @@ impl Family for Maxwell {
     }
 
     fn derived(&self, outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        vec![ModelParameter {
-            name: "eta".into(),
-            value: linear[0] * outer[0],
-            unit: "N*s/mm".into(),
-        }]
+        vec![ModelParameter::new("eta", linear[0] * outer[0], "N*s/mm")]
     }
 }

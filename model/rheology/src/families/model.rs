@@ -19,6 +19,16 @@ pub struct ModelParameter {
     pub unit: String,
 }
 
+impl ModelParameter {
+    pub(super) fn new(name: &str, value: f64, unit: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            value,
+            unit: unit.to_owned(),
+        }
+    }
+}
+
 /// A model of one family with all its parameters.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Model {
@@ -154,20 +164,10 @@ impl Model {
     /// All parameters: outer ones, coefficients, and what the literature makes of them.
     pub fn parameters(&self) -> Result<Vec<ModelParameter>, ModelError> {
         let family = by_key(&self.family)?;
-        let outer = family.outer();
-        let outer = outer.into_iter().zip(&self.outer);
-        let outer = outer.map(|(one, value)| ModelParameter {
-            name: one.name,
-            value: *value,
-            unit: one.unit.to_owned(),
-        });
-        let linear = family.linear();
-        let linear = linear.into_iter().zip(&self.linear);
-        let linear = linear.map(|((name, unit), value)| ModelParameter {
-            name,
-            value: *value,
-            unit: unit.to_owned(),
-        });
+        let outer = family.outer().into_iter().zip(&self.outer);
+        let outer = outer.map(|(one, value)| ModelParameter::new(&one.name, *value, one.unit));
+        let linear = family.linear().into_iter().zip(&self.linear);
+        let linear = linear.map(|((name, unit), value)| ModelParameter::new(&name, *value, unit));
         let mut all: Vec<ModelParameter> = outer.chain(linear).collect();
         all.extend(family.derived(&self.outer, &self.linear));
         Ok(all)

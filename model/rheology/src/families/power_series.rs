@@ -2,6 +2,8 @@
 
 use super::family::{Family, Kernel, Live, Outer, OuterRange};
 use super::relaxation::{Drive, POWER_MAX, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x'`.
 ///
@@ -16,6 +18,14 @@ const UNITS: [&str; POWER_MAX] = ["N/mm", "N/mm^2", "N/mm^3", "N/mm^4", "N/mm^5"
 
 const ORDINALS: [&str; POWER_MAX] = ["first", "second", "third", "fourth", "fifth"];
 
+/// What the second and each later term is.
+const ADDED: [&str; POWER_MAX - 1] = [
+    "a square of depth",
+    "a cube of depth",
+    "a fourth power of depth",
+    "a fifth power of depth",
+];
+
 impl PowerSeries {
     /// The order of the thesis.
     pub const THESIS: Self = Self { order: 3 };
@@ -26,6 +36,12 @@ impl PowerSeries {
         (1..=POWER_MAX).contains(&order).then_some(Self { order })
     }
 }
+
+pub(super) const KIND: Kind = Kind {
+    word: "series",
+    of: |number| Some(Arc::new(PowerSeries::of_order(number?)?)),
+    compared: Some(1..=POWER_MAX),
+};
 
 impl Family for PowerSeries {
     fn key(&self) -> String {
@@ -57,12 +73,15 @@ impl Family for PowerSeries {
         }
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        match self.order {
+            0 | 1 => Vec::new(),
+            order => vec![(format!("series-{}", order - 1), ADDED[order - 2])],
+        }
+    }
+
     fn outer(&self) -> Vec<Outer> {
-        vec![Outer {
-            name: "tau_eps".into(),
-            unit: "s",
-            range: OuterRange::Time,
-        }]
+        vec![Outer::new("tau_eps", "s", OuterRange::Time)]
     }
 
     fn linear(&self) -> Vec<(String, &'static str)> {
@@ -72,17 +91,9 @@ impl Family for PowerSeries {
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
         let tau = outer[0];
-        let elastic = (1..=self.order).map(|k| Relaxation {
-            tau,
-            elastic: Drive::power(k, 1.0),
-            rate: Drive::default(),
-        });
+        let elastic = (1..=self.order).map(|k| Relaxation::settling(Drive::power(k, 1.0), tau));
         // x x' is the rate of x^2 / 2.
-        let viscous = Relaxation {
-            tau,
-            elastic: Drive::default(),
-            rate: Drive::power(2, 0.5),
-        };
+        let viscous = Relaxation::driven(Drive::power(2, 0.5), tau);
         elastic.chain([viscous]).map(|term| vec![term]).collect()
     }
 

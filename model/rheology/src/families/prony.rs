@@ -2,6 +2,8 @@
 
 use super::family::{Family, Outer, OuterRange};
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// Most terms: more than one for each of the thirty-one decades of the longest master curve published
 /// with its series.
@@ -10,6 +12,15 @@ pub const TERMS_MAX: usize = 40;
 /// Most terms a selection tries on a recording: beyond one for each decade that it shows, terms cannot
 /// be told apart.
 pub const TERMS_COMPARED: usize = 6;
+
+/// What the second and each later term is.
+const ADDED: [&str; TERMS_COMPARED - 1] = [
+    "a second relaxation time",
+    "a third relaxation time",
+    "a fourth relaxation time",
+    "a fifth relaxation time",
+    "a sixth relaxation time",
+];
 
 /// `F = k0 x + sum_i k_i m_i`, `m_i + tau_i m_i' = tau_i x'`: relaxation modulus `k0 + sum k_i e^(-t / tau_i)`
 /// (Prony series), all `k_i >= 0`.
@@ -34,6 +45,12 @@ impl Prony {
     }
 }
 
+pub(super) const KIND: Kind = Kind {
+    word: "prony",
+    of: |number| Some(Arc::new(Prony::of_terms(number?)?)),
+    compared: Some(2..=TERMS_COMPARED),
+};
+
 impl Family for Prony {
     fn key(&self) -> String {
         format!("prony-{}", self.terms)
@@ -51,12 +68,18 @@ impl Family for Prony {
         "stiffness that grows with depth; unloading that differs from loading"
     }
 
-    fn outer(&self) -> Vec<Outer> {
-        let time = |i| Outer {
-            name: format!("tau_{i}"),
-            unit: "s",
-            range: OuterRange::Time,
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        let simpler = match self.terms {
+            0 | 1 => return Vec::new(),
+            2 => "kelvin".to_owned(),
+            terms => format!("prony-{}", terms - 1),
         };
+        let words = ADDED.get(self.terms - 2);
+        vec![(simpler, words.unwrap_or(&"another relaxation time"))]
+    }
+
+    fn outer(&self) -> Vec<Outer> {
+        let time = |i| Outer::new(format!("tau_{i}"), "s", OuterRange::Time);
         (1..=self.terms).map(time).collect()
     }
 

@@ -5,6 +5,7 @@ use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
 use super::quadrature::gauss_legendre;
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
 use std::sync::Arc;
 
 /// `F = int_0^t G(t - s) dT/ds ds` with the elastic response `T = A (e^(B x) - 1)` and the reduced
@@ -42,6 +43,15 @@ impl QuasiLinear {
     }
 }
 
+pub(super) const KIND: Kind = Kind {
+    word: "fung",
+    of: |number| match number {
+        None => Some(Arc::new(QuasiLinear::default())),
+        Some(nodes) => Some(Arc::new(QuasiLinear::of_nodes(nodes)?)),
+    },
+    compared: None,
+};
+
 impl Family for QuasiLinear {
     fn key(&self) -> String {
         if self.nodes == QUASI_LINEAR_NODES {
@@ -63,23 +73,21 @@ impl Family for QuasiLinear {
         "relaxation whose shape depends on depth; stiffness that grows other than in proportion to force; unloading that differs from loading"
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        vec![
+            (
+                "exponential".into(),
+                "a continuous spread of relaxation times",
+            ),
+            ("fractional".into(), "stiffness that grows with force"),
+        ]
+    }
+
     fn outer(&self) -> Vec<Outer> {
         vec![
-            Outer {
-                name: "tau_1".into(),
-                unit: "s",
-                range: OuterRange::Time,
-            },
-            Outer {
-                name: "tau_2/tau_1".into(),
-                unit: "",
-                range: OuterRange::Ratio(3.0, 1e6),
-            },
-            Outer {
-                name: "B".into(),
-                unit: "1/mm",
-                range: CURVATURE,
-            },
+            Outer::new("tau_1", "s", OuterRange::Time),
+            Outer::new("tau_2/tau_1", "", OuterRange::Ratio(3.0, 1e6)),
+            Outer::new("B", "1/mm", CURVATURE),
         ]
     }
 
@@ -111,15 +119,10 @@ impl Family for QuasiLinear {
     }
 
     fn derived(&self, outer: &[f64], linear: &[f64]) -> Vec<ModelParameter> {
-        let named = |name: &str, value: f64, unit: &str| ModelParameter {
-            name: name.into(),
-            value,
-            unit: unit.into(),
-        };
         vec![
-            named("A", linear[0] + linear[1] * outer[1].ln(), "N"),
-            named("C", linear[1] / linear[0], ""),
-            named("tau_2", outer[0] * outer[1], "s"),
+            ModelParameter::new("A", linear[0] + linear[1] * outer[1].ln(), "N"),
+            ModelParameter::new("C", linear[1] / linear[0], ""),
+            ModelParameter::new("tau_2", outer[0] * outer[1], "s"),
         ]
     }
 }

@@ -206,24 +206,36 @@ pub struct Relaxation {
 }
 
 impl Relaxation {
-    /// A spring without memory.
+    /// What tends to `elastic` in `tau` seconds when held.
     #[must_use]
-    pub fn spring(elastic: Drive) -> Self {
+    pub fn settling(elastic: Drive, tau: f64) -> Self {
         Self {
-            tau: 0.0,
+            tau,
             elastic,
             rate: Drive::default(),
         }
     }
 
-    /// A spring in series with a dashpot that lets it relax in `tau` seconds.
+    /// What moving drives by `rate` and fades in `tau` seconds.
     #[must_use]
-    pub fn maxwell(spring: Drive, tau: f64) -> Self {
+    pub fn driven(rate: Drive, tau: f64) -> Self {
         Self {
             tau,
             elastic: Drive::default(),
-            rate: spring.scaled(tau),
+            rate,
         }
+    }
+
+    /// A spring without memory.
+    #[must_use]
+    pub fn spring(elastic: Drive) -> Self {
+        Self::settling(elastic, 0.0)
+    }
+
+    /// A spring in series with a dashpot that lets it relax in `tau` seconds.
+    #[must_use]
+    pub fn maxwell(spring: Drive, tau: f64) -> Self {
+        Self::driven(spring.scaled(tau), tau)
     }
 
     /// The term times a number.

@@ -3,6 +3,8 @@
 use super::family::{Family, Outer};
 use super::power_series::PowerSeries;
 use super::relaxation::{Drive, Relaxation, SOFTENING_MAX};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F + tau_eps F' = mu1 x + .. + mun x^n + tau_sig x x' + (s1 x + s2 x^2 + s3 x^3) (1 - x / x_max)`,
 /// with `x_max` the greatest depth so far.
@@ -32,6 +34,12 @@ impl Unloading {
     }
 }
 
+pub(super) const KIND: Kind = Kind {
+    word: "unloading",
+    of: |number| Some(Arc::new(Unloading::of_order(number?)?)),
+    compared: Some(3..=3),
+};
+
 impl Family for Unloading {
     fn key(&self) -> String {
         format!("unloading-{}", self.order)
@@ -49,6 +57,10 @@ impl Family for Unloading {
         "more than one relaxation time; recovery of what was lost; a second loading that differs from the unloading before it; anything deeper than the data"
     }
 
+    fn adds_to(&self) -> Vec<(String, &'static str)> {
+        vec![(self.loading.key(), "softness after greater depth")]
+    }
+
     fn outer(&self) -> Vec<Outer> {
         self.loading.outer()
     }
@@ -59,13 +71,8 @@ impl Family for Unloading {
     }
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let softening = (1..=SOFTENING_MAX).map(|k| {
-            vec![Relaxation {
-                tau: outer[0],
-                elastic: Drive::softening(k, 1.0),
-                rate: Drive::default(),
-            }]
-        });
+        let softening = (1..=SOFTENING_MAX)
+            .map(|k| vec![Relaxation::settling(Drive::softening(k, 1.0), outer[0])]);
         let loading = self.loading.columns(outer);
         loading.into_iter().chain(softening).collect()
     }

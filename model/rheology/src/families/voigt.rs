@@ -2,6 +2,8 @@
 
 use super::family::{Family, Outer};
 use super::relaxation::{Drive, Relaxation};
+use super::table::Kind;
+use std::sync::Arc;
 
 /// `F = k x + eta x'`.
 ///
@@ -10,6 +12,12 @@ use super::relaxation::{Drive, Relaxation};
 /// goes into its force undamped.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Voigt;
+
+pub(super) const KIND: Kind = Kind {
+    word: "voigt",
+    of: |number| number.is_none().then(|| Arc::new(Voigt) as _),
+    compared: None,
+};
 
 impl Family for Voigt {
     fn key(&self) -> String {
@@ -37,11 +45,7 @@ impl Family for Voigt {
     }
 
     fn columns(&self, _outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let dashpot = Relaxation {
-            tau: 0.0,
-            elastic: Drive::default(),
-            rate: Drive::power(1, 1.0),
-        };
+        let dashpot = Relaxation::driven(Drive::power(1, 1.0), 0.0);
         vec![
             vec![Relaxation::spring(Drive::power(1, 1.0))],
             vec![dashpot],

@@ -3,8 +3,7 @@
 //! Every family has them as exact responses of its relaxation terms. The modified Kelvin body of third order has a kernel of
 //! its own ([`super::design`]), made for records of many samples.
 
-use super::design::{self, LANES, LINEAR_COUNT, Lane, Rows, Scale, six};
-use super::design_blocks;
+use super::design::{self, LANES, LINEAR_COUNT, Lane, Rows, Scale, blocks as design_blocks, six};
 use super::options::Layout;
 use super::sample::FitSample;
 use super::thin::Block;

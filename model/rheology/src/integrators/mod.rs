@@ -300,4 +300,5 @@ fn unfinished([from, to]: [f64; 2], dt: f64) -> StepError {
 }
 
 #[cfg(test)]
+#[cfg(feature = "extremes")]
 mod tests;

@@ -5,6 +5,7 @@ mod abilities;
 mod coverage;
 mod cycles;
 mod expected;
+#[cfg(feature = "extremes")]
 mod extremes;
 mod families;
 mod fit_recovers;

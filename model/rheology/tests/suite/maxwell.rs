@@ -3,8 +3,7 @@
 #[path = "../../examples/maxwell_fit/mod.rs"]
 mod maxwell_fit;
 
-use maxwell_fit::{StrainSample, fit_maxwell};
-use palpate_model::viscoelastic::{Integrator, Maxwell};
+use maxwell_fit::{Integrator, Maxwell, StrainSample, fit_maxwell};
 use palpate_model::{Depth, Newtons, Seconds};
 use palpate_rheology::families;
 use palpate_rheology::fit::{FitError, FitOptions, FitSample, fit};

@@ -1,13 +1,13 @@
-//! The columns of [`super::design`] over the blocks of a thinned record.
+//! The columns of [`super`] over the blocks of a thinned record.
 
-use super::design::{Coefficients, Columns, LINEAR_COUNT, Scale};
-use super::thin::Block;
-use super::triangle::{Factor, Triangle};
+use super::super::thin::Block;
+use super::super::triangle::{Factor, Triangle};
+use super::{Coefficients, Columns, LINEAR_COUNT, Scale};
 
 /// The six columns and the mean force over each block of a thinned record as one triangle, for one relaxation time. The
 /// mean of a filtered column needs no samples: integrating `f + tau f' = x^k` gives
 /// `mean f = mean x^k - tau (f_end - f_start) / dt`.
-pub(super) fn thin_factor(blocks: &[Block], scale: Scale, tau: f64) -> Factor {
+pub(in super::super) fn thin_factor(blocks: &[Block], scale: Scale, tau: f64) -> Factor {
     let mut triangle = Triangle::new(LINEAR_COUNT + 1);
     let Some(first) = blocks.first() else {
         return triangle.finish();
@@ -55,7 +55,7 @@ fn mean([x0, x1]: [f64; 2], [before, after]: [&[f64; 6]; 2], block: &Block, tau:
 }
 
 /// Visits the ends of blocks on the redrawn path with bare columns and the slope by `log tau`.
-pub(super) fn redrawn(
+pub(in super::super) fn redrawn(
     blocks: &[Block],
     scale: Scale,
     tau: f64,

@@ -7,9 +7,8 @@
 //! phi(+) = phi + (psi_0(r) / r) d - psi_0(r) phi
 //! ```
 
-use super::exact_step::Compensated;
-use super::psi::psi;
-use crate::units::Seconds;
+use palpate_model::units::Seconds;
+use palpate_model::viscoelastic::{Compensated, psi};
 
 /// Parameters of a Maxwell body, in the unit of the stress; strain is a ratio.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -1,0 +1,137 @@
+//! The state after a tick.
+
+use crate::buzz::Buzz;
+use crate::flags::Flags;
+use crate::margin::{Margin, Watch};
+use palpate_model::time::Nanos;
+use palpate_model::units::{Depth, MmPerS, Newtons, Volts};
+use serde::Serialize;
+
+/// The state of everything after a tick, as screens and records take it.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct Snapshot {
+    /// Ticks since the start, those away included.
+    pub tick: u64,
+    /// The time of that.
+    pub time: Nanos,
+    /// The master's encoder.
+    pub counts: i64,
+    /// Way of the master from its start, in mm.
+    pub master_mm: f64,
+    /// Speed of the master.
+    pub master_speed: MmPerS,
+    /// Pulses sent to the slave since the start.
+    pub pulses: i64,
+    /// Pulses that wait for the slave's drive.
+    pub behind: i64,
+    /// Depth of the slave.
+    pub depth: Depth,
+    /// Speed of the slave.
+    pub speed: MmPerS,
+    /// Force on the cell.
+    pub cell: Newtons,
+    /// Whether it touches.
+    pub is_touching: bool,
+    /// Force of the model.
+    pub model: Newtons,
+    /// Force that the guard let through.
+    pub guarded: Newtons,
+    /// Force rendered, with the controller's damping.
+    pub force: Newtons,
+    /// Damping that the controller added, in N s/mm.
+    pub damping: f64,
+    /// Energy that the rendered force has absorbed, in N mm.
+    pub energy: f64,
+    /// Torque commanded, in N mm.
+    pub torque: f64,
+    /// Bias voltage.
+    pub bias: Volts,
+    /// Temperature of the motor's winding as its commands let expect, in degrees Celsius.
+    pub winding_c: f64,
+    /// A buzz, if there is one.
+    pub buzz: Option<Buzz>,
+    /// The margin at this depth.
+    pub margin: Margin,
+    /// What was special.
+    pub flags: Flags,
+    /// Of all before, so that a torn copy is told.
+    pub checksum: u64,
+}
+
+impl Snapshot {
+    /// Before the first tick.
+    pub(super) fn at_start(watch: &Watch, depth: Depth, winding_c: f64) -> Self {
+        Self {
+            tick: 0,
+            time: Nanos::ZERO,
+            counts: 0,
+            master_mm: 0.0,
+            master_speed: MmPerS(0.0),
+            pulses: 0,
+            behind: 0,
+            depth,
+            speed: MmPerS(0.0),
+            cell: Newtons(0.0),
+            is_touching: false,
+            model: Newtons(0.0),
+            guarded: Newtons(0.0),
+            force: Newtons(0.0),
+            damping: 0.0,
+            energy: 0.0,
+            torque: 0.0,
+            bias: Volts(0.0),
+            winding_c,
+            buzz: None,
+            margin: watch.at(depth, MmPerS(0.0)),
+            flags: Flags::NONE,
+            checksum: 0,
+        }
+    }
+
+    /// FNV-1a over the bits of every field but the checksum.
+    #[must_use]
+    pub fn sum(&self) -> u64 {
+        let floats = [
+            self.master_mm,
+            self.master_speed.0,
+            self.depth.0,
+            self.speed.0,
+            self.cell.0,
+            self.model.0,
+            self.guarded.0,
+            self.force.0,
+            self.damping,
+            self.energy,
+            self.torque,
+            self.bias.0,
+            self.winding_c,
+            self.buzz.map_or(-1.0, |buzz| buzz.frequency_hz),
+            self.buzz.map_or(-1.0, |buzz| buzz.amplitude_mm),
+            self.margin.depth.0,
+            self.margin.needed,
+            self.margin.has,
+            self.margin.friction_needed.0,
+            self.margin.friction.0,
+        ];
+        let others = [
+            self.tick,
+            self.time.0,
+            self.counts as u64,
+            self.pulses as u64,
+            self.behind as u64,
+            u64::from(self.is_touching),
+            u64::from(self.flags.bits()),
+            self.margin.cause as u64,
+        ];
+        let words = others.into_iter().chain(floats.map(f64::to_bits));
+        words.fold(0xCBF2_9CE4_8422_2325, |sum, word| {
+            (sum ^ word).wrapping_mul(0x0000_0100_0000_01B3)
+        })
+    }
+
+    /// Whether every field is of the same tick.
+    #[must_use]
+    pub fn is_whole(&self) -> bool {
+        self.sum() == self.checksum
+    }
+}

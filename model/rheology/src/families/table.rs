@@ -1,0 +1,109 @@
+//! Every family there is, and how its key is read.
+
+use super::family::Family;
+use std::ops::RangeInclusive;
+use std::sync::Arc;
+use thiserror::Error;
+
+/// Every kind of family, the simplest first: a kind that is not here is in no list and has no key.
+const TABLE: &[Kind] = &[
+    super::voigt::KIND,
+    super::maxwell::KIND,
+    super::kelvin::KIND,
+    super::power_series::KIND,
+    super::exponential::KIND,
+    super::prony::KIND,
+    super::fractional::KIND,
+    super::quasi_linear::KIND,
+    super::unloading::KIND,
+];
+
+/// Families of one equation.
+pub(super) struct Kind {
+    /// Their key, before a hyphen and a number where there is one.
+    pub word: &'static str,
+    /// The family of the word alone or with a number; `None` where there is none.
+    pub of: fn(Option<usize>) -> Option<Arc<dyn Family>>,
+    /// Numbers of those that a selection compares; `None` for the word alone.
+    pub compared: Option<RangeInclusive<usize>>,
+}
+
+/// No family has this key.
+#[derive(Clone, Debug, PartialEq, Eq, Error)]
+#[error("there is no model family '{key}'; there are {known}")]
+pub struct UnknownFamily {
+    /// What was asked for.
+    pub key: String,
+    /// Keys there are.
+    pub known: String,
+}
+
+/// All families, the simplest first: what a selection compares. One Prony term is the Kelvin body;
+/// unloading of other orders than the third is there by its key.
+#[must_use]
+pub fn all() -> Vec<Arc<dyn Family>> {
+    let members = |kind: &Kind| -> Vec<Arc<dyn Family>> {
+        match kind.compared.clone() {
+            None => (kind.of)(None).into_iter().collect(),
+            Some(numbers) => numbers.filter_map(|one| (kind.of)(Some(one))).collect(),
+        }
+    };
+    TABLE.iter().flat_map(members).collect()
+}
+
+/// The family of a key such as `series-3`, `unloading-3` or `fung-8`.
+pub fn by_key(key: &str) -> Result<Arc<dyn Family>, UnknownFamily> {
+    let find = |word: &str, number| {
+        let kind = TABLE.iter().find(|kind| kind.word == word)?;
+        (kind.of)(number)
+    };
+    let found = match key.split_once('-') {
+        None => find(key, None),
+        Some((word, number)) => number.parse().ok().and_then(|one| find(word, Some(one))),
+    };
+    found.ok_or_else(|| UnknownFamily {
+        key: key.to_owned(),
+        known: all()
+            .iter()
+            .map(|family| family.key())
+            .collect::<Vec<_>>()
+            .join(", "),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_family_is_found_by_the_key_that_it_tells() {
+        let all = all();
+        assert!(all.len() >= TABLE.len());
+        for family in &all {
+            assert_eq!(by_key(&family.key()).unwrap().key(), family.key());
+            for (simpler, words) in family.adds_to() {
+                assert!(by_key(&simpler).is_ok() && words.len() > 5, "{simpler}");
+            }
+        }
+        // Keys of families that are compared only where somebody names them.
+        for key in [
+            "prony-1",
+            "prony-40",
+            "unloading-1",
+            "fung-8",
+            "fractional-12",
+        ] {
+            assert_eq!(by_key(key).unwrap().key(), key);
+        }
+        for key in [
+            "", "voigt-1", "series", "series-0", "series-x", "prony-41", "fung-0",
+        ] {
+            let refused = by_key(key).unwrap_err();
+            assert!(
+                refused
+                    .known
+                    .starts_with("voigt, maxwell, kelvin, series-1")
+            );
+        }
+    }
+}
