@@ -5,8 +5,10 @@
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
 //! no hardware. [`doubles`] is for tests only.
 
+mod board_clock;
 pub mod cell;
 pub mod detect;
+pub mod device;
 pub mod doubles;
 pub mod galil;
 pub mod grbl;
