@@ -341,8 +341,8 @@ mod tests {
         for (pair, told) in [
             ("specimen.colour=red", "specimen.thickness_mm"),
             ("specimen", "KEY=VALUE"),
-            ("specimen.thickness_mm=0", "a number of mm above 0"),
-            ("specimen.thickness_mm=NaN", "a number of mm above 0"),
+            ("specimen.thickness_mm=0", "above 0"),
+            ("specimen.thickness_mm=NaN", "above 0"),
             ("specimen.time_since_death_h=-1", "a number of h from 0"),
             ("specimen.temperature_c=-300", "above -273.15"),
             ("series.repeat=0", "a whole number from 1"),

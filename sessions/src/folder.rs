@@ -252,9 +252,12 @@ mod tests {
         let parent = tempfile::tempdir().unwrap();
         let path = parent.path().join("a/b/session");
         let held = SessionFolder::create(&path).unwrap();
-        let refusal = SessionFolder::create(&path).unwrap_err().to_string();
-        let holder = format!("in use by process {};", std::process::id());
-        assert!(refusal.contains(&holder), "{refusal}");
+        let refusal = SessionFolder::create(&path).unwrap_err();
+        let id = std::process::id().to_string();
+        assert!(
+            matches!(&refusal, FolderError::Lock(LockError::Held { holder, .. }) if *holder == id),
+            "{refusal:?}"
+        );
         // A session that never wrote anything leaves a folder that can be used again.
         drop(held);
         SessionFolder::create(&path).unwrap();
@@ -265,10 +268,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         fs::write(folder.path().join("thesis.doc"), "irreplaceable").unwrap();
         let refusal = SessionFolder::create(folder.path()).unwrap_err();
-        let text = refusal.to_string();
         assert!(
-            text.ends_with("is not empty; choose a new folder"),
-            "{text}"
+            matches!(&refusal, FolderError::NotEmpty { path } if path == folder.path()),
+            "{refusal:?}"
         );
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
     }
@@ -278,9 +280,9 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let file = folder.path().join("session");
         fs::write(&file, "").unwrap();
-        let refusal = SessionFolder::create(&file).unwrap_err().to_string();
-        assert!(refusal.contains("is a file, not a folder"), "{refusal}");
+        let refusal = SessionFolder::create(&file).unwrap_err();
+        assert!(matches!(&refusal, FolderError::NotAFolder { path } if *path == file));
         let below = SessionFolder::create(&file.join("more")).unwrap_err();
-        assert!(below.to_string().starts_with("cannot make"), "{below}");
+        assert!(matches!(below, FolderError::Io { .. }), "{below:?}");
     }
 }

@@ -269,10 +269,10 @@ mod tests {
         let good = raw_blocks(0, &[piece(1, "a", true, b"xy"), piece(2, "a", false, b"z")]);
         type Edit = fn(&mut RawMessage);
         let edits: [(Edit, &str); 4] = [
-            (|block| block.length[1] = 2, "holds 3 bytes, its pieces 4"),
+            (|block| block.length[1] = 2, "3 bytes"),
             (|block| block.is_sent.clear(), "length"),
             (|block| block.at_delta_ns.push(1), "length"),
-            (|block| block.data.clear(), "holds 0 bytes"),
+            (|block| block.data.clear(), "0 bytes"),
         ];
         for (edit, expected) in edits {
             let mut block = good[0].clone();

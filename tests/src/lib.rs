@@ -36,22 +36,32 @@ pub fn workspace() -> PathBuf {
     root.map_or_else(|| PathBuf::from("."), Path::to_path_buf)
 }
 
-/// Every file below a folder with an extension, in order.
+/// Every file below a folder with an extension, in order; `target` and hidden folders are left out.
+///
+/// # Panics
+/// If there is none: a rule that is checked on no file would hold whatever is written.
 #[must_use]
 pub fn files_below(folder: &Path, extension: &str) -> Vec<PathBuf> {
     let mut files = Vec::new();
-    let Ok(entries) = std::fs::read_dir(folder) else {
-        return files;
-    };
+    gather(folder, extension, &mut files);
+    assert!(
+        !files.is_empty(),
+        "no .{extension} below {}",
+        folder.display()
+    );
+    files.sort();
+    files
+}
+
+fn gather(folder: &Path, extension: &str, files: &mut Vec<PathBuf>) {
+    let entries = std::fs::read_dir(folder).expect("a folder that can be read");
     for entry in entries.flatten() {
         let path = entry.path();
         let name = entry.file_name().to_string_lossy().into_owned();
         if path.is_dir() && name != "target" && !name.starts_with('.') {
-            files.extend(files_below(&path, extension));
+            gather(&path, extension, files);
         } else if path.extension().is_some_and(|found| found == extension) {
             files.push(path);
         }
     }
-    files.sort();
-    files
 }

@@ -2,20 +2,9 @@
 
 use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
 use palpate_tables::lake;
+use palpate_test_support::wait::until;
 use std::fs;
 use std::process::{Command, Stdio};
-use std::time::Duration;
-
-/// Waits for something that comes at any speed of the computer.
-fn wait(what: &str, mut is_so: impl FnMut() -> bool) {
-    for _ in 0..6000 {
-        if is_so() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("a minute without {what}");
-}
 
 #[test]
 fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
@@ -31,9 +20,8 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
         .spawn()
         .unwrap();
     let log = at.join("emptied/000.mcap");
-    wait("a log that grows", || {
-        fs::metadata(&log).is_ok_and(|file| file.len() > 100_000)
-    });
+    let has_grown = || (fs::metadata(&log).ok()?.len() > 100_000).then_some(());
+    until(has_grown, || "a log that grows".into());
     // Whoever wants it in a lake is told to wait.
     let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
     assert_eq!(export.status.code(), Some(1));

@@ -77,7 +77,7 @@ fn a_controller_answers_on_a_port_and_weights_are_put_on_its_cell() {
         note
     };
     assert_eq!(order("load 840\n"), "note: 840 g are on the load cell\n");
-    assert!(order("load much\n").contains("give load and a mass in g"));
+    assert!(order("load much\n").contains("mass in g"));
     // A sample later the cell feels it.
     let is_felt = || {
         let loaded: f64 = ask("MG @AN[1]\r").parse().ok()?;
@@ -106,23 +106,11 @@ fn wrong_use_is_one_sentence() {
     for (args, code, part) in [
         (&["--model", "dmc1820"][..], 2, "choose dmc4143"),
         (&["--fault", "melt@1"], 2, "garbage, drop"),
-        (
-            &["--pty", "a", "--tcp", "127.0.0.1:0"],
-            2,
-            "cannot be used with",
-        ),
+        (&["--pty", "a", "--tcp", "127.0.0.1:0"], 2, "used with"),
         (&["--adc", "8"], 2, "12, 16 or none"),
         // An address of documentation, which no computer has.
-        (
-            &["--tcp", "192.0.2.1:5023"],
-            1,
-            "choose another --pty or --tcp",
-        ),
-        (
-            &["--pty", "no/such/folder"],
-            1,
-            "choose another --pty or --tcp",
-        ),
+        (&["--tcp", "192.0.2.1:5023"], 1, "--pty or --tcp"),
+        (&["--pty", "no/such/folder"], 1, "--pty or --tcp"),
     ] {
         let output = palpate(folder.path(), &[&["emulate", "galil"], args].concat());
         assert_eq!(output.status.code(), Some(code), "{args:?}");

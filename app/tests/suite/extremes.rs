@@ -109,22 +109,15 @@ fn one_family_in_words_and_an_unknown_one() {
     let run = palpate(at, &["extremes", "--quick", "--family", "kelvin"]);
     succeeded(&run);
     let text = stdout(&run);
+    assert!(text.contains("9 right, 0 refused"), "{text}");
     assert!(
-        text.contains("relaxation time and step: 9 right, 0 refused"),
-        "{text}"
-    );
-    assert!(
-        text.contains("closest to its tolerance") && !text.contains("WRONG "),
+        text.contains("closest") && !text.contains("WRONG "),
         "{text}"
     );
 
     let run = palpate(at, &["extremes", "--family", "burgers"]);
     assert_eq!(run.status.code(), Some(2));
-    assert!(
-        stderr(&run).contains("no model family 'burgers'"),
-        "{}",
-        stderr(&run)
-    );
+    assert!(stderr(&run).contains("'burgers'"), "{}", stderr(&run));
 
     let run = palpate(
         at,
@@ -138,9 +131,5 @@ fn one_family_in_words_and_an_unknown_one() {
         ],
     );
     assert_eq!(run.status.code(), Some(2));
-    assert!(
-        stderr(&run).contains("there is no folder no/such"),
-        "{}",
-        stderr(&run)
-    );
+    assert!(stderr(&run).contains("no/such"), "{}", stderr(&run));
 }

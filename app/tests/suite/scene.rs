@@ -74,14 +74,14 @@ fn what_is_impossible_is_refused_in_words() {
     for (words, reason) in [
         (
             &["run", "bad.toml"][..],
-            "bad.toml, line 2: 'tissue.sidemm' means nothing here",
+            "bad.toml, line 2: 'tissue.sidemm'",
         ),
         (&["run", "gone.toml"], "gone"),
         (&["run", "nowhere.toml"], "cannot read nowhere.toml"),
-        (&["run", "--path", "pork"], "poke, press, drag, taps"),
+        (&["run", "--path", "pork"], "taps"),
         (&["run", "--seconds", "0"], "--seconds 0"),
         (&["replay", "nowhere"], "nowhere"),
-        (&["record", "--to", "no/folder"], "there is no folder no"),
+        (&["record", "--to", "no/folder"], "folder no"),
     ] {
         let out = palpate(at.path(), &[&["scene"], words].concat());
         assert_eq!(out.status.code(), Some(2), "{words:?}");

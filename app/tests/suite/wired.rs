@@ -31,7 +31,7 @@ fn a_rig_is_found_checked_and_watched() {
     let checked = palpate(folder.path(), &["rig", "check", &file, "--json"]);
     let checked = json(&checked);
     let identity = checked["rig"]["identity"].as_str().unwrap();
-    assert!(identity.contains("watchdog: at most 13.3 mm"), "{identity}");
+    assert!(identity.contains("13.3 mm"), "{identity}");
     assert!(
         checked["links"][0]["answers"].as_u64().unwrap() > 0,
         "{checked}"
@@ -73,7 +73,7 @@ fn what_is_not_as_the_file_says_is_told() {
         &["rig", "detect", "--at", "/dev/there-is-no-such-port"],
     );
     assert!(
-        stdout(&nobody).contains("there is no serial port"),
+        stdout(&nobody).contains("serial port"),
         "{}",
         stdout(&nobody)
     );

@@ -213,12 +213,7 @@ mod tests {
         }
         let sample = dialogue.take_sample().unwrap();
         assert!((sample.volts.0 - 5.0).abs() < 1e-6 && sample.counts == COUNT_MAX);
-        assert!(
-            dialogue
-                .take_trouble()
-                .unwrap()
-                .contains("beyond the HX711's range")
-        );
+        assert!(dialogue.take_trouble().unwrap().contains("range"));
         assert_eq!(dialogue.take_trouble(), None);
         for i in 0..3_u32 {
             let micros = 600_000 + 500_000 * i;

@@ -74,13 +74,4 @@ mod tests {
         assert_eq!(port.name, "/dev/ttyUSB0");
         assert_eq!(port.description, "USB 0403:6001, FTDI, no. A12");
     }
-
-    #[test]
-    fn listing_is_sorted_and_never_panics() {
-        // How many ports there are depends on the computer; their order does not.
-        match list_ports() {
-            Ok(ports) => assert!(ports.is_sorted()),
-            Err(err) => assert!(err.to_string().contains("cannot be listed")),
-        }
-    }
 }

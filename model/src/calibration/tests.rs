@@ -77,18 +77,16 @@ fn a_line_is_a_line_and_a_falling_line_is_refused() {
 #[test]
 fn a_signal_that_falls_by_more_than_it_repeats_is_refused() {
     use Direction::{Loading, Unloading};
-    let falls = |series: &[Taken<'_>]| {
-        let refusal = document(series).check_rise().err();
-        refusal.map(|err| err.to_string())
-    };
+    let falls = |series: &[Taken<'_>]| document(series).check_rise().err();
     let wired: &[_] = &[(0.0, 1.2), (100.0, 1.1), (200.0, 1.9), (300.0, 1.7)];
-    let told = falls(&[(Loading, 1, wired)]).unwrap();
-    assert!(
-        told.starts_with(
-            "under 100 g the cell reads 1.1 V in loading, less than the 1.2 V under 0 g"
-        ) && told.contains("check the wiring"),
-        "{told}"
-    );
+    let fall = CalibrationError::SignalFalls {
+        mass_g: 100.0,
+        volts: 1.1,
+        before_g: 0.0,
+        before_volts: 1.2,
+        way: "loading",
+    };
+    assert_eq!(falls(&[(Loading, 1, wired)]), Some(fall));
     // One line through all of them rises and would hide it.
     let line = CurveKind::Polynomial { degree: 1 };
     assert!(
@@ -159,13 +157,13 @@ fn a_document_of_recorded_sessions_gives_the_same_curve() {
 fn facts_that_cannot_be_are_refused() {
     let thesis = Calibration::thesis;
     let nan = Some(Volts(f64::NAN));
-    for (wrong, words) in [
+    for (wrong, fact) in [
         (
             Calibration {
                 excitation: nan,
                 ..thesis()
             },
-            "excitation of the calibration is NaN",
+            "excitation",
         ),
         (
             Calibration {
@@ -179,25 +177,31 @@ fn facts_that_cannot_be_are_refused() {
                 resolution: Some(Volts(-0.1)),
                 ..thesis()
             },
-            "resolution of the calibration is -0.1",
+            "resolution",
         ),
     ] {
-        let refusal = wrong.curve().unwrap_err().to_string();
-        assert!(refusal.contains(words), "{refusal}");
+        let refusal = wrong.curve().unwrap_err();
+        assert!(
+            matches!(refusal, CalibrationError::Fact { what, .. } if what == fact),
+            "{refusal:?}"
+        );
     }
     let mut noisy = document(&[(Direction::Loading, 1, &[(0.0, 1.0), (100.0, 1.2)])]);
     noisy.series[0].steps[1].noise = nan;
-    assert!(noisy.curve().unwrap_err().to_string().contains("noise"));
+    assert!(matches!(
+        noisy.curve(),
+        Err(CalibrationError::Fact { what: "noise", .. })
+    ));
 }
 
 #[test]
 fn a_newer_form_is_refused() {
     let mut calibration = Calibration::thesis();
-    calibration.format = CALIBRATION_FORMAT + 1;
-    let refusal = calibration.curve().unwrap_err().to_string();
-    assert!(
-        refusal.contains("newer than this program knows"),
-        "{refusal}"
+    let format = CALIBRATION_FORMAT + 1;
+    calibration.format = format;
+    assert_eq!(
+        calibration.curve(),
+        Err(CalibrationError::NewerFormat { format })
     );
 }
 
@@ -234,10 +238,10 @@ fn weights_must_be_known_and_add_up() {
     let up: &[(f64, f64)] = &[(0.0, 1.0), (100.0, 1.2)];
     let mut calibration = document(&[(Direction::Loading, 1, up)]);
     calibration.series[0].steps[1].weights = vec!["A".into()];
-    let refusal = calibration.curve().unwrap_err().to_string();
-    assert!(
-        refusal.contains("\"A\" on it, which is not in the list"),
-        "{refusal}"
+    let name = "A".to_owned();
+    assert_eq!(
+        calibration.curve(),
+        Err(CalibrationError::UnknownWeight { step: 2, name })
     );
     let weight = |mass_g| NamedWeight {
         name: "A".into(),
@@ -245,11 +249,12 @@ fn weights_must_be_known_and_add_up() {
         tolerance_g: None,
     };
     calibration.weights = vec![weight(50.0)];
-    let refusal = calibration.curve().unwrap_err().to_string();
-    assert!(
-        refusal.contains("has 100 g but its weights add up to 50 g"),
-        "{refusal}"
-    );
+    let disagree = CalibrationError::WeightsDisagree {
+        step: 2,
+        mass_g: 100.0,
+        sum_g: 50.0,
+    };
+    assert_eq!(calibration.curve(), Err(disagree));
     calibration.weights = vec![weight(100.0)];
     assert!(calibration.curve().is_ok());
 }
@@ -306,7 +311,10 @@ fn segments_go_where_they_are_told_or_nearest() {
 fn a_polynomial_through_the_flat_stretch_is_refused() {
     let points = Calibration::thesis().points().unwrap();
     let refusal = CurveKind::Polynomial { degree: 6 }.through(&points);
-    assert!(refusal.unwrap_err().to_string().contains("degree 6"));
+    assert!(matches!(
+        refusal,
+        Err(CalibrationError::NotRising { degree: 6, .. })
+    ));
     assert!(CurveKind::Polynomial { degree: 1 }.through(&points).is_ok());
 }
 
@@ -322,19 +330,15 @@ fn the_flat_stretch_of_the_thesis_is_called_out() {
         "{flat:?}"
     );
     let sentence = &quality.findings[0];
-    assert!(
-        sentence.starts_with(
-            "from 340 g to 640 g (3.33 to 6.28 N) the cell moves only 0.09 V for 300 g"
-        ),
-        "{sentence}"
-    );
+    for fact in ["340 g", "640 g", "3.33", "6.28 N", "0.09 V", "300 g"] {
+        assert!(sentence.contains(fact), "{fact}: {sentence}");
+    }
     // 0.01 V for 100 g is 0.098 N per mV; between the weights the curve is flatter yet.
     assert!((0.098..0.14).contains(&flat.worst_n_per_mv), "{flat:?}");
-    assert!(sentence.contains("one standard uncertainty"), "{sentence}");
+    let extrapolated = &quality.findings[1];
     assert!(
-        quality.findings[1].starts_with("forces above 10.20 N (1040 g) are extrapolated"),
-        "{:?}",
-        quality.findings
+        extrapolated.contains("10.20 N") && extrapolated.contains("1040 g"),
+        "{extrapolated}"
     );
     assert!(
         quality.findings[2].contains("hysteresis"),
@@ -461,11 +465,11 @@ fn age_and_rig_raise_doubts() {
     for (age, words) in [
         (Some(0), None),
         (Some(335), None),
-        (Some(336), Some("valid for 29 more")),
-        (Some(365), Some("valid for 0 more")),
-        (Some(366), Some("366 days old and was valid for 365")),
-        (Some(-1), Some("dated 1 days ahead")),
-        (None, Some("does not say when")),
+        (Some(336), Some("29 more")),
+        (Some(365), Some("0 more")),
+        (Some(366), Some("366 days")),
+        (Some(-1), Some("1 days ahead")),
+        (None, Some("when it was taken")),
     ] {
         let doubts = calibration.doubts(&bench(age));
         assert_eq!(
@@ -504,7 +508,7 @@ fn a_known_weight_passes_within_one_percent() {
         "{result:?}"
     );
     assert!(
-        result.sentence.contains("+0.90 %, within the limit of 1 %"),
+        result.sentence.contains("+0.90 %") && result.sentence.contains("1 %"),
         "{result:?}"
     );
     let strict = KnownWeight {
@@ -512,7 +516,7 @@ fn a_known_weight_passes_within_one_percent() {
         ..weight
     };
     let result = calibration.check(&strict).unwrap();
-    assert!(!result.is_passed && result.sentence.contains("take a new calibration"));
+    assert!(!result.is_passed && result.sentence.contains("0.5 %"));
     let none = KnownWeight {
         mass_g: 0.0,
         ..weight
@@ -527,10 +531,7 @@ fn a_known_weight_passes_within_one_percent() {
         ..weight
     };
     let result = thesis.check(&flat).unwrap();
-    assert!(
-        result.is_passed && result.doubts[0].contains("says little here"),
-        "{result:?}"
-    );
+    assert!(result.is_passed && result.doubts.len() == 1, "{result:?}");
 }
 
 #[test]
@@ -539,8 +540,7 @@ fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     for mass_g in [200.0, 500.0] {
         let told = thesis.check_refusal(mass_g).unwrap().unwrap();
         assert!(
-            told.contains(&format!("the force of {mass_g} g to"))
-                && told.ends_with("such as 950 g"),
+            told.contains(&format!("{mass_g} g")) && told.contains("950 g"),
             "{told}"
         );
     }
@@ -552,6 +552,7 @@ fn a_weight_that_the_calibration_cannot_tell_is_no_check() {
     assert_eq!(line.check_refusal(200.0), Ok(None));
     let mut coarse = thesis;
     coarse.resolution = Some(Volts(0.2));
+    // No weight would do.
     let told = coarse.check_refusal(800.0).unwrap().unwrap();
-    assert!(told.contains("take a new calibration"), "{told}");
+    assert!(told.contains("800 g") && !told.contains("950 g"), "{told}");
 }

@@ -169,12 +169,15 @@ mod tests {
         let (speed, accel) = (path.speed_max().0, path.acceleration_max().0);
         assert_eq!(path.check(MmPerS(speed), MmPerS2(accel)), Ok(()));
         let err = path.check(MmPerS(0.99 * speed), MmPerS2(accel));
-        assert_eq!(
-            err,
-            Err("a sine of 0.750 mm amplitude at 0.5000 Hz reaches 2.36 mm/s where the axis makes 2.33 mm/s; choose a smaller amplitude or a longer period".into())
-        );
+        let err = err.unwrap_err();
+        for fact in ["0.750 mm", "0.5000 Hz", "2.36 mm/s", "2.33 mm/s"] {
+            assert!(err.contains(fact), "{fact}: {err}");
+        }
         let err = path.check(MmPerS(speed), MmPerS2(0.9 * accel)).unwrap_err();
-        assert!(err.contains("accelerates by 7.40 mm/s2 where the axis makes 6.66 mm/s2"));
+        assert!(
+            err.contains("7.40 mm/s2") && err.contains("6.66 mm/s2"),
+            "{err}"
+        );
         for (amplitude, period, cycles) in [(0, 2000, 1), (50, 0, 1), (50, 2000, 0), (0, 0, 0)] {
             let command = Oscillation {
                 amplitude_pulses: amplitude,
@@ -184,7 +187,7 @@ mod tests {
             };
             let path = Sine::new(Position(45.0), &command, 0.015, Seconds(1e-3));
             let err = path.check(MmPerS(20.0), MmPerS2(61.44)).unwrap_err();
-            assert!(err.contains("none may be zero"), "{err}");
+            assert!(err.contains("zero"), "{err}");
         }
     }
 

@@ -1,4 +1,5 @@
 //! Signals through the crate's public door.
 #![cfg(test)]
 
+mod messages;
 mod touches;

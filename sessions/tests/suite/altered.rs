@@ -7,9 +7,9 @@ use palpate_sessions::{
     Alteration, FileSink, FolderSegments, LOG_FILE, LogError, LogWriter, Notice, Pace, Row,
     Session, SessionFolder, SessionWriter, segment_file,
 };
+use palpate_test_support::wait::until;
 use std::path::Path;
 use std::process::Command;
-use std::time::Duration;
 
 /// Does something to the file `$1` in a process of its own.
 fn stranger(command: &str, file: &Path) {
@@ -65,17 +65,6 @@ fn push(writer: &mut SessionWriter, rows: &[Row], order: u64) {
     writer.on_tick(last.host + Nanos(1)).unwrap();
 }
 
-/// Waits until all that was pushed is on the disk.
-fn wait(mut is_so: impl FnMut() -> bool) {
-    for _ in 0..6000 {
-        if is_so() {
-            return;
-        }
-        std::thread::sleep(Duration::from_millis(10));
-    }
-    panic!("a minute has passed");
-}
-
 #[test]
 fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
     let rows = rows(6000, 6);
@@ -86,14 +75,18 @@ fn an_altered_log_is_told_at_once_and_the_recording_goes_on_beside_it() {
         let folder = SessionFolder::create(&path).unwrap();
         let mut writer = SessionWriter::start(folder, None, &manifest(), Pace::Real).unwrap();
         push(&mut writer, first, 1);
-        wait(|| writer.saved_through() >= first[2999].host && writer.disk_state().sync_s.is_some());
+        let is_saved = || {
+            let is_synced = writer.disk_state().sync_s.is_some();
+            (writer.saved_through() >= first[2999].host && is_synced).then_some(())
+        };
+        until(is_saved, || "all that was pushed on the disk".into());
         stranger(command, &path.join(LOG_FILE));
         push(&mut writer, rest, 2);
-        let mut told = Vec::new();
-        wait(|| {
-            told.extend(writer.take_notices());
-            !told.is_empty()
-        });
+        let first_notices = || {
+            let notices = writer.take_notices();
+            (!notices.is_empty()).then_some(notices)
+        };
+        let told = until(first_notices, || "a notice".into());
         assert!(
             matches!(&told[..], [Notice::Altered(LogError::Altered { .. })]),
             "{command}: {told:?}"

@@ -606,7 +606,7 @@ fn a_file_that_is_no_catalog_is_set_aside_and_the_searches_go_on() {
     let catalog = updated(at);
     assert_eq!(catalog.all().unwrap(), expected);
     assert!(
-        catalog.remarks[0].contains("it was set aside as"),
+        catalog.remarks[0].contains("set aside"),
         "{:?}",
         catalog.remarks
     );

@@ -83,12 +83,8 @@ fn csv_holds_every_digit_and_reads_back() {
         assert_eq!(table.is_unload[k], session.rows[i].phase == Phase::Unload);
     }
     let left_out = session.rows.len() - kept.len();
-    assert_eq!(
-        table.notes,
-        [format!(
-            "{left_out} rows outside ramp, hold and unload are left out"
-        )]
-    );
+    assert_eq!(table.notes.len(), 1);
+    assert!(table.notes[0].starts_with(&format!("{left_out} rows")));
 }
 
 #[test]

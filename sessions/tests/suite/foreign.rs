@@ -5,9 +5,10 @@
 use chrono::{TimeZone, Utc};
 use palpate_model::about::Labels;
 use palpate_model::rig::Phase;
-use palpate_sessions::{ORIGINAL_FOLDER, Session};
+use palpate_sessions::{FolderError, ORIGINAL_FOLDER, Session};
 use palpate_tables::import::{
-    Foreign, ForeignPart, Kept, Sample, Told, folder_name, keep, open_foreign, parse_foreign,
+    Foreign, ForeignPart, KeepError, Kept, Sample, Told, folder_name, keep, open_foreign,
+    parse_foreign,
 };
 use palpate_test_support::skip;
 use std::fmt::Write;
@@ -82,18 +83,19 @@ fn a_table_is_understood_and_everything_is_said() {
     assert_eq!(read.bytes, bytes);
     for (what, expected) in [
         ("layout", "table (detected)"),
-        (
-            "encoding",
-            "windows-1252, for it is not UTF-8; other 8-bit encodings look alike (detected)",
-        ),
+        ("encoding", "windows-1252"),
         ("delimiter", "semicolon (detected)"),
         ("header", "line 4 (detected)"),
         ("units", "line 5 (detected)"),
-        ("decimal sign", "comma, from '0,0' in line 6 (detected)"),
-        ("depth", "column 2 'Weg' in µm (detected)"),
-        ("force", "column 3 'Kraft' in mN (detected)"),
+        ("decimal sign", "'0,0' in line 6"),
+        ("depth", "column 2 'Weg' in µm"),
+        ("force", "column 3 'Kraft' in mN"),
     ] {
-        assert_eq!(said(part, what), expected);
+        let found = said(part, what);
+        assert!(
+            found.contains(expected) && found.ends_with("(detected)"),
+            "{found}"
+        );
     }
 }
 
@@ -121,12 +123,16 @@ fn what_is_told_outweighs_what_is_detected() {
             assert!((found - expected).abs() <= 1e-16, "{found} {expected}");
         }
     }
-    let expected = "column 2 'z' in mm, its sign turned, counted from the first row (told)";
-    assert_eq!(said(part, "depth"), expected);
-    assert_eq!(
-        said(part, "force"),
-        "column 4 'load' in gf, its sign turned (told)"
-    );
+    for (what, expected) in [
+        ("depth", "column 2 'z' in mm"),
+        ("force", "column 4 'load' in gf"),
+    ] {
+        let found = said(part, what);
+        assert!(
+            found.starts_with(expected) && found.ends_with("(told)"),
+            "{found}"
+        );
+    }
     // A file without names.
     let bare = "0 0,5 1\n1 0,75 2\n";
     let read_bare = |options: &[(&str, &str)]| numbers(&read_one(bare, &telling(options)));
@@ -153,63 +159,39 @@ fn what_has_two_readings_is_refused_with_the_question() {
         (
             "t_s;x_mm;F_N\n1;1,234;5\n2;2,345;6\n",
             &[][..],
-            "'1,234' in line 2 could be in thousands",
+            "'1,234' in line 2",
         ),
-        (
-            "t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n",
-            &[],
-            "say which counts with --decimal",
-        ),
+        ("t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n", &[], "--decimal"),
         (
             "t_s;x_mm;F_N\n0;0,5;1\n1;0.75;2\n",
             &[("decimal", "comma")],
-            "line 3: the depth '0.75' is not a number",
+            "line 3: the depth '0.75'",
         ),
         (
             "t_s,Step time,x_mm,F_N\n0,0,0,0\n1,1,1,1\n",
             &[],
-            "could both be the time",
+            "'t_s' and 'Step time'",
         ),
-        (
-            "t_s,x_mm,F_furlong\n0,0,0\n1,1,1\n",
-            &[],
-            "the unit 'furlong' of the force",
-        ),
-        (
-            "t_s,x_mm,force\n0,0,0\n1,1,1\n",
-            &[],
-            "has no unit; say it with --unit force=UNIT, one of N, mN",
-        ),
-        (
-            "t_s,x_mm\n0,0\n1,1\n",
-            &[],
-            "no column is known as the force (line 1 has 't_s', 'x_mm')",
-        ),
-        ("0,0,0\n1,1,1\n", &[], "no names of columns stand above"),
-        (
-            "0,0,0\n1,1,1\n",
-            &[("columns", "t_s,x_mm")],
-            "has 3 columns but 2 are named",
-        ),
+        ("t_s,x_mm,F_furlong\n0,0,0\n1,1,1\n", &[], "'furlong'"),
+        ("t_s,x_mm,force\n0,0,0\n1,1,1\n", &[], "N, mN"),
+        ("t_s,x_mm\n0,0\n1,1\n", &[], "'t_s', 'x_mm'"),
+        ("0,0,0\n1,1,1\n", &[], "names of columns"),
+        ("0,0,0\n1,1,1\n", &[("columns", "t_s,x_mm")], "3 columns"),
         (
             "t_s,x_mm,F_N\n0,0,0\n1,1,1\n",
             &[("column", "depth=y")],
-            "no column is called 'y' in line 1",
+            "'y' in line 1",
         ),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,1,1,9\n",
-            &[],
-            "line 3 has a cell in column 4 where the header has 3",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,1,9\n", &[], "column 4"),
         (
             "t_s,x_mm,F_N\n0,0,0\n1,1,one\n2,2,2\n",
             &[],
-            "line 3: the force 'one' is not a number",
+            "line 3: the force 'one'",
         ),
         (
             "t_s,x_mm,F_N\n0,0,0\n1,,1\n2,2,2\n",
             &[],
-            "line 3: there is no depth; mend the file, or leave such rows out with --skip missing",
+            "line 3: there is no depth",
         ),
         (
             "t_s,x_mm,F_N\n0,0,0\n1,1,NaN\n2,2,2\n",
@@ -219,28 +201,20 @@ fn what_has_two_readings_is_refused_with_the_question() {
         (
             "t_s,x_mm,F_N\n0,0,0\n0,1,1\n2,2,2\n",
             &[],
-            "line 3: the time 0 s is that of the row before",
+            "line 3: the time 0 s",
         ),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n",
-            &[],
-            "line 4: the time goes back from 2 to 1 s",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n", &[], "from 2 to 1 s"),
         (
             "t_s,x_mm,F_N\n0,0,0\n2,1,1\n1,2,2\n",
             &[("part", "x")],
-            "no part is called 'x'",
+            "'x'",
         ),
-        ("t_s,x_mm,F_N\n0,0,0\n", &[], "fewer than two rows"),
-        ("nothing of use\n", &[], "no line holds two numbers"),
-        (
-            "t_s,x_mm,F_N\n0,0,0\n1,1,\"1\n",
-            &[],
-            "line 3: a quote is not closed",
-        ),
+        ("t_s,x_mm,F_N\n0,0,0\n", &[], "two rows"),
+        ("nothing of use\n", &[], "two numbers"),
+        ("t_s,x_mm,F_N\n0,0,0\n1,1,\"1\n", &[], "line 3: a quote"),
     ] {
         let reason = refused(text, &telling(options));
-        assert!(reason.contains(told), "{text:?}: {reason}");
+        assert!(reason.contains(told), "{told}: {text:?}: {reason}");
     }
     assert!(parse_foreign("f", Vec::new(), &self::told()).is_err());
 }
@@ -261,12 +235,18 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
     let part = read_one(&text, &telling(&all));
     assert_eq!(part.samples.len(), 51);
     let expected = [
-        "2 rows without a value are left out, as told; the first is line 52",
-        "2 rows with the time of the row before are left out, as told; the first is line 53",
-        "1 rows whose time goes back are left out, as told; the first is line 55",
-        "1 gaps: after line 51 nothing for 0.600000 s where rows are 0.100000 s apart; nothing is filled in",
+        ["2 rows without a value", "line 52"],
+        ["2 rows with the time", "line 53"],
+        ["1 rows whose time", "line 55"],
+        ["1 gaps: after line 51", "0.600000 s"],
     ];
-    assert_eq!(part.imported.remarks, expected);
+    assert_eq!(part.imported.remarks.len(), expected.len());
+    for (remark, facts) in part.imported.remarks.iter().zip(expected) {
+        assert!(
+            facts.iter().all(|fact| remark.contains(fact)),
+            "{facts:?}: {remark}"
+        );
+    }
     for (option, value) in all {
         let others: Vec<(&str, &str)> = all.into_iter().filter(|one| one.1 != value).collect();
         let reason = refused(&text, &telling(&others));
@@ -279,7 +259,7 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
         turned.imported.remarks
     );
     let uneven = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,1\n10,2,2\n100,2,2\n", &told());
-    assert!(uneven.imported.remarks[0].contains("not evenly spaced: 1.000000 to 90.000000 s"));
+    assert!(uneven.imported.remarks[0].contains("1.000000 to 90.000000 s"));
 }
 
 /// A file as a Mach-1 writes it: a command without data, one with, and one with two ramps.
@@ -385,10 +365,7 @@ fn rheometer_intervals_in_utf16_become_parts() {
             assert!((found - expected).abs() < 1e-12, "{found} {expected}");
         }
     }
-    assert_eq!(
-        said(part, "encoding"),
-        "UTF-16LE, says its byte order mark (detected)"
-    );
+    assert!(said(part, "encoding").starts_with("UTF-16LE"));
     assert!(said(part, "decimal sign").starts_with("comma, from '"));
     // The header of the second interval and its units, two lines below.
     assert_eq!(
@@ -397,7 +374,7 @@ fn rheometer_intervals_in_utf16_become_parts() {
     );
     let reason = parse_foreign("gel.csv", utf16(&rheometer()), &self::told()).unwrap_err();
     assert!(
-        reason.contains("part 'Squeeze 1 interval 1': no column is known as the depth"),
+        reason.contains("part 'Squeeze 1 interval 1': ") && reason.contains("depth"),
         "{reason}"
     );
 }
@@ -438,9 +415,10 @@ fn sheets_with_a_time_become_parts_in_both_formats() {
                 }
             }
         }
-        assert_eq!(
-            said(&read.parts[1], "force"),
-            "column 3 'Force standard' in mN (detected)"
+        let force = said(&read.parts[1], "force");
+        assert!(
+            force.starts_with("column 3 'Force standard' in mN"),
+            "{force}"
         );
     }
 }
@@ -482,7 +460,7 @@ fn a_session_is_made_and_the_original_kept() {
         part.samples.len() as u64
     );
     assert!(
-        session.notes[0].starts_with("imported from Gel 3 (first).txt"),
+        session.notes[0].contains("Gel 3 (first).txt"),
         "{:?}",
         session.notes
     );
@@ -498,16 +476,18 @@ fn a_session_is_made_and_the_original_kept() {
             sample.t.to_bits()
         );
     }
-    let refusal = make().unwrap_err().to_string();
-    assert!(refusal.contains("is not empty"), "{refusal}");
+    assert!(matches!(
+        make(),
+        Err(KeepError::Folder(FolderError::NotEmpty { .. }))
+    ));
 }
 
 #[test]
 fn times_that_no_session_holds_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     for (text, expected) in [
-        ("t_s,x_mm,F_N\n0,0,0\n1e7,1,1\n", "more than 106 days"),
-        ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "less than a picosecond"),
+        ("t_s,x_mm,F_N\n0,0,0\n1e7,1,1\n", "106 days"),
+        ("t_s,x_mm,F_N\n0,0,0\n1e-13,1,1\n", "picosecond"),
     ] {
         let part = read_one(text, &told());
         let kept = Kept {

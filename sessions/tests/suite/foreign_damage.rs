@@ -53,13 +53,13 @@ fn an_archive_that_unpacks_to_too_much_is_refused() {
     });
     assert!(bomb.len() < 1 << 20, "{} bytes", bomb.len());
     let reason = reason_of(bomb);
-    assert!(reason.contains("unpacks to more than"), "{reason}");
+    assert!(reason.contains("unpacks"), "{reason}");
     let liar = xlsx_with("xl/sharedStrings.xml", &mut |file| {
         file.write_all(b"<sst uniqueCount=\"9999999999999\"></sst>")
             .unwrap();
     });
     let reason = reason_of(liar);
-    assert!(reason.contains("more texts than it has bytes"), "{reason}");
+    assert!(reason.contains("more texts"), "{reason}");
 }
 
 /// Found by damaging the workbook at random: 5632 bytes made the reader ask for 180 MB.
@@ -169,16 +169,10 @@ fn the_largest_workbook_is_read_in_little_memory_and_a_larger_one_is_refused() {
     assert!(output.status.success(), "{output:?}");
     assert_eq!(told(&output, "rows"), [WORKBOOK_ROWS as u64]);
     let reason = reason_of(workbook(WORKBOOK_ROWS + 1));
-    assert!(
-        reason.contains("more than 524288 cells; export the measurement as text"),
-        "{reason}"
-    );
+    assert!(reason.contains("524288 cells"), "{reason}");
     let texts = xlsx_with("xl/sharedStrings.xml", &mut |file| {
         file.write_all(&vec![b' '; (4 << 20) + 1]).unwrap();
     });
     let reason = reason_of(texts);
-    assert!(
-        reason.contains("a list in the workbook unpacks to more than 4194304"),
-        "{reason}"
-    );
+    assert!(reason.contains("4194304"), "{reason}");
 }

@@ -15,6 +15,7 @@ mod hostile;
 mod killed;
 mod lake;
 mod limits;
+mod messages;
 mod pace;
 mod power;
 mod recovery;

@@ -6,7 +6,7 @@ use palpate_model::Nanos;
 use palpate_sessions::recover::{
     Health, RecoverError, examine, examine_library, recover, recovered_folder,
 };
-use palpate_sessions::{LOG_FILE, Pace, Session, SessionFolder, SessionWriter};
+use palpate_sessions::{LOG_FILE, Pace, ReadError, Session, SessionFolder, SessionWriter};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -60,8 +60,7 @@ fn an_interrupted_session_is_found_and_recovered_beside_the_original() {
     assert_eq!(session.entries, original.entries);
     assert_eq!(session.end.as_ref().unwrap().outcome, "interrupted");
     assert!(
-        session.notes[0].contains("recovered from")
-            && session.notes[0].contains("the end is missing"),
+        session.notes[0].contains("recovered from") && session.notes[0].contains("end is missing"),
         "{:?}",
         session.notes
     );
@@ -169,7 +168,7 @@ fn the_doctor_says_what_each_file_is() {
         patient
             .findings
             .iter()
-            .any(|one| one.contains("000.mcap is damaged at byte"))
+            .any(|one| one.contains("000.mcap") && one.contains("byte"))
     );
     // Where no sample is: nothing is missing, and it is still made whole again.
     let mut hurt = whole.clone();
@@ -178,10 +177,7 @@ fn the_doctor_says_what_each_file_is() {
     let patient = health("index", &hurt);
     assert_eq!(patient.samples, 1500);
     let wounds = patient.findings.join("; ");
-    assert!(
-        wounds.contains("the checksum of the index is wrong"),
-        "{wounds}"
-    );
+    assert!(wounds.contains("the index"), "{wounds}");
     let copy = recover(&library.path().join("sessions/index"), "1", at()).unwrap();
     let copy = Session::open(&copy.folder).unwrap();
     assert!(same_bits(&copy.rows, &rows) && copy.end.is_some());
@@ -199,9 +195,11 @@ fn the_doctor_says_what_each_file_is() {
     // Where nothing is, nothing is damaged, and recovery would not help.
     let hollow = library.path().join("hollow");
     fs::create_dir(&hollow).unwrap();
-    let refusal = recover(&hollow, "1", at()).unwrap_err().to_string();
-    let expected = "is not a palpate session (it holds no 000.mcap)";
-    assert!(refusal.contains(expected), "{refusal}");
+    let refusal = recover(&hollow, "1", at()).unwrap_err();
+    assert!(
+        matches!(&refusal, RecoverError::Read(ReadError::NotASession { path, .. }) if *path == hollow),
+        "{refusal:?}"
+    );
 
     // Somebody records it: it is left alone.
     let path = library.path().join("sessions/live");

@@ -88,7 +88,7 @@ fn a_log_without_an_end_opens_with_a_note() {
     assert_eq!(session.end, None);
     let note = &session.notes[0];
     assert!(
-        note.starts_with("no end record: the recording was interrupted at 12.3 s"),
+        note.starts_with("no end record") && note.contains("12.3 s"),
         "{note}"
     );
 }
@@ -104,10 +104,15 @@ fn a_newer_session_is_refused_with_both_versions() {
     log.finish(end(Nanos::ZERO)).unwrap();
     let bytes = sink.bytes();
     let refusal = open_bytes(&bytes).unwrap_err();
-    assert!(matches!(refusal, ReadError::Newer { .. }));
-    let text = refusal.to_string();
-    let expected = "was written by palpate 3.1.4 with record version 3; this palpate reads up to 2; update palpate";
-    assert!(text.ends_with(expected), "{text}");
+    let ReadError::Newer {
+        software_version,
+        record_version,
+        ..
+    } = refusal
+    else {
+        panic!("{refusal:?}");
+    };
+    assert_eq!((software_version.as_str(), record_version), ("3.1.4", 3));
 }
 
 #[test]

@@ -302,13 +302,13 @@ fn a_new_segment_that_never_began_leaves_an_interrupted_session() {
             assert!(same_bits(&session.rows, &rows[..4 * BATCH]));
             assert!(session.end.is_none());
             let notes = session.notes.join("; ");
-            assert!(notes.contains("002.mcap was begun but"), "{notes}");
+            assert!(notes.contains("002.mcap"), "{notes}");
             assert!(notes.contains("no end record"), "{notes}");
         }
     }
     fs::remove_file(&last).unwrap();
     let session = Session::open(folder.path()).unwrap();
-    assert!(session.notes[0].contains("no end record: the recording was interrupted"));
+    assert!(session.notes[0].contains("no end record"));
 }
 
 #[test]
@@ -353,7 +353,7 @@ fn an_unfinished_segment_is_joined_only_where_the_next_goes_on() {
     cut(&middle, whole.len() - 100);
     let session = Session::open(folder.path()).unwrap();
     assert!(same_bits(&session.rows, &rows) && session.end.is_some());
-    assert!(session.notes[0].contains("001.mcap was not finished"));
+    assert!(session.notes[0].contains("001.mcap"));
     // Anything less, and samples are lost.
     let data = whole.len() / 3;
     cut(&middle, data);
@@ -382,7 +382,7 @@ fn a_wrong_checksum_in_any_segment_is_refused() {
         hurt[index] ^= 1;
         fs::write(&path, &hurt).unwrap();
         let refusal = Session::open(folder.path()).unwrap_err().to_string();
-        assert!(refusal.contains("the checksum of the index"), "{refusal}");
+        assert!(refusal.contains("the index"), "{refusal}");
         assert!(refusal.contains(&segment_file(number)), "{refusal}");
         let (left, kept) = salvaged(folder.path());
         assert!(same_bits(&kept, &rows));
@@ -412,7 +412,7 @@ fn segments_of_another_session_are_refused() {
     )
     .unwrap();
     let refusal = Session::open(folder.path()).unwrap_err().to_string();
-    assert!(refusal.contains("its manifest is not that"), "{refusal}");
+    assert!(refusal.contains("manifest"), "{refusal}");
 
     // Nor may anything follow the end.
     let sink = MemorySink::default();
@@ -420,6 +420,9 @@ fn segments_of_another_session_are_refused() {
     log.append(&rows, &entries).unwrap();
     log.finish(end(Nanos::ZERO)).unwrap();
     fs::write(folder.path().join("000.mcap"), sink.bytes()).unwrap();
-    let refusal = Session::open(folder.path()).unwrap_err().to_string();
-    assert!(refusal.contains("follows the one that ended"), "{refusal}");
+    let refusal = Session::open(folder.path()).unwrap_err();
+    assert!(
+        matches!(&refusal, ReadError::Damaged { path, .. } if path.ends_with("001.mcap")),
+        "{refusal:?}"
+    );
 }

@@ -2,6 +2,7 @@
 //!
 //! It is a dependency of tests only and needs the model alone, so that no test program waits for another crate.
 
+pub mod messages;
 pub mod naive_surface;
 pub mod record;
 pub mod skip;

@@ -95,7 +95,7 @@ fn row(noise: &str, stiffness: &str) -> Row {
             // The one honest way out: the noise of this search leaves the position open.
             let reason = found.outcome.reason;
             assert!(
-                reason.contains("is only known to"),
+                reason.contains("known to"),
                 "{noise} mN {stiffness} % seed {seed}: {reason}"
             );
             row.refused += 1;
@@ -206,7 +206,7 @@ fn a_search_without_tissue_is_refused() {
         ..settings(1, "20", "100")
     };
     let found = search(settings, FindContact::default(), Some(HandAction::Unmount));
-    assert_refused(&found, "no tissue before 149.0 mm");
+    assert_refused(&found, "149.0 mm");
     assert_eq!(found.force_true_max, 0.0);
 }
 
@@ -238,7 +238,7 @@ fn a_search_that_meets_the_base_is_refused() {
 #[test]
 fn noise_above_the_criterion_is_refused_before_anything_moves() {
     let found = search(settings(1, "250", "100"), FindContact::default(), None);
-    assert_refused(&found, "would need a contact criterion");
+    assert_refused(&found, "contact criterion");
 }
 
 #[test]
@@ -250,8 +250,7 @@ fn a_second_pass_that_felt_nothing_for_noise_says_so() {
     assert!(!blind.is_empty(), "no search failed so");
     for why in blind {
         assert!(
-            why.contains("noise raised the criterion from 0.0")
-                && why.contains("quieten the signal"),
+            why.contains("from 0.0") && why.contains("quieten the signal"),
             "{why}"
         );
     }
@@ -262,7 +261,7 @@ fn a_loaded_cell_is_refused() {
     let loaded = HandAction::LoadCell { mass_g: 100.0 };
     let plan = FindContact::default();
     let found = search(settings(1, "20", "100"), plan, Some(loaded));
-    assert_refused(&found, "before anything touches the probe");
+    assert_refused(&found, "touches the probe");
     // After the tare it is the search that notices.
     let mut rig = SimRig::new(settings(1, "20", "100"));
     rig.by_hand(HandAction::LoadCell { mass_g: 0.0 });
@@ -271,7 +270,7 @@ fn a_loaded_cell_is_refused() {
             rig.by_hand(HandAction::LoadCell { mass_g: 10.0 });
         }
     });
-    assert_refused(&found, "before the tissue is met");
+    assert_refused(&found, "tissue is met");
 }
 
 #[test]

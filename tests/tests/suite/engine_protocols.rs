@@ -151,7 +151,7 @@ fn a_force_that_is_not_there_ends_the_run() {
     let mut lab = lab(SimProfile::Ideal, plan(vec![Step::LoadTo(load)]));
     lab.run();
     let reason = &lab.state().holding().unwrap().reason;
-    assert!(reason.contains("was not reached before"), "{reason}");
+    assert!(reason.contains("not reached"), "{reason}");
 }
 
 #[test]
@@ -378,7 +378,7 @@ fn watched(action: Action, threshold: f64) -> Plan {
         resume: 0.5 * threshold,
         settle: Seconds(0.5),
         action,
-        message: "the force is high".into(),
+        message: "force is high".into(),
     }];
     plan
 }
@@ -526,8 +526,7 @@ fn a_base_that_hardly_gives_way_trips_with_what_to_do() {
     let ended = lab.outcome.as_ref().or(lab.state().holding());
     let reason = &ended.unwrap().reason;
     assert!(
-        reason.contains("faster than 50 N/s; what the search for the base met hardly gives way")
-            && reason.contains("give find-base a lower speed"),
+        reason.contains("50 N/s") && reason.contains("find-base"),
         "{reason}"
     );
 }

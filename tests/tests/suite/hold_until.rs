@@ -129,6 +129,7 @@ fn the_last_live_answer_is_the_fit_of_a_run_on_the_lab_rig() {
     }
     let live = live.estimate().unwrap();
     let exact = fit(&run.samples, &FitOptions::default()).unwrap();
+    assert_eq!(live.parameters.len(), 7);
     for parameter in &live.parameters {
         let same = exact.parameter(&parameter.name).unwrap();
         let error = same.std_error.unwrap();

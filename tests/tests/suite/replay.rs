@@ -14,6 +14,7 @@ fn recorded() -> Vec<PathBuf> {
         .filter(|path| path.is_dir())
         .collect();
     folders.sort();
+    assert!(folders.len() >= 2, "{folders:?}");
     folders
 }
 
@@ -23,9 +24,7 @@ fn open(name: &str) -> Session {
 
 #[test]
 fn every_recorded_session_replays() {
-    let folders = recorded();
-    assert!(folders.len() >= 2);
-    for folder in folders {
+    for folder in recorded() {
         let note = std::fs::read_to_string(folder.join("README.md")).unwrap();
         assert!(
             note.starts_with("Why: "),

@@ -148,7 +148,7 @@ fn a_sine_that_loses_the_tissue_is_told_before_and_after() {
         let session = ran(SimProfile::Lab, &plan);
         let (verdict, reason) = verdict(&session);
         assert_eq!(verdict, Verdict::Suspect, "{reason}");
-        assert!(reason.contains("may have lost the tissue"), "{reason}");
+        assert!(reason.contains("lost the tissue"), "{reason}");
         for one in sines(&of_session(&session).unwrap()) {
             println!(
                 "{name} {} Hz: {:.3}, {:.4}",
@@ -166,24 +166,18 @@ fn a_force_too_small_to_tell_is_not_called_met() {
     let plan = shipped("creep", &[("force", "0.001 N"), brief]);
     let told = notes(&plan);
     assert!(
-        told.len() == 1 && told[0].contains("nothing tells whether it was met"),
+        told.len() == 1 && told[0].contains("whether it was met"),
         "{told:?}"
     );
     let (of_little, reason) = verdict(&ran(SimProfile::Lab, &plan));
     assert_eq!(of_little, Verdict::Suspect, "{reason}");
-    assert!(
-        reason.contains("0.0010 N is no more than a force may be off"),
-        "{reason}"
-    );
+    assert!(reason.contains("0.0010 N"), "{reason}");
     // One that may be off by a quarter is met, and that is said.
     let plan = shipped("creep", &[("force", "0.2 N"), brief]);
     assert!(notes(&plan).is_empty());
     let (of_more, reason) = verdict(&ran(SimProfile::Lab, &plan));
     assert_eq!(of_more, Verdict::Valid, "{reason}");
-    assert!(
-        reason.contains("counts as met within 0.0500 N of 0.2000 N"),
-        "{reason}"
-    );
+    assert!(reason.contains("0.0500 N of 0.2000 N"), "{reason}");
 }
 
 #[test]

@@ -373,10 +373,5 @@ fn scenes_that_cannot_be_are_refused_in_words() {
         assert!(said.contains(word), "{said}");
     }
     assert!("poke".parse::<ScenePath>().is_ok());
-    assert!(
-        "pork"
-            .parse::<ScenePath>()
-            .unwrap_err()
-            .contains("poke, press, drag, taps")
-    );
+    assert!("pork".parse::<ScenePath>().unwrap_err().contains("taps"));
 }

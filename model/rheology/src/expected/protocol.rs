@@ -155,10 +155,11 @@ mod tests {
     fn impossible_paths_are_refused_in_words() {
         let of = |speed, depth, rate| {
             let protocol = Protocol::ramp_hold(MmPerS(speed), Depth(depth), Seconds(1.0), rate);
-            protocol.check().unwrap_err().to_string()
+            protocol.check().unwrap_err()
         };
-        assert!(of(0.0, 30.0, 1e3).contains("duration of a piece"));
-        assert!(of(1.0, -1.0, 1e3).contains("depth in mm of -1"));
-        assert!(of(1.0, 1.0, 0.0).contains("sampling rate"));
+        let is_number = |refused, number: &str| matches!(refused, ExpectedError::BadNumber { what, .. } if what.contains(number));
+        assert!(is_number(of(0.0, 30.0, 1e3), "duration"));
+        assert!(is_number(of(1.0, -1.0, 1e3), "depth"));
+        assert!(is_number(of(1.0, 1.0, 0.0), "sampling rate"));
     }
 }

@@ -282,35 +282,47 @@ fn what_cannot_be_stepped_is_refused() {
     let body = SeriesBody::from(THESIS);
     let mut forces = vec![1.0];
     let mut refusal = |scheme: Scheme, body: &SeriesBody<3>, dt: f64, depths: &[f64]| {
-        scheme
-            .respond(body, dt, depths, &mut forces)
-            .unwrap_err()
-            .to_string()
+        scheme.respond(body, dt, depths, &mut forces).unwrap_err()
     };
     let path = [0.0, 1.0];
-    let text = refusal(Scheme::ExplicitEuler, &body, 2.1, &path);
-    assert!(
-        text.contains("explicit Euler is unstable") && text.contains("below 2.000"),
-        "{text}"
-    );
-    assert!(refusal(Scheme::RungeKutta, &body, 3.0, &path).contains("below 2.785"));
+    for (scheme, dt, most) in [
+        (Scheme::ExplicitEuler, 2.1, 2.0),
+        (Scheme::RungeKutta, 3.0, 2.785_293_563_405_282),
+    ] {
+        match refusal(scheme, &body, dt, &path) {
+            IntegratorError::Unstable { name, limit, .. } => {
+                assert_eq!((name, limit), (scheme.name(), most));
+            }
+            other => panic!("{scheme:?}: {other:?}"),
+        }
+    }
     for dt in [0.0, -1.0, f64::NAN, f64::INFINITY, 1e-310] {
-        assert!(refusal(Scheme::Exact, &body, dt, &path).contains("are not possible"));
+        let refused = refusal(Scheme::Exact, &body, dt, &path);
+        assert!(matches!(refused, IntegratorError::Time(_)), "{refused:?}");
     }
     let bad = SeriesBody {
         tau_eps: 0.0,
         ..body
     };
-    assert!(refusal(Scheme::Exact, &bad, 0.1, &path).contains("tau_eps = 0"));
+    let refused = refusal(Scheme::Exact, &bad, 0.1, &path);
+    assert!(matches!(refused, IntegratorError::Body(_)), "{refused:?}");
     for scheme in Scheme::ALL {
         for depth in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-            assert!(refusal(scheme, &body, 0.1, &[0.0, depth]).contains("not a finite number"));
-            assert!(refusal(scheme, &body, 0.1, &[depth, 0.0]).contains("not a finite number"));
+            for path in [[0.0, depth], [depth, 0.0]] {
+                let refused = refusal(scheme, &body, 0.1, &path);
+                assert!(
+                    matches!(refused, IntegratorError::Step(StepError::Depth(_))),
+                    "{scheme:?}: {refused:?}"
+                );
+            }
         }
-        let text = refusal(scheme, &body, 0.1, &[0.0, 1e200, 2e200]);
+        let refused = refusal(scheme, &body, 0.1, &[0.0, 1e200, 2e200]);
         assert!(
-            text.contains("beyond the largest number"),
-            "{scheme:?}: {text}"
+            matches!(
+                refused,
+                IntegratorError::Step(StepError::Overflow { .. } | StepError::Rest { .. })
+            ),
+            "{scheme:?}: {refused:?}"
         );
         let mut out: Vec<f64> = Vec::new();
         scheme.respond(&body, 0.1, &[], &mut out).unwrap();

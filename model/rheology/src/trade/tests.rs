@@ -117,11 +117,14 @@ fn the_front_is_what_nothing_beats() {
     assert_eq!(fronts, [true, true, true, false, true], "by target");
 }
 
-fn used(advice: &Advice) -> &str {
-    match advice {
-        Advice::Use(choice) => &choice.setting,
-        Advice::None(why) => why,
-    }
+/// Whether a setting is advised that has all these facts.
+fn is_use(advice: &Advice, facts: &[&str]) -> bool {
+    matches!(advice, Advice::Use(choice) if facts.iter().all(|fact| choice.setting.contains(fact)))
+}
+
+/// Whether nothing is advised, for a reason that has all these facts.
+fn is_none(advice: &Advice, facts: &[&str]) -> bool {
+    matches!(advice, Advice::None(why) if facts.iter().all(|fact| why.contains(fact)))
 }
 
 #[test]
@@ -130,37 +133,28 @@ fn the_cheapest_that_does_is_recommended() {
     let percent = |percent: f64| Tolerance::PercentOfPeak(percent);
     let at_1_khz = curves.recommend(percent(0.01), 1000.0, 0.1);
     // At 1 kHz a step is at most 1 ms.
-    assert_eq!(
-        used(&at_1_khz.integrator),
-        "trapezoid in f64, a step every 1 ms"
-    );
-    assert_eq!(used(&at_1_khz.families[0].1), "series-3");
-    assert!(used(&at_1_khz.families[1].1).contains("nearest is fung-4"));
+    assert!(is_use(&at_1_khz.integrator, &["trapezoid", "f64", "1 ms"]));
+    assert!(is_use(&at_1_khz.families[0].1, &["series-3"]));
+    assert!(is_none(&at_1_khz.families[1].1, &["fung-4"]));
     let at_100_hz = curves.recommend(percent(0.02), 100.0, 0.1);
-    assert_eq!(
-        used(&at_100_hz.integrator),
-        "trapezoid in f64, a step every 10 ms"
-    );
+    assert!(is_use(&at_100_hz.integrator, &["trapezoid", "10 ms"]));
     let loose = curves.recommend(percent(10.0), 1000.0, 0.1);
-    assert_eq!(
-        used(&loose.integrator),
-        "explicit Euler in f64, a step every 1 ms"
-    );
-    assert_eq!(used(&loose.families[0].1), "series-2");
-    assert_eq!(used(&loose.fit), "10 samples a second, 901 in all");
+    assert!(is_use(&loose.integrator, &["explicit Euler", "1 ms"]));
+    assert!(is_use(&loose.families[0].1, &["series-2"]));
+    assert!(is_use(&loose.fit, &["10 samples", "901"]));
     let strict = curves.recommend(Tolerance::PercentOfPeak(0.1), 1000.0, 0.1);
-    assert_eq!(used(&strict.fit), "1000 samples a second, 90001 in all");
+    assert!(is_use(&strict.fit, &["1000 samples", "90001"]));
     // series-4 is as exact and costs more; at a like cost the more exact one would be taken.
     let mut alike = curves.clone();
     alike.families[3] = family("series-4", "a body", 1e-12, 52.0);
     let alike = alike.recommend(percent(0.01), 1000.0, 0.1);
-    assert_eq!(used(&alike.families[0].1), "series-4");
+    assert!(is_use(&alike.families[0].1, &["series-4"]));
     // The more exact one is no use where only the cheaper keeps pace.
     let mut tight = curves.clone();
     tight.families[3] = family("series-4", "a body", 1e-12, 52.0);
     let share = 51.0e-9 * 1e6;
     let tight = tight.recommend(percent(0.01), 1e6, share);
-    assert_eq!(used(&tight.families[0].1), "series-3");
+    assert!(is_use(&tight.families[0].1, &["series-3"]));
     let Advice::Use(choice) = &loose.integrator else {
         panic!("{loose:?}");
     };
@@ -173,12 +167,12 @@ fn none_is_said_with_its_reason() {
     let curves = curves();
     let one = Tolerance::PercentOfPeak(1.0);
     let fast = curves.recommend(one, 1e6, 0.1);
-    assert!(used(&fast.integrator).contains("nothing was measured at 1000000"));
-    assert!(used(&fast.families[1].1).contains("takes 30.000 % of each period"));
+    assert!(is_none(&fast.integrator, &["1000000"]));
+    assert!(is_none(&fast.families[1].1, &["30.000 %"]));
     let exact = Tolerance::Newtons(palpate_model::units::Newtons(1e-20));
     let exact = curves.recommend(exact, 1000.0, 0.1);
-    assert!(used(&exact.integrator).contains("the nearest is exact, depth straight"));
-    assert!(used(&exact.fit).contains("the nearest is 1000 samples"));
+    assert!(is_none(&exact.integrator, &[Scheme::Exact.name()]));
+    assert!(is_none(&exact.fit, &["1000 samples"]));
 }
 
 #[test]
@@ -190,8 +184,8 @@ fn stale_and_foreign_curves_are_noticed() {
         assert_eq!(doubts.len(), 1, "{doubts:?}");
         doubts.concat()
     };
-    assert!(doubt(&here(), "1.2.3", 91.0).contains("stale: measured 91 days ago"));
-    assert!(doubt(&here(), "1.3.0", 1.0).contains("stale: measured by palpate 1.2.3"));
+    assert!(doubt(&here(), "1.2.3", 91.0).contains("91 days"));
+    assert!(doubt(&here(), "1.3.0", 1.0).contains("palpate 1.2.3"));
     assert!(doubt(&here(), "1.2.3", -2.0).contains("future"));
     let other = Machine { cores: 4, ..here() };
     assert!(doubt(&other, "1.2.3", 1.0).contains("foreign"));
@@ -199,7 +193,7 @@ fn stale_and_foreign_curves_are_noticed() {
         profile: "debug".into(),
         ..here()
     };
-    assert!(doubt(&debug, "1.2.3", 1.0).contains("a release build and this is a debug build"));
+    assert!(doubt(&debug, "1.2.3", 1.0).contains("debug"));
     assert_eq!(
         here().file_stem(),
         "example-r-cpu-3-ghz-8-logical-cores-linux-release-build"
@@ -211,41 +205,40 @@ fn curves_that_were_changed_are_noticed() {
     let good = curves();
     assert_eq!(good.clone().checked(), Ok(good.clone()));
     type Change = fn(&mut TradeCurves);
-    let changes: [(Change, &str); 9] = [
-        (|curves| curves.format = 2, "format 2"),
-        (
-            |curves| curves.integrators[0].cost.ns = -1.0,
-            "a time in ns = -1",
-        ),
-        (
-            |curves| curves.integrators[0].cost.ns *= 1.001,
-            "contradict",
-        ),
-        (
-            |curves| curves.integrators[0].second_ns *= 1.001,
-            "contradict",
-        ),
-        (|curves| curves.integrators[5].refused = None, "contradict"),
-        (
-            |curves| curves.integrators[1].front = true,
-            "marked as best",
-        ),
-        (
-            |curves| curves.families[0].error_n = f64::NAN,
-            "an error in N = NaN",
-        ),
-        (
-            |curves| curves.fit[0].tau_error = f64::INFINITY,
-            "an error of tau = inf",
-        ),
-        (|curves| curves.peak.poke_n = 0.0, "a peak force = 0"),
+    let contradicted: [Change; 4] = [
+        |curves| curves.integrators[0].cost.ns *= 1.001,
+        |curves| curves.integrators[0].second_ns *= 1.001,
+        |curves| curves.integrators[5].refused = None,
+        |curves| curves.integrators[1].front = true,
     ];
-    for (change, words) in changes {
+    let checked = |change: Change| {
         let mut changed = good.clone();
         change(&mut changed);
-        let refusal = changed.checked().unwrap_err().to_string();
-        assert!(refusal.contains(words), "{refusal}");
+        changed.checked().unwrap_err()
+    };
+    for change in contradicted {
+        let refusal = checked(change);
+        assert!(
+            matches!(refusal, CurveError::Contradiction(_)),
+            "{refusal:?}"
+        );
     }
+    let impossible: [(Change, f64); 4] = [
+        (|curves| curves.integrators[0].cost.ns = -1.0, -1.0),
+        (|curves| curves.families[0].error_n = f64::NAN, f64::NAN),
+        (
+            |curves| curves.fit[0].tau_error = f64::INFINITY,
+            f64::INFINITY,
+        ),
+        (|curves| curves.peak.poke_n = 0.0, 0.0),
+    ];
+    for (change, number) in impossible {
+        match checked(change) {
+            CurveError::Number { value, .. } => assert_eq!(value.to_bits(), number.to_bits()),
+            other => panic!("{number}: {other:?}"),
+        }
+    }
+    assert_eq!(checked(|curves| curves.format = 2), CurveError::Format(2));
     let changes: [(Change, &str); 6] = [
         (
             |curves| {
@@ -254,31 +247,27 @@ fn curves_that_were_changed_are_noticed() {
                     .iter_mut()
                     .for_each(|e| e.poke_n *= 1.00001)
             },
-            "trapezoid at 0.001 s in f64",
+            "trapezoid at 0.001 s",
         ),
-        (
-            |curves| curves.families[1].error_n *= 0.999,
-            "series-2 for a body",
-        ),
-        (
-            |curves| curves.fit[1].tau_error *= 1.001,
-            "the fit at 10 Hz",
-        ),
-        (
-            |curves| curves.peak.ramp_hold_n *= 1.00001,
-            "the ramp and hold",
-        ),
-        (|curves| curves.live.clear(), "no row the live fit"),
+        (|curves| curves.families[1].error_n *= 0.999, "series-2"),
+        (|curves| curves.fit[1].tau_error *= 1.001, "10 Hz"),
+        (|curves| curves.peak.ramp_hold_n *= 1.00001, "ramp and hold"),
+        (|curves| curves.live.clear(), "live"),
         (
             |curves| curves.integrators.truncate(3),
-            "no row exact, depth straight",
+            Scheme::Exact.name(),
         ),
     ];
     assert_eq!(good.agrees_with(&good), Ok(()));
-    for (change, words) in changes {
+    for (change, row) in changes {
         let mut changed = good.clone();
         change(&mut changed);
-        let refusal = changed.agrees_with(&good).unwrap_err().to_string();
-        assert!(refusal.contains(words), "{refusal}");
+        let refusal = changed.agrees_with(&good).unwrap_err();
+        let is_it = match &refusal {
+            CurveError::Error { what, .. } => what.contains(row),
+            CurveError::Missing(what) => what.contains(row),
+            _ => false,
+        };
+        assert!(is_it, "{row}: {refusal:?}");
     }
 }

@@ -14,6 +14,7 @@ mod joint;
 mod live_fit;
 mod master_curve;
 mod maxwell;
+mod messages;
 mod random_bodies;
 mod real_recordings;
 mod select_picks;

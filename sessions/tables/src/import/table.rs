@@ -290,12 +290,9 @@ mod tests {
     fn a_time_without_a_unit_is_seconds_and_says_so() {
         let table = parse_table("Time,x_mm,F_N\n0,0,0\n0.5,1,2\n", None).unwrap();
         assert_eq!(table.t, [0.0, 0.5]);
-        assert_eq!(
-            table.notes,
-            ["column 'Time' has no unit; it is taken to be in seconds"]
-        );
+        assert!(table.notes[0].contains("'Time'") && table.notes.len() == 1);
         let reason = parse_table("time_furlong,x_mm,F_N\n0,0,0\n", None).unwrap_err();
-        assert!(reason.contains("no unit that is known"), "{reason}");
+        assert!(reason.contains("'time_furlong'"), "{reason}");
     }
 
     #[test]
@@ -310,10 +307,10 @@ mod tests {
             let reason = parse_table(text, Some(&names)).unwrap_err();
             assert!(reason.contains(expected), "{reason}");
         };
-        check("0,0,0,0\n", "4 columns but 3 are named");
+        check("0,0,0,0\n", "4 columns");
         check("t_s,x_mm,F_N\n0,0,0\n", "already");
         let reason = "t_s,x_mm".parse::<ColumnNames>().unwrap_err();
-        assert!(reason.contains("no column is a force"), "{reason}");
+        assert!(reason.contains("force"), "{reason}");
     }
 
     #[test]
@@ -334,7 +331,7 @@ mod tests {
         let table = parse_table(text, None).unwrap();
         assert_eq!(table.force, [0.0, 2.5]);
         let reason = parse_table("t_s,x_mm,F_N\n0,0,\"0\n", None).unwrap_err();
-        assert!(reason.contains("line 2: a quote is not closed"), "{reason}");
+        assert!(reason.contains("line 2: a quote"), "{reason}");
     }
 
     #[test]
@@ -346,9 +343,12 @@ mod tests {
         check("", "empty");
         check("0,0,0\n1,1,1\n", "no header");
         check("t_s depth_mm force_N\n", "names no columns");
-        check("t_s,depth_mm\n0,0\n", "no column is a force");
-        check("t_s,depth_mm,force\n0,0,0\n", "'force' has no unit");
-        check("t_s,depth_mm,x_mm,force_N\n0,0,0,0\n", "both be the depth");
+        check("t_s,depth_mm\n0,0\n", "is a force");
+        check("t_s,depth_mm,force\n0,0,0\n", "'force'");
+        check(
+            "t_s,depth_mm,x_mm,force_N\n0,0,0,0\n",
+            "'depth_mm' and 'x_mm'",
+        );
         check(
             "t_s,depth_mm,force_N\n0,0,0\n1,one,1\n",
             "line 3: the depth 'one'",

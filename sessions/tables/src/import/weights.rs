@@ -310,40 +310,59 @@ mod tests {
 
     #[test]
     fn mistakes_name_line_and_cell() {
-        for (text, words) in [
-            ("", "no column mass_g"),
-            ("mass_g,force\n1,2", "no column volts"),
-            (
-                "mass_g,volts\n0,1\n100,one",
-                "line 3 has \"one\" for volts, which is not a number",
-            ),
-            ("mass_g,volts\n0", "line 2 has \"\" for volts"),
+        for (text, line_wanted, cell_wanted, column_wanted) in [
+            ("mass_g,volts\n0,1\n100,one", 3, "one", "volts"),
+            ("mass_g,volts\n0", 2, "", "volts"),
             (
                 "mass_g,volts,direction\n0,1,sideways",
-                "\"sideways\" for direction, which is not loading",
+                2,
+                "sideways",
+                "direction",
             ),
-            (
-                "mass_g,volts\n0,1\n100,2\n50,1.5",
-                "line 4 has 50 g after 100 g; add a column direction",
-            ),
-            ("mass_g,volts,repeat\n0,1,-1", "\"-1\" for repeat"),
-            (
-                "mass_g,volts\n0,1.2\n140,1,600",
-                "line 3 has 3 cells where the first line names 2 columns",
-            ),
-            (
-                "mass_g,volts\n0,\"1,280\"\n140,\"1,600\"",
-                "line 2 has \"1,280\", in which the comma may be",
-            ),
-            (
-                "mass_g;volts\n0;1.28\n140;1,6",
-                "line 3 has \"1,6\", in which the comma may be",
-            ),
-            ("mass_g,volts\n0,\"1.2", "line 2: a quote is not closed"),
-            ("mass_g,volts\n0,nan", "\"nan\" for volts"),
+            ("mass_g,volts,repeat\n0,1,-1", 2, "-1", "repeat"),
+            ("mass_g,volts\n0,nan", 2, "nan", "volts"),
         ] {
-            let refusal = parse_weights(text).unwrap_err().to_string();
-            assert!(refusal.contains(words), "{text}: {refusal}");
+            match parse_weights(text) {
+                Err(WeightsError::Cell {
+                    line, column, cell, ..
+                }) => assert_eq!(
+                    (line, cell.as_str(), column),
+                    (line_wanted, cell_wanted, column_wanted)
+                ),
+                other => panic!("{text}: {other:?}"),
+            }
+        }
+        for (text, column) in [("", "mass_g"), ("mass_g,force\n1,2", "volts")] {
+            assert!(matches!(
+                parse_weights(text),
+                Err(WeightsError::NoColumn { wanted }) if wanted == column
+            ));
+        }
+        for (text, line_wanted, cell_wanted) in [
+            ("mass_g,volts\n0,\"1,280\"\n140,\"1,600\"", 2, "1,280"),
+            ("mass_g;volts\n0;1.28\n140;1,6", 3, "1,6"),
+        ] {
+            assert!(matches!(
+                parse_weights(text),
+                Err(WeightsError::Comma { line, cell }) if (line, cell.as_str()) == (line_wanted, cell_wanted)
+            ));
+        }
+        assert!(matches!(
+            parse_weights("mass_g,volts\n0,1\n100,2\n50,1.5"),
+            Err(WeightsError::Falling {
+                line: 4,
+                mass_g: 50.0,
+                before_g: 100.0
+            })
+        ));
+        for (text, fact) in [
+            ("mass_g,volts\n0,1.2\n140,1,600", "line 3 has 3 cells"),
+            ("mass_g,volts\n0,\"1.2", "line 2: a quote"),
+        ] {
+            assert!(matches!(
+                parse_weights(text),
+                Err(WeightsError::Row(told)) if told.starts_with(fact)
+            ));
         }
     }
 }

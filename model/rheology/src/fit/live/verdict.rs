@@ -162,16 +162,13 @@ mod tests {
     #[test]
     fn says_so_in_words() {
         let blind = Blind::of(&[(0.0, 0.0), (40.0, 1.0)], 1.023, &SCALED);
-        assert_eq!(
-            blind.reason(1).unwrap(),
-            "mu1 cannot yet be separated from tau_sig: the depth has moved at one speed only; hold \
-             for about 5 tau"
+        let reason = blind.reason(1).unwrap();
+        assert!(
+            reason.contains("mu1") && reason.contains("tau_sig"),
+            "{reason}"
         );
         assert_eq!(blind.reason(2), None);
         let still = Blind::of(&[(0.0, 0.0), (40.0, 0.0)], 1.023, &SCALED);
-        assert!(
-            still.reason(3).unwrap().contains("move deeper"),
-            "{still:?}"
-        );
+        assert!(still.reason(3).unwrap().contains("deeper"), "{still:?}");
     }
 }
