@@ -32,7 +32,7 @@ use crate::workers::fit::{Refit, Refitter};
 use crate::workers::path_dialog::{Ask, PathDialog};
 use crate::workers::ports::Ports;
 use crate::workers::recovery::Recovery;
-use eframe::egui::{Context, Theme, Ui, ViewportCommand};
+use eframe::egui::{Context, RawInput, Theme, Ui, ViewportCommand};
 use palpate_analysis::haptics_tape::is_tape;
 use palpate_analysis::select::Selected;
 use palpate_haptics::surface::SceneCurves;
@@ -305,10 +305,11 @@ impl WorkbenchApp {
             match command {
                 Command::Start => self.start(),
                 Command::Stop => {
-                    self.palette.close();
+                    // The rig first: what else stops may take its time.
+                    self.operator(Operator::Stop);
                     self.haptics.stop_loop();
                     self.scene.stop();
-                    self.operator(Operator::Stop);
+                    self.palette.close();
                 }
                 Command::Halt => self.operator(Operator::Halt),
                 Command::Wish(wish) => {
@@ -656,26 +657,40 @@ impl WorkbenchApp {
     /// Closing stops first: the window stays until the axis rests.
     fn handle_close(&mut self, ctx: &Context) {
         let is_safe = !is_motion_possible(&self.snapshot) && matches!(self.start, Start::None);
-        if ctx.input(|input| input.viewport().close_requested()) && !is_safe {
-            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
-            self.is_closing = true;
+        let is_asked = ctx.input(|input| input.viewport().close_requested());
+        // Nothing may start in a window that is about to close.
+        self.is_closing |= is_asked;
+        if is_asked && !is_safe {
             self.operator(Operator::Stop);
-        } else if self.is_closing && (is_safe || !self.runner.is_alive()) {
+            ctx.send_viewport_cmd(ViewportCommand::CancelClose);
+        } else if !is_asked && self.is_closing && (is_safe || !self.runner.is_alive()) {
             ctx.send_viewport_cmd(ViewportCommand::Close);
         }
     }
 }
 
 impl eframe::App for WorkbenchApp {
+    fn raw_input_hook(&mut self, ctx: &Context, raw_input: &mut RawInput) {
+        let mut stops = Commands::default();
+        self.keys.read_early(ctx, &raw_input.events, &mut stops);
+        self.act(ctx, &mut stops);
+    }
+
     fn logic(&mut self, ctx: &Context, frame: &mut eframe::Frame) {
-        self.meter.begin(frame.info().cpu_usage);
+        // Stops come before anything else of a frame.
         let mut commands = Commands::default();
-        self.keys.read(ctx, &mut commands);
+        self.keys.read_stops(ctx, &mut commands);
+        self.act(ctx, &mut commands);
+        self.snapshot = self.runner.snapshot();
+        self.handle_close(ctx);
+        self.meter.begin(frame.info().cpu_usage);
+        let is_new = self.keys.read(ctx, &mut commands);
         if !std::mem::replace(&mut self.is_zoom_set, true) {
             ctx.set_zoom_factor(self.settings.now.zoom);
         }
-        self.take_dropped(ctx);
-        self.snapshot = self.runner.snapshot();
+        if is_new {
+            self.take_dropped(ctx);
+        }
         self.poll_start();
         self.ports.poll();
         self.recovery.poll();
@@ -727,7 +742,6 @@ impl eframe::App for WorkbenchApp {
         self.plots.update(self.snapshot.run.as_ref());
         self.refitter.update(ctx, self.snapshot.run.as_ref());
         self.act(ctx, &mut commands);
-        self.handle_close(ctx);
         self.remember(ctx);
         let is_quiet = run_in_progress(&self.snapshot).is_none()
             && self.intent() == Intent::None
@@ -779,3 +793,6 @@ impl eframe::App for WorkbenchApp {
         }
     }
 }
+
+#[cfg(test)]
+mod tests;

@@ -87,6 +87,14 @@ pub enum Command {
     Show(Screen),
 }
 
+impl Command {
+    /// Whether it stops motion: nothing may come before it.
+    #[must_use]
+    pub const fn is_stop(&self) -> bool {
+        matches!(self, Self::Stop | Self::Halt)
+    }
+}
+
 /// A run beside the protocol in the form.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Aside {

@@ -178,7 +178,7 @@ impl WorkbenchApp {
             .frame(frame(ui, false))
             .show(ui, |ui| {
                 let specimen = self.form.specimen();
-                top_bar_ui(ui, &self.snapshot, activity, specimen, commands);
+                top_bar_ui(ui, &self.snapshot, activity, specimen);
             });
         if let Some(run) = run_in_progress(&self.snapshot).filter(|run| is_controllable(run)) {
             Panel::top("run_strip")

@@ -2,8 +2,9 @@
 
 use super::rail::Screen;
 use super::run_strip::Wish;
+use super::top_bar::push_stop_buttons;
 use crate::command::{Command, Commands};
-use eframe::egui::{Context, InputState, Key};
+use eframe::egui::{Context, Event, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
 pub const KEYS: [(Key, Command); 13] = [
@@ -22,44 +23,83 @@ pub const KEYS: [(Key, Command); 13] = [
     (Key::F10, Command::Wish(Wish::Finish)),
 ];
 
-/// Reads the keys once per frame.
+/// Reads the keys once per frame, those that stop before all others.
 #[derive(Debug, Default)]
 pub struct Keys {
     frame_read: Option<u64>,
+    /// The frame whose events were looked at before it began, and how many of them.
+    looked_at: Option<(u64, usize)>,
+    frame_stopped: Option<u64>,
 }
 
 impl Keys {
-    /// Asks for what was pressed since the last frame.
-    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) {
-        // While the window is hidden the input is that of the last frame shown; pressing once
-        // must not act again and again.
+    /// Asks for the stops among the events of a frame that is about to begin: the earliest that they can be seen.
+    pub fn read_early(&mut self, ctx: &Context, events: &[Event], commands: &mut Commands) {
         let frame = ctx.cumulative_frame_nr();
-        if self.frame_read.replace(frame) == Some(frame) {
+        // Events that wait while the window is hidden come again, before those that are new.
+        let known = match self.looked_at {
+            Some((of, count)) if of == frame => count.min(events.len()),
+            _ => 0,
+        };
+        self.looked_at = Some((frame, events.len()));
+        // Repeats are not told apart yet: a key that is held went down before.
+        let is_new = |event: &&Event| match event {
+            Event::Key { key, .. } => !ctx.input(|input| input.key_down(*key)),
+            _ => false,
+        };
+        let new: Vec<Event> = events[known..].iter().filter(is_new).cloned().collect();
+        push_keys(&new, true, commands);
+    }
+
+    /// Asks for the stops of this frame: keys that nobody looked at before it began, and the buttons of the top bar,
+    /// which are asked before anything is drawn.
+    pub fn read_stops(&mut self, ctx: &Context, commands: &mut Commands) {
+        // A frame may have several passes, and while the window is hidden its input is that of the last frame
+        // shown: pressing once must not act again and again.
+        let frame = ctx.cumulative_frame_nr();
+        if self.frame_stopped.replace(frame) == Some(frame) {
             return;
         }
+        if self.looked_at.is_none_or(|(of, _)| of != frame) {
+            ctx.input(|input| push_keys(&input.events, true, commands));
+        }
+        push_stop_buttons(ctx, commands);
+    }
+
+    /// Asks for what else was pressed since the last frame; whether this frame is read for the first time.
+    pub fn read(&mut self, ctx: &Context, commands: &mut Commands) -> bool {
+        let frame = ctx.cumulative_frame_nr();
+        if self.frame_read.replace(frame) == Some(frame) {
+            return false;
+        }
         ctx.input(|input| {
-            for (key, command) in KEYS {
-                if is_pressed(input, key, false) {
-                    commands.push(command);
-                }
-            }
-            if is_pressed(input, Key::K, true) {
+            push_keys(&input.events, false, commands);
+            if is_pressed(&input.events, Key::K, true) {
                 commands.push(Command::Palette);
             }
             for screen in Screen::ALL {
-                if is_pressed(input, screen.key(), true) {
+                if is_pressed(&input.events, screen.key(), true) {
                     commands.push(Command::Show(screen));
                 }
             }
         });
+        true
+    }
+}
+
+/// Asks for the keys of [`KEYS`] among events: for those that stop, or for the others.
+fn push_keys(events: &[Event], are_stops: bool, commands: &mut Commands) {
+    for (key, command) in KEYS {
+        if command.is_stop() == are_stops && is_pressed(events, key, false) {
+            commands.push(command);
+        }
     }
 }
 
 /// Whether a key went down, not counting the repeats of a key held; with Ctrl where that is asked for. The
 /// modifiers are the event's own: those of the frame may have been let go already.
-fn is_pressed(input: &InputState, wanted: Key, with_command: bool) -> bool {
-    use eframe::egui::Event;
-    input.events.iter().any(|event| {
+fn is_pressed(events: &[Event], wanted: Key, with_command: bool) -> bool {
+    events.iter().any(|event| {
         matches!(event, Event::Key { key, pressed: true, repeat: false, modifiers, .. }
             if *key == wanted && (modifiers.command || !with_command))
     })

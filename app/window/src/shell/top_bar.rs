@@ -4,7 +4,9 @@ use super::activity::{Activity, is_motion_possible, run_in_progress};
 use crate::command::{Command, Commands};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::state_badge::badge_ui;
-use eframe::egui::{Align, Button, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2};
+use eframe::egui::{
+    Align, Button, Context, Id, Label, Layout, ProgressBar, RichText, Stroke, Ui, vec2,
+};
 use palpate_figures::uncertain::clock;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_runner::{RunView, Snapshot};
@@ -16,27 +18,46 @@ pub const HEIGHT: f32 = 52.0;
 const RUN_WIDTH: f32 = 226.0;
 
 /// Draws the bar. `specimen` is the one of the run in progress or of the form.
-pub fn top_bar_ui(
-    ui: &mut Ui,
-    snapshot: &Snapshot,
-    activity: &Activity,
-    specimen: &str,
-    commands: &mut Commands,
-) {
+pub fn top_bar_ui(ui: &mut Ui, snapshot: &Snapshot, activity: &Activity, specimen: &str) {
     ui.horizontal(|ui| {
         ui.set_height(HEIGHT);
         badge_ui(ui, activity, vec2(146.0, HEIGHT));
         ui.add_space(6.0);
         run_ui(ui, snapshot.run.as_ref(), specimen);
         ui.with_layout(Layout::right_to_left(Align::Center), |ui| {
-            stop_ui(ui, is_motion_possible(snapshot), commands);
-            halt_ui(ui, commands);
+            let stop = stop_ui(ui, is_motion_possible(snapshot));
+            let buttons = StopButtons {
+                stop,
+                halt: halt_ui(ui),
+            };
+            ui.data_mut(|data| data.insert_temp(Id::unique("stop buttons"), buttons));
             numbers_ui(ui, snapshot);
         });
     });
 }
 
-fn stop_ui(ui: &mut Ui, is_motion_possible: bool, commands: &mut Commands) {
+/// Where the two buttons were drawn last.
+#[derive(Clone, Copy)]
+struct StopButtons {
+    stop: Id,
+    halt: Id,
+}
+
+/// Asks for what the two buttons say, where they were pressed since they were drawn last: before anything of a frame
+/// is drawn, so that no screen can hold up a stop.
+pub fn push_stop_buttons(ctx: &Context, commands: &mut Commands) {
+    let drawn = ctx.data(|data| data.get_temp::<StopButtons>(Id::unique("stop buttons")));
+    let Some(StopButtons { stop, halt }) = drawn else {
+        return;
+    };
+    for (button, command) in [(stop, Command::Stop), (halt, Command::Halt)] {
+        if ctx.read_response(button).is_some_and(|one| one.clicked()) {
+            commands.push(command);
+        }
+    }
+}
+
+fn stop_ui(ui: &mut Ui, is_motion_possible: bool) -> Id {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let text = RichText::new("Stop motion  F12").size(17.0).strong();
     // Grey while nothing can move, and always there: it also stops what we do not know of.
@@ -48,22 +69,18 @@ fn stop_ui(ui: &mut Ui, is_motion_possible: bool, commands: &mut Commands) {
     let button = button
         .stroke(Stroke::new(2.0, tokens.alarm_fill))
         .min_size(vec2(176.0, HEIGHT));
-    if ui.add(button).clicked() {
-        commands.push(Command::Stop);
-    }
+    ui.add(button).id
 }
 
 /// The harder way to stop: no braking, and position zero is lost.
-fn halt_ui(ui: &mut Ui, commands: &mut Commands) {
+fn halt_ui(ui: &mut Ui) -> Id {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let button = Button::new("Halt  F11")
         .fill(tokens.control)
         .stroke(Stroke::new(1.0, tokens.alarm_fill))
         .min_size(vec2(72.0, HEIGHT));
     let hint = "cut the motion without braking; the axis must be homed again";
-    if ui.add(button).on_hover_text(hint).clicked() {
-        commands.push(Command::Halt);
-    }
+    ui.add(button).on_hover_text(hint).id
 }
 
 fn run_ui(ui: &mut Ui, run: Option<&RunView>, specimen: &str) {

@@ -1,0 +1,106 @@
+use super::*;
+use eframe::App;
+use eframe::egui::{Event, Key, Modifiers};
+use palpate_drivers::sim::{SimRig, SimSettings};
+use palpate_drivers::{Rig, RigEvent};
+use palpate_model::Nanos;
+use palpate_model::rig::{RigCommand, RigDescription};
+use palpate_runner::TimeScale;
+use palpate_test_support::wait::until;
+use std::sync::Mutex;
+
+/// What a rig was told to do, in order.
+type Commanded = Arc<Mutex<Vec<RigCommand>>>;
+
+/// A simulated rig that does nothing of what it is told, and writes it down.
+struct Recorder(SimRig, Commanded);
+
+impl Rig for Recorder {
+    fn description(&self) -> &RigDescription {
+        self.0.description()
+    }
+
+    fn send(&mut self, command: RigCommand) {
+        self.1.lock().unwrap().push(command);
+    }
+
+    fn next_event(&mut self, until: Nanos) -> Option<RigEvent> {
+        self.0.next_event(until)
+    }
+
+    fn is_virtual(&self) -> bool {
+        true
+    }
+}
+
+fn open(ctx: &Context) -> (WorkbenchApp, Commanded) {
+    let settings = SimSettings::default();
+    let mut options = WindowOptions::open("sim", &settings, TimeScale::Max).unwrap();
+    let commanded = Commanded::default();
+    options.rig = Box::new(Recorder(SimRig::new(settings), Arc::clone(&commanded)));
+    options.list_ports = || Ok(Vec::new());
+    // A library that is not there: nothing of this computer is read.
+    let folder = tempfile::tempdir().unwrap();
+    options.sessions = Some(folder.path().join("none"));
+    (WorkbenchApp::new(options, ctx).unwrap(), commanded)
+}
+
+fn pressed(key: Key) -> RawInput {
+    RawInput {
+        events: vec![Event::Key {
+            key,
+            physical_key: None,
+            pressed: true,
+            repeat: false,
+            modifiers: Modifiers::NONE,
+        }],
+        ..RawInput::default()
+    }
+}
+
+/// Waits until the rig was told something, and gives all of it.
+fn all_up_to(commanded: &Commanded, last: RigCommand) -> Vec<RigCommand> {
+    until(
+        || {
+            let all = commanded.lock().unwrap().clone();
+            (all.last() == Some(&last)).then_some(all)
+        },
+        || format!("{:?}", commanded.lock().unwrap()),
+    )
+}
+
+#[test]
+fn a_stop_key_is_sent_before_its_frame_begins_and_once() {
+    let ctx = Context::default();
+    let (mut app, commanded) = open(&ctx);
+    let mut input = pressed(Key::F12);
+    app.raw_input_hook(&ctx, &mut input);
+    assert_eq!(all_up_to(&commanded, RigCommand::Stop), [RigCommand::Stop]);
+    // While the window is hidden the events come again, before new ones.
+    input.events.extend(pressed(Key::F11).events);
+    app.raw_input_hook(&ctx, &mut input);
+    all_up_to(&commanded, RigCommand::Halt);
+    let mut frame = eframe::Frame::_new_kittest();
+    let mut drawn = ctx.run_ui(input, |ui| app.logic(ui.ctx(), &mut frame));
+    drawn.textures_delta.clear();
+    // A key that is held comes again and again.
+    app.raw_input_hook(&ctx, &mut pressed(Key::F12));
+    let mut drawn = ctx.run_ui(pressed(Key::F12), |ui| app.logic(ui.ctx(), &mut frame));
+    drawn.textures_delta.clear();
+    // Whoever shows the window may have no such hook: then the frame itself does it, in one of its passes.
+    let mut drawn = ctx.run_ui(pressed(Key::Escape), |ui| {
+        app.logic(ui.ctx(), &mut frame);
+        app.logic(ui.ctx(), &mut frame);
+    });
+    drawn.textures_delta.clear();
+    app.operator(Operator::Halt);
+    let all = until(
+        || {
+            let all = commanded.lock().unwrap().clone();
+            (all.len() >= 4).then_some(all)
+        },
+        || format!("{:?}", commanded.lock().unwrap()),
+    );
+    use RigCommand::{Halt, Stop};
+    assert_eq!(all, [Stop, Halt, Stop, Halt]);
+}
