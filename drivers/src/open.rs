@@ -151,7 +151,7 @@ mod tests {
         assert!(matches!(
             open_wired(&file, &clock),
             Err(RigError::Device {
-                error: rig_file::DeviceError::Wire(_),
+                error: crate::device::OpenError::Wire(_),
                 ..
             })
         ));
