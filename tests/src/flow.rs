@@ -98,6 +98,14 @@ impl Flow {
         }
     }
 
+    /// Draws frames until a label has these words, and some more.
+    pub fn wait_for_words(&mut self, words: &str) {
+        self.wait(words, |window| {
+            window.query_all_by_label_contains(words).next().is_some()
+        });
+        self.window.run_steps(2);
+    }
+
     /// What happened so far, for a failure's message.
     fn story(&self) -> String {
         let lines = self.run().map_or(Vec::new(), |run| {

@@ -1,20 +1,18 @@
 //! What other programs do to files of palpate while it uses them, or after.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_refused, command, json, palpate, short_run, stderr, stdout, succeeded,
+};
 use palpate_tables::lake;
 use palpate_test_support::wait::until;
 use std::fs;
-use std::process::{Command, Stdio};
+use std::process::Stdio;
 
 #[test]
 fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let child = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(["run", "ramp-hold", "--out", "emptied", "--json"])
-        .current_dir(at)
-        .env("PALPATE_HOME", at.join("library"))
-        .stdin(Stdio::null())
+    let child = command(at, &["run", "ramp-hold", "--out", "emptied", "--json"])
         .stdout(Stdio::piped())
         .stderr(Stdio::piped())
         .spawn()
@@ -24,12 +22,7 @@ fn a_log_that_is_emptied_in_mid_run_ends_the_run_and_is_not_valid() {
     until(has_grown, || "a log that grows".into());
     // Whoever wants it in a lake is told to wait.
     let export = palpate(at, &["export", "emptied", "--lake", "lake"]);
-    assert_eq!(export.status.code(), Some(1));
-    assert!(
-        stderr(&export).contains("is being recorded"),
-        "{}",
-        stderr(&export)
-    );
+    assert_refused(&export, 1, "is being recorded");
     assert!(lake::sessions(&at.join("lake")).map_or(true, |found| found.is_empty()));
     fs::write(&log, "").unwrap();
     let done = child.wait_with_output().unwrap();

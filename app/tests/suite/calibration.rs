@@ -1,6 +1,9 @@
 //! `palpate calibration` as a user meets it.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_prints, assert_refused, assert_says, json, palpate, short_run, split_words,
+    stderr, stdout, succeeded, typed,
+};
 use palpate_model::calibration::Calibration;
 use std::fmt::Write;
 use std::fs;
@@ -32,28 +35,12 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(at, "cell.csv", 0.0);
-    let import = [
-        "calibration",
-        "import",
-        "cell.csv",
-        "--name",
-        "bench",
-        "--rig",
-        "sim",
-    ];
-    let more = [
-        "--tolerance",
-        "0.05",
-        "--taken-at",
-        "2020-01-01T00:00:00Z",
-        "--json",
-    ];
-    let made = palpate(
+    let import = split_words("calibration import cell.csv --name bench --rig sim");
+    let more = split_words("--tolerance 0.05 --taken-at 2020-01-01T00:00:00Z --json");
+    let made = answer(&palpate(
         at,
         &[&import[..], &more, &["--picture", "cell.svg"]].concat(),
-    );
-    succeeded(&made);
-    let made = json(&made);
+    ));
     let id = made["id"].as_str().unwrap().to_owned();
     assert!(id.starts_with("20200101-bench-"), "{id}");
     let finding = made["quality"]["findings"][0].as_str().unwrap();
@@ -68,20 +55,13 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     );
 
     let again = palpate(at, &[&import[..], &more].concat());
-    assert_eq!(again.status.code(), Some(2));
-    assert!(stderr(&again).contains("already"), "{}", stderr(&again));
+    assert_refused(&again, 2, "already");
 
     // In date it is not, and every use says so.
     let run = short_run(at, "session", &["--calibration", "bench"]);
     succeeded(&run);
-    assert!(
-        stderr(&run).contains("was valid for 365"),
-        "{}",
-        stderr(&run)
-    );
-    let fit = palpate(at, &["fit", "session", "--json"]);
-    succeeded(&fit);
-    let fit = json(&fit);
+    assert_says(&run, "was valid for 365");
+    let fit = answer(&palpate(at, &["fit", "session", "--json"]));
     assert_eq!(fit["systematic"]["calibrations"][0]["name"], "bench");
     let terms = fit["systematic"]["parameters"][0]["terms"]
         .as_array()
@@ -96,10 +76,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     );
     let tau = &fit["parameters"][0];
     assert!(tau["systematic_error"].as_f64().unwrap() > 0.0, "{tau}");
-    let plain = json(&palpate(
-        at,
-        &["fit", "session", "--json", "--no-systematic"],
-    ));
+    let plain = json(&typed(at, "fit session --json --no-systematic"));
     assert!(
         plain.get("systematic").is_none()
             && plain["parameters"][0].get("systematic_error").is_none()
@@ -132,16 +109,7 @@ fn a_calibration_is_imported_listed_checked_used_and_superseded() {
     );
 
     table(at, "newer.csv", 0.01);
-    let newer = [
-        "calibration",
-        "supersede",
-        "bench",
-        "newer.csv",
-        "--name",
-        "bench",
-        "--rig",
-        "sim",
-    ];
+    let newer = split_words("calibration supersede bench newer.csv --name bench --rig sim");
     succeeded(&palpate(at, &newer));
     let list = json(&palpate(at, &["calibration", "list", "--json"]));
     let list = list["calibrations"].as_array().unwrap();
@@ -257,11 +225,7 @@ fn mistakes_get_one_sentence() {
         );
     }
     let list = palpate(at, &["calibration", "list"]);
-    assert!(
-        stdout(&list).contains("store one with"),
-        "{}",
-        stdout(&list)
-    );
+    assert_prints(&list, "store one with");
 }
 
 #[test]
@@ -270,14 +234,7 @@ fn a_table_is_read_whole_or_refused_and_a_falling_signal_is_none() {
     let at = folder.path();
     let import = |rows: &str| {
         fs::write(at.join("cell.csv"), format!("mass_g,volts\n{rows}")).unwrap();
-        let args = [
-            "calibration",
-            "import",
-            "cell.csv",
-            "--name",
-            "bench",
-            "--json",
-        ];
+        let args = split_words("calibration import cell.csv --name bench --json");
         palpate(at, &args)
     };
     for (rows, words) in [

@@ -1,13 +1,15 @@
 //! The library searched, its sessions analysed, reviewed and told of over time, as a user does it.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_prints, assert_refused, assert_says, background, json, palpate, short_run, stderr,
+    stdout, succeeded,
+};
 use palpate_analysis::source::calibration_of;
 use palpate_model::rig::Phase;
 use palpate_sessions::log::Session;
 use serde_json::Value;
 use std::fs;
 use std::path::Path;
-use std::process::{Command, Stdio};
 
 /// A run into the library of [`palpate`].
 fn run(at: &Path, name: &str, more: &[&str]) -> String {
@@ -70,18 +72,13 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
         assert!(stderr(&none).contains(word), "{}", stderr(&none));
     }
     let order = palpate(at, &["find", "--where", "depth~3"]);
-    assert_eq!(order.status.code(), Some(2));
-    assert!(stderr(&order).contains("depth>=2mm"), "{}", stderr(&order));
+    assert_refused(&order, 2, "depth>=2mm");
 
     succeeded(&palpate(at, &["tag", &one, &two, "+pilot", "-none"]));
     // What is not there is told, and leaves no edit.
     let nothing = palpate(at, &["tag", &two, "-nothere"]);
     succeeded(&nothing);
-    assert!(
-        stderr(&nothing).contains("no tag 'nothere'"),
-        "{}",
-        stderr(&nothing)
-    );
+    assert_says(&nothing, "no tag 'nothere'");
     let edits = fs::read_to_string(at.join(&two).join("edits.jsonl")).unwrap();
     assert!(!edits.contains("nothere"), "{edits}");
     let tagged = palpate(at, &["tag", &two, "-pilot", "+good", "--json"]);
@@ -102,19 +99,14 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
     let info = stdout(&palpate(at, &["info", &two]));
     assert!(info.contains("Ada: note: the gel was warm"), "{info}");
     let empty = palpate(at, &["note", &one, "--text", " ", "--json"]);
-    assert_eq!(empty.status.code(), Some(2));
-    assert!(
-        stderr(&empty).contains("a note its words"),
-        "{}",
-        stderr(&empty)
-    );
+    assert_refused(&empty, 2, "a note its words");
 
     let why = ["--reason", "curve and video agree", "--by", "Mary"];
     let mut review = vec!["review", one.as_str(), "--accept"];
     review.extend(why);
     let review = palpate(at, &review);
     succeeded(&review);
-    assert!(stdout(&review).contains("000.mcap"), "{}", stdout(&review));
+    assert_prints(&review, "000.mcap");
     assert_eq!(found(at, &["--review", "accepted"]), ["sessions/one"]);
     let info = json(&palpate(at, &["info", &one, "--json"]));
     assert_eq!(info["review"]["by"], "Mary");
@@ -142,20 +134,8 @@ fn a_library_is_searched_tagged_reviewed_and_told_over_time() {
 
     // Two at a time, while one makes it anew.
     fs::remove_file(at.join("library/catalog.sqlite")).unwrap();
-    let start = |args: &[&str]| {
-        Command::new(env!("CARGO_BIN_EXE_palpate"))
-            .args(args)
-            .env("PALPATE_HOME", at.join("library"))
-            .stdout(Stdio::null())
-            .spawn()
-            .unwrap()
-    };
-    let several = [
-        start(&["find"]),
-        start(&["catalog", "rebuild"]),
-        start(&["find", "ada"]),
-    ];
-    for mut one in several {
+    let several = ["find", "catalog rebuild", "find ada"];
+    for mut one in several.map(|line| background(at, line)) {
         assert!(one.wait().unwrap().success());
     }
     succeeded(&palpate(at, &["find"]));
@@ -213,12 +193,7 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     ];
     succeeded(&palpate(at, &double));
     let again = palpate(at, &double);
-    assert_eq!(again.status.code(), Some(2));
-    assert!(
-        stderr(&again).contains("never used twice"),
-        "{}",
-        stderr(&again)
-    );
+    assert_refused(&again, 2, "never used twice");
     assert_eq!(fs::read(&log).unwrap(), before);
 
     // The whole model is linear in force: the same times, moduli twice as large.
@@ -269,8 +244,7 @@ fn analyses_stand_beside_a_session_and_are_read_and_withdrawn() {
     let why = ["withdraw", &one, "double", "--reason", "wrong weights"];
     succeeded(&palpate(at, &why));
     let gone = palpate(at, &["fit", &one, "--analysis", "double"]);
-    assert_eq!(gone.status.code(), Some(2));
-    assert!(stderr(&gone).contains("wrong weights"), "{}", stderr(&gone));
+    assert_refused(&gone, 2, "wrong weights");
     let info = json(&palpate(at, &["info", &one, "--json"]));
     let records = info["analyses"].as_array().unwrap();
     assert_eq!(records.len(), 5);

@@ -1,6 +1,9 @@
 //! `palpate compliance` as a user meets it, and what it does to fits and tables.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_refused, assert_says, json, palpate, short_run, split_words, stderr, stdout, succeeded,
+    typed,
+};
 use std::fs;
 use std::path::Path;
 
@@ -8,14 +11,7 @@ use std::path::Path;
 const RIG: [&str; 4] = ["--compliance", "100", "--profile", "ideal"];
 
 fn stiff_surface(at: &Path) {
-    let run = [
-        "run",
-        "stiff-surface",
-        "--operator",
-        "Ada",
-        "--time-scale",
-        "max",
-    ];
+    let run = split_words("run stiff-surface --operator Ada --time-scale max");
     let more = ["--set", "repeats=2", "--out", "stiff"];
     succeeded(&palpate(at, &[&run[..], &more, &RIG].concat()));
 }
@@ -28,8 +24,7 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     succeeded(&short_run(at, "demo", &RIG));
     // Nothing is kept yet.
     let early = palpate(at, &["fit", "demo", "--compliance", "last"]);
-    assert_eq!(early.status.code(), Some(2));
-    assert!(stderr(&early).contains("rig sim"), "{}", stderr(&early));
+    assert_refused(&early, 2, "rig sim");
     assert!(
         json(&palpate(at, &["fit", "demo", "--json"]))
             .get("compliance")
@@ -46,15 +41,11 @@ fn a_compliance_is_found_kept_and_taken_from_depths() {
     let id = kept["id"].as_str().unwrap();
     assert!(id.contains("-sim-"), "{id}");
     let twice = palpate(at, &["compliance", "stiff", "--save"]);
-    assert_eq!(twice.status.code(), Some(2));
-    assert!(stderr(&twice).contains("already"), "{}", stderr(&twice));
+    assert_refused(&twice, 2, "already");
 
     // Raw depths by default, and the report says what the correction would do.
     let raw = json(&palpate(at, &["fit", "demo", "--json"]));
-    let corrected = json(&palpate(
-        at,
-        &["fit", "demo", "--compliance", "last", "--json"],
-    ));
+    let corrected = json(&typed(at, "fit demo --compliance last --json"));
     let file = kept["file"].as_str().unwrap();
     let by_file = json(&palpate(
         at,
@@ -133,8 +124,7 @@ fn what_tells_no_compliance_is_refused() {
     )
     .unwrap();
     let table = palpate(at, &["fit", "table.csv", "--compliance", "last"]);
-    assert_eq!(table.status.code(), Some(2));
-    assert!(stderr(&table).contains("which rig"), "{}", stderr(&table));
+    assert_refused(&table, 2, "which rig");
     // A document of another rig, and one that was changed by hand.
     stiff_surface(at);
     let kept = json(&palpate(at, &["compliance", "stiff", "--save", "--json"]));
@@ -146,19 +136,10 @@ fn what_tells_no_compliance_is_refused() {
     )
     .unwrap();
     let changed = palpate(at, &["fit", "demo", "--compliance", "changed.json"]);
-    assert!(
-        stderr(&changed).contains("was changed after"),
-        "{}",
-        stderr(&changed)
-    );
+    assert_says(&changed, "was changed after");
     let mut document = kept["document"].clone();
     document["rig"] = "bench".into();
     fs::write(at.join("bench.json"), document.to_string()).unwrap();
     let other = palpate(at, &["fit", "demo", "--compliance", "bench.json"]);
-    assert_eq!(other.status.code(), Some(2));
-    assert!(
-        stderr(&other).contains("of rig bench"),
-        "{}",
-        stderr(&other)
-    );
+    assert_refused(&other, 2, "of rig bench");
 }

@@ -1,6 +1,6 @@
 //! Disks without room, before and during a run.
 
-use crate::support::{json, palpate, short_run, stderr, succeeded};
+use crate::support::{assert_says, json, palpate, short_run, stderr, succeeded};
 use palpate_test_support::skip::{Need, skip};
 use serde_json::Value;
 use std::path::Path;
@@ -111,11 +111,7 @@ fn a_disk_without_room_is_refused_before_the_start() {
     let output = in_own_namespace(at, script);
     match output {
         Ok(output) if output.status.code() == Some(2) => {
-            assert!(
-                stderr(&output).contains("free some space"),
-                "{}",
-                stderr(&output)
-            );
+            assert_says(&output, "free some space");
         }
         other if has_no_namespace(&other) => {
             skip(Need::System("mount namespaces"), &format!("{other:?}"));

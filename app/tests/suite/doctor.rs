@@ -1,6 +1,8 @@
 //! `palpate doctor` and `palpate recover`: each kind of file gets the right word, and the original is left alone.
 
-use crate::support::{json, log_file, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_prints, assert_says, json, log_file, palpate, short_run, stderr, stdout, succeeded,
+};
 use palpate_sessions::log::Session;
 use std::fs;
 
@@ -71,11 +73,7 @@ fn every_kind_of_file_gets_the_right_word() {
     assert!(note.contains(&format!("{lost} samples between")), "{note}");
     succeeded(&palpate(at, &["fit", "damaged.recovered"]));
     let again = palpate(at, &["recover", "damaged"]);
-    assert!(
-        stderr(&again).contains("was recovered before"),
-        "{}",
-        stderr(&again)
-    );
+    assert_says(&again, "was recovered before");
     let visit = stdout(&palpate(at, &["doctor", "damaged.recovered"]));
     assert!(visit.contains("healthy"), "{visit}");
 }
@@ -91,7 +89,7 @@ fn the_next_run_recovers_what_a_crash_left_in_the_library() {
     fs::write(left.join("000.mcap"), &bytes[..bytes.len() / 2]).unwrap();
     let next = short_run(at, "next", &[]);
     succeeded(&next);
-    assert!(stderr(&next).contains("missing"), "{}", stderr(&next));
+    assert_says(&next, "missing");
     let recovered = left.with_extension("recovered");
     assert!(Session::open(&recovered).unwrap().end.is_some());
     // Said once.
@@ -122,7 +120,7 @@ fn several_sessions_are_recovered_one_after_the_other() {
     ] {
         assert!(text.contains(part), "{part} in {text}");
     }
-    assert!(stderr(&all).contains("2 of 4"), "{}", stderr(&all));
+    assert_says(&all, "2 of 4");
     // Done before is wrong use, and a session of which nothing is left a failure.
     let again = palpate(at, &["recover", "first", "lost", "--json"]);
     assert_eq!(again.status.code(), Some(1), "{}", stderr(&again));
@@ -152,7 +150,7 @@ fn what_stands_beside_a_healthy_log_is_looked_at_too() {
     fs::write(&journal, text.replace("pilot", "pilow")).unwrap();
     let visit = palpate(at, &["doctor", "whole"]);
     assert_eq!(visit.status.code(), Some(1), "{}", stdout(&visit));
-    assert!(stdout(&visit).contains("edits.jsonl"), "{}", stdout(&visit));
+    assert_prints(&visit, "edits.jsonl");
 
     let line = |i: u32| {
         format!(

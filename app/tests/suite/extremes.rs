@@ -1,6 +1,6 @@
 //! `palpate extremes`, and the page it wrote for the guide.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{answer, assert_refused, palpate, stdout, succeeded, typed};
 use std::path::Path;
 
 #[test]
@@ -9,11 +9,11 @@ fn the_extremes_agree_with_the_page_of_the_guide() {
     let at = folder.path();
     std::fs::write(at.join("notes.md"), "mine").unwrap();
     let refused = palpate(at, &["extremes", "--quick", "--page", "notes.md"]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("exists already"));
-    let run = palpate(at, &["extremes", "--quick", "--json", "--page", "page.md"]);
-    succeeded(&run);
-    let run = json(&run);
+    assert_refused(&refused, 2, "exists already");
+    let run = answer(&palpate(
+        at,
+        &["extremes", "--quick", "--json", "--page", "page.md"],
+    ));
     assert_eq!(run["command"], "extremes");
     assert_eq!(
         (&run["extent"], &run["wrong"]),
@@ -116,20 +116,8 @@ fn one_family_in_words_and_an_unknown_one() {
     );
 
     let run = palpate(at, &["extremes", "--family", "burgers"]);
-    assert_eq!(run.status.code(), Some(2));
-    assert!(stderr(&run).contains("'burgers'"), "{}", stderr(&run));
+    assert_refused(&run, 2, "'burgers'");
 
-    let run = palpate(
-        at,
-        &[
-            "extremes",
-            "--quick",
-            "--family",
-            "voigt",
-            "--page",
-            "no/such/page.md",
-        ],
-    );
-    assert_eq!(run.status.code(), Some(2));
-    assert!(stderr(&run).contains("no/such"), "{}", stderr(&run));
+    let run = typed(at, "extremes --quick --family voigt --page no/such/page.md");
+    assert_refused(&run, 2, "no/such");
 }

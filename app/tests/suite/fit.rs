@@ -1,6 +1,9 @@
 //! `palpate fit`: one source, many, pictures, tables of all kinds.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_refused, command, json, palpate, short_run, split_words, stderr, stdout, succeeded,
+    typed,
+};
 use palpate_analysis::fit::fit_source;
 use palpate_analysis::report::text;
 use palpate_analysis::source::Wanted;
@@ -51,8 +54,7 @@ fn a_batch_prints_the_same_bytes_with_any_number_of_jobs() {
         let outputs = ["1", "2", "9"].map(|jobs| {
             let args = [&["fit", "lib", "--jobs", jobs], kind].concat();
             let output = palpate(at, &args);
-            assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-            assert!(stderr(&output).contains("2 of 9"));
+            assert_refused(&output, 1, "2 of 9");
             stdout(&output)
         });
         assert_eq!(outputs[0], outputs[1]);
@@ -130,12 +132,7 @@ fn pictures_show_the_fit_or_why_there_is_none_and_overwrite_nothing() {
     );
 
     let again = palpate(at, &["fit", "t.csv", "--picture", "t.csv"]);
-    assert_eq!(again.status.code(), Some(2));
-    assert!(
-        stderr(&again).contains("exists already"),
-        "{}",
-        stderr(&again)
-    );
+    assert_refused(&again, 2, "exists already");
 
     let refused = palpate(at, &["fit", "ramp.csv", "--picture", "ramp.svg"]);
     assert_eq!(refused.status.code(), Some(1));
@@ -158,24 +155,15 @@ fn tables_without_header_or_unit_are_read_when_told_how() {
     std::fs::write(at.join("bare.csv"), &rows).unwrap();
     std::fs::write(at.join("time.csv"), format!("Time,x_mm,F_N\n{rows}")).unwrap();
     let unnamed = palpate(at, &["fit", "bare.csv"]);
-    assert_eq!(unnamed.status.code(), Some(2));
-    assert!(
-        stderr(&unnamed).contains("--columns"),
-        "{}",
-        stderr(&unnamed)
-    );
-    let named = palpate(
-        at,
-        &["fit", "bare.csv", "--columns", "t_s,x_mm,F_N", "--json"],
-    );
+    assert_refused(&unnamed, 2, "--columns");
+    let named = typed(at, "fit bare.csv --columns t_s,x_mm,F_N --json");
     succeeded(&named);
     let time = palpate(at, &["fit", "time.csv", "--json"]);
     succeeded(&time);
     assert!(stderr(&time).contains("seconds"));
     assert_eq!(json(&named)["parameters"], json(&time)["parameters"]);
     let wrong = palpate(at, &["fit", "bare.csv", "--columns", "t_s,x_mm"]);
-    assert_eq!(wrong.status.code(), Some(2));
-    assert!(stderr(&wrong).contains("is a force"), "{}", stderr(&wrong));
+    assert_refused(&wrong, 2, "is a force");
 }
 
 #[test]
@@ -187,9 +175,7 @@ fn a_batch_that_is_asked_to_end_keeps_what_it_has() {
     for i in 0..40 {
         table(&at.join(format!("many/t{i:02}.csv")), &rows);
     }
-    let mut batch = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(["fit", "many", "--jobs", "1", "--json"])
-        .current_dir(at)
+    let mut batch = command(at, &["fit", "many", "--jobs", "1", "--json"])
         .stdout(Stdio::piped())
         .stderr(Stdio::null())
         .spawn()
@@ -232,17 +218,7 @@ fn recordings_are_fitted_together_and_say_what_they_share() {
     let at = folder.path();
     table(&at.join("a.csv"), &rows(900, 0.1, 1.0));
     table(&at.join("b.csv"), &rows(600, 0.1, 1.2));
-    let joint = palpate(
-        at,
-        &[
-            "fit",
-            "a.csv",
-            "b.csv",
-            "--share",
-            "tau_eps,tau_sig",
-            "--json",
-        ],
-    );
+    let joint = typed(at, "fit a.csv b.csv --share tau_eps,tau_sig --json");
     succeeded(&joint);
     let object = json(&joint);
     assert_eq!(object["shared"], serde_json::json!(["tau_eps", "tau_sig"]));
@@ -279,16 +255,7 @@ fn more_intervals_come_on_request_and_repeat_with_their_seed() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(&at.join("a.csv"), &rows(900, 0.1, 1.0));
-    let asked = [
-        "fit",
-        "a.csv",
-        "--profile",
-        "--bootstrap",
-        "50",
-        "--seed",
-        "4",
-        "--json",
-    ];
+    let asked = split_words("fit a.csv --profile --bootstrap 50 --seed 4 --json");
     let (first, second) = (json(&palpate(at, &asked)), json(&palpate(at, &asked)));
     assert_eq!(first["bootstrap"], second["bootstrap"]);
     assert_eq!(first["bootstrap_seed"], 4);
@@ -383,10 +350,7 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
     let kept = stdout(&palpate(at, &["info", "loop", "--json"]));
     assert!(kept.contains("straight"), "{kept}");
     succeeded(&palpate(at, &["export", "loop", "--lake", "lake"]));
-    let lake = json(&palpate(
-        at,
-        &["fit", "lake", "--family", "kelvin", "--json"],
-    ));
+    let lake = json(&typed(at, "fit lake --family kelvin --json"));
     assert_eq!(
         (&lake["model"], &lake["made"]),
         (&"kelvin".into(), &1.into())
@@ -414,6 +378,5 @@ fn any_family_is_fitted_and_unloading_where_it_was_recorded() {
         );
     }
     let output = palpate(at, &["run", "ramp-hold", "--softening", "95"]);
-    assert_eq!(output.status.code(), Some(2));
-    assert!(stderr(&output).contains("0 to 90"), "{}", stderr(&output));
+    assert_refused(&output, 2, "0 to 90");
 }

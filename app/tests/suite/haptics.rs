@@ -1,6 +1,8 @@
 //! `palpate haptics`.
 
-use crate::support::{json, palpate, stderr, stdout};
+use crate::support::{
+    assert_prints, assert_refused, assert_says, json, palpate, split_words, stderr, stdout, typed,
+};
 
 #[test]
 fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
@@ -16,19 +18,8 @@ fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
     // The back-EMF of a voltage drive calms what a current drive without friction lets buzz.
     let calm = &with["tried"][0];
     assert_eq!(calm["buzz_share"], 0.0, "{with}");
-    let weak = [
-        "haptics",
-        "check",
-        "thesis",
-        "--drive",
-        "current",
-        "--damping",
-        "0.5",
-        "--friction",
-        "0",
-        "--delay",
-        "2",
-    ];
+    let weak =
+        split_words("haptics check thesis --drive current --damping 0.5 --friction 0 --delay 2");
     let words = palpate(at.path(), &weak);
     let told = stdout(&words);
     assert!(told.contains("damping"), "{told}");
@@ -46,10 +37,7 @@ fn the_thesis_body_is_told_where_it_returns_energy_and_what_a_device_needs() {
 #[test]
 fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
     let at = tempfile::tempdir().unwrap();
-    let run = json(&palpate(
-        at.path(),
-        &["haptics", "run", "thesis", "--seconds", "1", "--json"],
-    ));
+    let run = json(&typed(at.path(), "haptics run thesis --seconds 1 --json"));
     assert!(run["work"]["count"].as_u64().unwrap() > 100, "{run}");
     assert!(run["work"]["p50_s"].as_f64().unwrap() > 0.0, "{run}");
     assert!(!run["priority"].as_str().unwrap().is_empty());
@@ -59,7 +47,7 @@ fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
         "/../tests/sessions/ramp-hold-lab"
     );
     let far = palpate(at.path(), &["haptics", "check", session]);
-    assert!(stderr(&far).contains("extrapolated"), "{}", stderr(&far));
+    assert_says(&far, "extrapolated");
     let near = palpate(at.path(), &["haptics", "check", session, "--depth", "10"]);
     assert!(!stderr(&near).contains("extrapolated"), "{}", stderr(&near));
     for (words, reason) in [
@@ -80,16 +68,7 @@ fn a_loop_tells_how_it_kept_its_time_and_what_is_impossible_is_refused() {
 #[test]
 fn the_check_of_the_source_follows_and_its_table_is_fitted() {
     let at = tempfile::tempdir().unwrap();
-    let words = [
-        "haptics",
-        "follow",
-        "thesis",
-        "--plot",
-        "follow.svg",
-        "--table",
-        "follow.csv",
-        "--json",
-    ];
+    let words = split_words("haptics follow thesis --plot follow.svg --table follow.csv --json");
     let found = json(&palpate(at.path(), &words));
     let number = |name: &str| found[name].as_f64().unwrap();
     // 6.396 N is the source's peak at 30 mm; the slider gives way, and so the master is a tenth of a millimetre less deep.
@@ -113,20 +92,9 @@ fn the_check_of_the_source_follows_and_its_table_is_fitted() {
 #[test]
 fn a_recorded_run_is_computed_again_bit_by_bit() {
     let at = tempfile::tempdir().unwrap();
-    let words = [
-        "haptics",
-        "run",
-        "thesis",
-        "--seconds",
-        "1",
-        "--drive",
-        "current",
-        "--friction",
-        "0.1",
-        "--record",
-        "run",
-        "--json",
-    ];
+    let words = split_words(
+        "haptics run thesis --seconds 1 --drive current --friction 0.1 --record run --json",
+    );
     let told = json(&palpate(at.path(), &words));
     assert_eq!(told["recorded"]["lost"], 0, "{told}");
     assert!(told["recorded"]["ticks"].as_u64().unwrap() > 100, "{told}");
@@ -143,12 +111,7 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
     )
     .unwrap();
     let other = palpate(at.path(), &["haptics", "replay", "run"]);
-    assert_eq!(other.status.code(), Some(1));
-    assert!(
-        stderr(&other).contains("error: tick "),
-        "{}",
-        stderr(&other)
-    );
+    assert_refused(&other, 1, "error: tick ");
     // Without its end nobody knows what came after, however alike the rest is.
     std::fs::write(&settings, text).unwrap();
     let ticks = at.path().join("run/ticks.csv");
@@ -156,8 +119,7 @@ fn a_recorded_run_is_computed_again_bit_by_bit() {
     let end = lines.rfind("end,").unwrap();
     std::fs::write(&ticks, &lines[..end]).unwrap();
     let cut = palpate(at.path(), &["haptics", "replay", "run"]);
-    assert_eq!(cut.status.code(), Some(1));
-    assert!(stderr(&cut).contains("cut off"), "{}", stderr(&cut));
+    assert_refused(&cut, 1, "cut off");
 }
 
 #[test]
@@ -225,12 +187,7 @@ fn the_check_of_the_source_is_a_session_whose_fit_is_the_body_and_its_friction()
         "{again}"
     );
     let taken = follow(&["thesis", "--out", "followed"]);
-    assert_eq!(taken.status.code(), Some(2));
-    assert!(
-        stderr(&taken).contains("followed exists already"),
-        "{}",
-        stderr(&taken)
-    );
+    assert_refused(&taken, 2, "followed exists already");
 }
 
 #[test]
@@ -274,15 +231,8 @@ fn a_slave_on_a_rig_is_led_and_its_session_is_an_ordinary_one() {
     let fitted = json(&palpate(at.path(), &["fit", "one", "--json"]));
     assert!(fitted["r2"].as_f64().is_some_and(|r2| r2 > 0.8), "{fitted}");
     // The preview moves nothing and names the bounds.
-    let preview = palpate(
-        at.path(),
-        &["haptics", "slave", "thesis", "--depth", "6", "--preview"],
-    );
-    assert!(
-        stdout(&preview).contains("no deeper than 6"),
-        "{}",
-        stdout(&preview)
-    );
+    let preview = typed(at.path(), "haptics slave thesis --depth 6 --preview");
+    assert_prints(&preview, "no deeper than 6");
     for bad in [
         ["--depth", "0"],
         ["--depth", "500"],

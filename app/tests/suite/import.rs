@@ -1,6 +1,8 @@
 //! `palpate import`: foreign files become sessions that other commands take.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    assert_prints, assert_refused, assert_says, json, palpate, stderr, stdout, succeeded, typed,
+};
 use std::fs;
 
 /// A ramp and hold of a body that relaxes, 0.1 s a row, in gf and µm with decimal commas.
@@ -29,11 +31,7 @@ fn an_imported_table_is_a_session_for_every_command() {
     let dry = palpate(at, &["import", "zug.csv", "--into", "in", "--dry-run"]);
     succeeded(&dry);
     assert!(!at.join("in").exists());
-    assert!(
-        stdout(&dry).contains("decimal sign  comma, from '"),
-        "{}",
-        stdout(&dry)
-    );
+    assert_prints(&dry, "decimal sign  comma, from '");
     let args = [
         "import",
         "zug.csv",
@@ -55,7 +53,7 @@ fn an_imported_table_is_a_session_for_every_command() {
     assert_eq!(fs::read_to_string(original).unwrap(), table());
 
     let none = palpate(at, &["compliance", "in/zug"]);
-    assert!(stderr(&none).contains("no rig"), "{}", stderr(&none));
+    assert_says(&none, "no rig");
     let info = json(&palpate(at, &["info", "in/zug", "--json"]));
     assert_eq!(
         (&info["imported"]["file"], &info["specimen"]),
@@ -63,10 +61,7 @@ fn an_imported_table_is_a_session_for_every_command() {
     );
     assert!(info["rig"].is_null());
     fs::create_dir(at.join("out")).unwrap();
-    succeeded(&palpate(
-        at,
-        &["export", "in/zug", "--format", "csv", "--to", "out"],
-    ));
+    succeeded(&typed(at, "export in/zug --format csv --to out"));
     let exported = fs::read_to_string(at.join("out/zug.csv")).unwrap();
     // Time, depth and 4 gf as force, and nothing in the columns of a rig.
     assert_eq!(
@@ -162,10 +157,5 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     check(&["import", "."], "not a file");
     succeeded(&palpate(at, &["import", "good.csv", "--into", "in"]));
     let again = palpate(at, &["import", "good.csv", "--into", "in"]);
-    assert_eq!(again.status.code(), Some(2));
-    assert!(
-        stderr(&again).contains("is there already"),
-        "{}",
-        stderr(&again)
-    );
+    assert_refused(&again, 2, "is there already");
 }

@@ -1,6 +1,9 @@
 //! Parts of sessions as tables, and many sessions as a lake that is fitted part by part.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_prints, assert_refused, json, palpate, short_run, split_words, stderr, stdout,
+    succeeded,
+};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
@@ -18,26 +21,10 @@ fn a_part_of_a_session_is_what_the_whole_table_has_there() {
     let header: Vec<&str> = whole.lines().next().unwrap().split(',').collect();
     let place = |name: &str| header.iter().position(|one| *one == name).unwrap();
     let (t, force, phase) = (place("t_s"), place("force_N"), place("phase"));
-    let part = [
-        "export",
-        "demo",
-        "--format",
-        "csv",
-        "--phase",
-        "ramp,hold",
-        "--from",
-        "60",
-        "--columns",
-        "t_s,force_N",
-        "--decimate",
-        "10",
-        "--delimiter",
-        ";",
-        "--json",
-    ];
-    let told = palpate(at, &part);
-    succeeded(&told);
-    let told = json(&told);
+    let part = split_words(
+        "export demo --format csv --phase ramp,hold --from 60 --columns t_s,force_N --decimate 10 --delimiter ; --json",
+    );
+    let told = answer(&palpate(at, &part));
     assert_eq!(
         (&told["every"], &told["is_part"]),
         (&10.into(), &true.into())
@@ -199,12 +186,7 @@ fn a_lake_is_fitted_in_parts_as_its_sessions_are_one_by_one() {
     assert!(contents(&at.join("killed")) == expected, "the kill shows");
 
     let other = palpate(at, &["fit", "killed", "--fixed", "f_offset=0"]);
-    assert_eq!(other.status.code(), Some(1));
-    assert!(
-        stderr(&other).contains("holds something else"),
-        "{}",
-        stderr(&other)
-    );
+    assert_refused(&other, 1, "holds something else");
     for (args, says) in [
         (["fit", "lake", "--shard", "4/3"], "i/n"),
         (["fit", "runs", "--shard", "1/3"], "not a lake"),
@@ -262,7 +244,7 @@ fn shells_and_man_know_every_command() {
     }
     let page = palpate(at, &["man"]);
     succeeded(&page);
-    assert!(stdout(&page).contains(".TH palpate 1"), "{}", stdout(&page));
+    assert_prints(&page, ".TH palpate 1");
     fs::create_dir(at.join("man1")).unwrap();
     succeeded(&palpate(at, &["man", "--to", "man1"]));
     let export = fs::read_to_string(at.join("man1/palpate-export.1")).unwrap();

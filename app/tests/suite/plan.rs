@@ -1,6 +1,8 @@
 //! `palpate plan` as a user meets it.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_refused, json, palpate, split_words, stderr, stdout, succeeded,
+};
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
 use palpate_model::{Depth, Seconds};
 use serde_json::Value;
@@ -38,9 +40,7 @@ fn table(at: &Path, body: &ModifiedKelvin) {
 fn a_proposed_run_reaches_what_was_promised() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let plan = palpate(at, &["plan", "--within", "tau=1%", "--json"]);
-    succeeded(&plan);
-    let plan = json(&plan);
+    let plan = answer(&palpate(at, &["plan", "--within", "tau=1%", "--json"]));
     assert!(plan["body_source"].as_str().unwrap().contains("thesis"));
     let proposals = plan["proposals"].as_array().unwrap();
     assert_eq!(proposals[0]["family"], "ramp-hold");
@@ -84,9 +84,7 @@ fn the_last_fit_is_assumed_and_any_other_can_be() {
         (&["plan", "--json", "--like", "fit.json"], "fit.json"),
     ];
     for (args, source) in checks {
-        let plan = palpate(at, args);
-        succeeded(&plan);
-        let plan = json(&plan);
+        let plan = answer(&palpate(at, args));
         let tau = plan["body"]["tau_eps"].as_f64().unwrap();
         assert!((tau - 2.5).abs() < 1e-2, "{tau}");
         let found = plan["body_source"].as_str().unwrap();
@@ -114,12 +112,7 @@ fn a_remembered_fit_that_was_changed_is_refused_and_one_of_before_is_read() {
     assert_eq!(text.matches(&tau).count(), 1, "{tau} in {text}");
     std::fs::write(&file, text.replacen(&tau, "\"value\":9.5", 1)).unwrap();
     let refused = palpate(at, &["plan"]);
-    assert_eq!(refused.status.code(), Some(1));
-    assert!(
-        stderr(&refused).contains("last-fit.json"),
-        "{}",
-        stderr(&refused)
-    );
+    assert_refused(&refused, 1, "last-fit.json");
     // Version 1 was the fit alone.
     std::fs::write(&file, kept["fit"].to_string()).unwrap();
     let plan = palpate(at, &["plan", "--json"]);
@@ -149,17 +142,8 @@ fn a_fit_that_cannot_be_remembered_is_a_fit() {
 #[test]
 fn text_says_what_was_assumed_and_what_to_type() {
     let folder = tempfile::tempdir().unwrap();
-    let args = [
-        "plan",
-        "--within",
-        "tau=5%",
-        "--within",
-        "mu3=5",
-        "--memory",
-        "10,0.5",
-        "--picture",
-        "plan.svg",
-    ];
+    let args =
+        split_words("plan --within tau=5% --within mu3=5 --memory 10,0.5 --picture plan.svg");
     let plan = palpate(folder.path(), &args);
     succeeded(&plan);
     let text = stdout(&plan);

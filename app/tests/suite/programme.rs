@@ -1,7 +1,9 @@
 //! Programmes and the calibration they measure, as a user meets them.
 
 use crate::protocol::with_mine;
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    assert_prints, assert_refused, json, palpate, split_words, stderr, stdout, succeeded, typed,
+};
 use std::fs;
 
 const TWO: &str = r#"
@@ -25,10 +27,7 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     fs::write(at.join("deep.toml"), TWO.replace("DEPTH", "200 mm")).unwrap();
-    let refused = palpate(
-        at,
-        &["run", "deep.toml", "--out", "day", "--time-scale", "max"],
-    );
+    let refused = typed(at, "run deep.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
     assert!(
@@ -41,15 +40,7 @@ fn a_programme_leaves_sessions_and_a_page_and_is_previewed_whole() {
     let ahead = palpate(at, &["run", "two.toml", "--preview", "--json"]);
     succeeded(&ahead);
     assert_eq!(json(&ahead)["sessions"], 2);
-    let run = [
-        "run",
-        "two.toml",
-        "--out",
-        "day",
-        "--time-scale",
-        "max",
-        "--json",
-    ];
+    let run = split_words("run two.toml --out day --time-scale max --json");
     let done = palpate(at, &run);
     succeeded(&done);
     let report = json(&done);
@@ -116,7 +107,7 @@ fn weights_read_on_the_rig_become_a_document() {
     succeeded(&palpate(at, &import));
     let shown = palpate(at, &["calibration", "show", "bench"]);
     succeeded(&shown);
-    assert!(stdout(&shown).contains("840.0"), "{}", stdout(&shown));
+    assert_prints(&shown, "840.0");
 }
 
 const ASKING: &str = r#"palpate-programme = 1
@@ -165,11 +156,7 @@ fn what_its_protocols_ask_for_is_told_before_anything_moves_and_stands_in_every_
     }
     let check = palpate(at, &["protocol", "check", "asking.toml"]);
     succeeded(&check);
-    assert!(
-        stdout(&check).contains("asking.toml, line 5: warning: "),
-        "{}",
-        stdout(&check)
-    );
+    assert_prints(&check, "asking.toml, line 5: warning: ");
 
     let about = "[about]\noperator = \"Ada\"\nspecimen.storage = \"saline\"\nspecimen.temperature_c = 21\n\n[[task]]";
     write(
@@ -221,18 +208,9 @@ fn check_looks_at_a_programme_whole() {
     let told = ASKING.replacen("[[task]]", about, 1);
     let sound = check(told.replace("DEPTH", "5 mm"));
     succeeded(&sound);
-    assert!(
-        stdout(&sound).contains("asking.toml: sound, about"),
-        "{}",
-        stdout(&sound)
-    );
+    assert_prints(&sound, "asking.toml: sound, about");
     let shown = palpate(at, &["protocol", "preview", "asking.toml"]);
-    assert_eq!(shown.status.code(), Some(2));
-    assert!(
-        stderr(&shown).contains("'palpate run asking.toml --preview'"),
-        "{}",
-        stderr(&shown)
-    );
+    assert_refused(&shown, 2, "'palpate run asking.toml --preview'");
     // What a run would refuse, line by line.
     for (text, words) in [
         (told.replace("DEPTH", "12 mm"), "line 17: parameter 'depth'"),
@@ -280,23 +258,12 @@ fn check_looks_at_a_programme_whole() {
 fn a_rig_that_failed_its_check_refuses_a_programme_before_its_first_task() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let failed = [
-        "daily-check",
-        "--time-scale",
-        "max",
-        "--operator",
-        "Ada",
-        "--profile",
-        "ideal",
-        "--calibration",
-        "thesis",
-    ];
+    let failed = split_words(
+        "daily-check --time-scale max --operator Ada --profile ideal --calibration thesis",
+    );
     assert_eq!(palpate(at, &failed).status.code(), Some(1));
     fs::write(at.join("two.toml"), TWO.replace("DEPTH", "10 mm")).unwrap();
-    let refused = palpate(
-        at,
-        &["run", "two.toml", "--out", "day", "--time-scale", "max"],
-    );
+    let refused = typed(at, "run two.toml --out day --time-scale max");
     assert_eq!(refused.status.code(), Some(2));
     let told = stderr(&refused);
     assert!(

@@ -1,6 +1,8 @@
 //! Protocol files on the command line.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_prints, json, palpate, split_words, stderr, stdout, succeeded, typed,
+};
 use palpate_test_support::skip;
 use serde_json::Value;
 use std::path::Path;
@@ -56,14 +58,7 @@ fn run_mine(at: &Path, more: &[&str]) -> std::process::Output {
 fn a_file_runs_and_its_session_says_which_it_was() {
     let folder = with_mine();
     let at = folder.path();
-    let told = [
-        "--set",
-        "depth=6mm",
-        "--operator",
-        "Ada",
-        "--about",
-        "specimen.storage=saline",
-    ];
+    let told = split_words("--set depth=6mm --operator Ada --about specimen.storage=saline");
     let run = run_mine(at, &told);
     succeeded(&run);
     let run = json(&run);
@@ -122,16 +117,9 @@ fn check_tells_every_mistake_with_its_line() {
 
     let sound = palpate(at, &["protocol", "check", "mine.toml", "creep"]);
     succeeded(&sound);
-    assert!(
-        stdout(&sound).contains("mine.toml: sound"),
-        "{}",
-        stdout(&sound)
-    );
+    assert_prints(&sound, "mine.toml: sound");
 
-    let check = palpate(
-        at,
-        &["protocol", "check", "mine.toml", "spoilt.toml", "deep.toml"],
-    );
+    let check = typed(at, "protocol check mine.toml spoilt.toml deep.toml");
     assert_eq!(check.status.code(), Some(2));
     let text = stdout(&check);
     for words in [
@@ -153,21 +141,10 @@ fn a_built_in_protocol_is_shown_copied_and_previewed() {
     let at = folder.path();
     let show = palpate(at, &["protocol", "show", "preconditioning"]);
     std::fs::write(at.join("copy.toml"), stdout(&show)).unwrap();
-    let preview = palpate(
+    let preview = answer(&typed(
         at,
-        &[
-            "protocol",
-            "preview",
-            "copy.toml",
-            "--set",
-            "cycles=3",
-            "--plot",
-            "plan.svg",
-            "--json",
-        ],
-    );
-    succeeded(&preview);
-    let preview = json(&preview);
+        "protocol preview copy.toml --set cycles=3 --plot plan.svg --json",
+    ));
     assert_eq!(preview["checkpoints"][2]["name"], "after cycle 3");
     let steps = preview["steps"].as_array().unwrap();
     let rests = steps.iter().filter(|step| step["phase"] == "rest");
@@ -183,21 +160,14 @@ fn a_built_in_protocol_is_shown_copied_and_previewed() {
         2,
         "depth and force"
     );
-    let again = palpate(
-        at,
-        &["protocol", "preview", "copy.toml", "--plot", "plan.svg"],
-    );
+    let again = typed(at, "protocol preview copy.toml --plot plan.svg");
     assert_eq!(again.status.code(), Some(2), "never over another file");
 
     let list = json(&palpate(at, &["protocol", "list", "--json"]));
     let names = list["protocols"].as_array().unwrap();
     assert!(names.iter().any(|one| one["name"] == "relaxation-series"));
     let steps = palpate(at, &["protocol", "show", "sine", "--steps"]);
-    assert!(
-        stdout(&steps).contains("find-contact"),
-        "{}",
-        stdout(&steps)
-    );
+    assert_prints(&steps, "find-contact");
 }
 
 #[test]

@@ -1,6 +1,6 @@
 //! A rig of 20 000 samples a second, as a user meets it.
 
-use crate::support::{json, palpate, short_run, stderr, succeeded};
+use crate::support::{answer, assert_refused, json, palpate, short_run, succeeded};
 use std::fs;
 
 #[test]
@@ -43,9 +43,7 @@ fn lateness_is_told_of_a_run_that_keeps_pace() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let args = "run ramp-hold --speed 3 --depth 6 --hold 1 --time-scale 100 --out paced --json";
-    let run = palpate(at, &args.split(' ').collect::<Vec<_>>());
-    succeeded(&run);
-    let run = json(&run);
+    let run = answer(&palpate(at, &args.split(' ').collect::<Vec<_>>()));
     for name in ["late_worst_s", "late_given_up_s"] {
         assert!(run[name].as_f64().is_some_and(|late| late >= 0.0), "{run}");
     }
@@ -56,12 +54,7 @@ fn a_rate_that_no_clock_divides_into_is_refused_everywhere() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let refused = palpate(at, &["run", "ramp-hold", "--rate", "3000", "--preview"]);
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(
-        stderr(&refused).contains("give 1000, 2000"),
-        "{}",
-        stderr(&refused)
-    );
+    assert_refused(&refused, 2, "give 1000, 2000");
     let programme = |rate: &str| {
         let text = format!(
             "palpate-programme = 1\nname = \"one\"\ntitle = \"One task\"\n[simulated]\nrate = {rate}\n\
@@ -72,6 +65,5 @@ fn a_rate_that_no_clock_divides_into_is_refused_everywhere() {
     };
     succeeded(&programme("5000"));
     let refused = programme("7000");
-    assert_eq!(refused.status.code(), Some(2));
-    assert!(stderr(&refused).contains("'7000'"));
+    assert_refused(&refused, 2, "'7000'");
 }

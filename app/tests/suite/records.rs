@@ -1,6 +1,9 @@
 //! What is told of a session, what is said of it afterwards, and what happened in it.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_prints, assert_refused, assert_says, json, palpate, short_run, stderr, stdout,
+    succeeded, typed,
+};
 use palpate_sessions::log::Session;
 use std::fs;
 
@@ -29,16 +32,10 @@ fn what_is_told_stands_in_the_session_and_the_table() {
     assert!(text.contains("filter none"), "{text}");
     // Who looks for the key finds it in the refusal.
     let unknown = short_run(at, "never", &["--about", "specimen.colour=red"]);
-    assert_eq!(unknown.status.code(), Some(2));
-    assert!(
-        stderr(&unknown).contains("specimen.hydration"),
-        "{}",
-        stderr(&unknown)
-    );
+    assert_refused(&unknown, 2, "specimen.hydration");
     let beyond = ["--about", "series.repeat=4", "--about", "series.repeats=3"];
     let beyond = short_run(at, "never", &beyond);
-    assert_eq!(beyond.status.code(), Some(2));
-    assert!(stderr(&beyond).contains("repeat 4 of 3"));
+    assert_refused(&beyond, 2, "repeat 4 of 3");
     assert!(!at.join("never").exists());
 }
 
@@ -167,8 +164,7 @@ fn a_corrected_contact_moves_every_depth_by_the_difference_and_nothing_else() {
         assert!(stderr(&refused).contains(told), "{}", stderr(&refused));
     }
     let mute = correct("41", " ");
-    assert_eq!(mute.status.code(), Some(2));
-    assert!(stderr(&mute).contains("needs a reason"));
+    assert_refused(&mute, 2, "needs a reason");
 }
 
 #[test]
@@ -178,7 +174,7 @@ fn a_rejected_session_is_left_out_and_counted() {
     for (name, seed) in [("all/a", "1"), ("all/b", "2"), ("all/c", "3")] {
         succeeded(&short_run(at, name, &["--seed", seed]));
     }
-    let reject = palpate(
+    let reject = answer(&palpate(
         at,
         &[
             "verdict",
@@ -190,20 +186,13 @@ fn a_rejected_session_is_left_out_and_counted() {
             "Ada",
             "--json",
         ],
-    );
-    succeeded(&reject);
-    let reject = json(&reject);
+    ));
     assert_eq!(
         (&reject["was"], &reject["verdict"]),
         (&"valid".into(), &"rejected".into())
     );
     let alone = palpate(at, &["fit", "all/b"]);
-    assert_eq!(alone.status.code(), Some(2));
-    assert!(
-        stderr(&alone).contains("rejected (hair under the probe)"),
-        "{}",
-        stderr(&alone)
-    );
+    assert_refused(&alone, 2, "rejected (hair under the probe)");
     succeeded(&palpate(at, &["fit", "all/b", "--include-rejected"]));
     let batch = palpate(at, &["fit", "all", "--json"]);
     succeeded(&batch);
@@ -215,18 +204,10 @@ fn a_rejected_session_is_left_out_and_counted() {
     assert_eq!(lines.len(), 3);
     assert_eq!(lines[1]["rejected"], "hair under the probe");
     assert!(lines[0]["samples"].is_u64() && lines[2]["samples"].is_u64());
-    assert!(
-        stderr(&batch).contains("3 sources, 1"),
-        "{}",
-        stderr(&batch)
-    );
+    assert_says(&batch, "3 sources, 1");
     let together = palpate(at, &["fit", "all", "--share", "body"]);
     succeeded(&together);
-    assert!(
-        stdout(&together).contains("2 records together"),
-        "{}",
-        stdout(&together)
-    );
+    assert_prints(&together, "2 records together");
     assert!(stderr(&together).contains("3 sources, 1"));
     // A second thought is one more line; the first stays.
     let again = [
@@ -258,11 +239,7 @@ fn a_rejected_session_is_left_out_and_counted() {
     ] {
         let refused = palpate(at, args);
         assert_eq!(refused.status.code(), Some(1), "{args:?}");
-        assert!(
-            stderr(&refused).contains("line 2 of"),
-            "{}",
-            stderr(&refused)
-        );
+        assert_says(&refused, "line 2 of");
     }
 }
 
@@ -272,7 +249,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     let at = folder.path();
     let first = short_run(at, "first", &[]);
     succeeded(&first);
-    assert!(stderr(&first).contains("daily check"), "{}", stderr(&first));
+    assert_says(&first, "daily check");
     let check = |more: &[&str]| {
         let mut args = vec![
             "daily-check",
@@ -301,12 +278,7 @@ fn a_rig_that_failed_its_check_today_runs_only_if_somebody_says_so() {
     assert!(!stderr(&open).contains("daily check"), "{}", stderr(&open));
     // The curve of another cell: neither its zero nor its weight is right.
     let failed = check(&["--profile", "ideal", "--calibration", "thesis"]);
-    assert_eq!(failed.status.code(), Some(1));
-    assert!(
-        stderr(&failed).contains("840 g reads"),
-        "{}",
-        stderr(&failed)
-    );
+    assert_refused(&failed, 1, "840 g reads");
     let refused = short_run(at, "refused", &[]);
     assert_eq!(refused.status.code(), Some(2));
     let why = stderr(&refused);
@@ -370,11 +342,7 @@ fn a_daily_check_asks_for_its_operator_and_a_weight_that_tells_something() {
     ];
     let run = palpate(at, &run);
     succeeded(&run);
-    assert!(
-        stderr(&run).contains("'palpate daily-check'"),
-        "{}",
-        stderr(&run)
-    );
+    assert_says(&run, "'palpate daily-check'");
     assert!(!at.join("library/checks").exists());
 }
 
@@ -393,9 +361,7 @@ fn a_thickness_is_told_by_the_run_and_by_its_session() {
         "20",
     ];
     let how = ["--time-scale", "max", "--out", "thick", "--json"];
-    let run = palpate(at, &[&run[..], &how].concat());
-    succeeded(&run);
-    let run = json(&run);
+    let run = answer(&palpate(at, &[&run[..], &how].concat()));
     let number = |name: &str| run[name].as_f64().unwrap();
     let (thickness, error) = (number("thickness_mm"), number("thickness_std_error_mm"));
     // Four standard errors, and a pulse for the rig that gives way at the contact.
@@ -425,10 +391,7 @@ fn samples_are_exported_as_messages() {
     let at = folder.path();
     succeeded(&short_run(at, "run", &[]));
     let session = palpate_sessions::Session::open(&at.join("run")).unwrap();
-    let all = json(&palpate(
-        at,
-        &["export", "run", "--mcap-full", "all.mcap", "--json"],
-    ));
+    let all = json(&typed(at, "export run --mcap-full all.mcap --json"));
     assert_eq!(all["rows"].as_u64(), Some(session.rows.len() as u64));
     assert_eq!(
         (&all["format"], &all["dictionary"]),
@@ -491,7 +454,7 @@ fn words_of_a_session_give_the_terminal_no_orders() {
             "{text}"
         );
     }
-    assert!(stdout(&info).contains("gel [2J 3"), "{}", stdout(&info));
+    assert_prints(&info, "gel [2J 3");
     // Machines get what was said.
     let object = json(&palpate(at, &["info", "one", "--json"]));
     assert_eq!(object["verdict_reason"], reason);
@@ -502,9 +465,6 @@ fn an_exported_table_has_the_whole_name_of_the_folder() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     succeeded(&short_run(at, "depth-2.5", &[]));
-    succeeded(&palpate(
-        at,
-        &["export", "depth-2.5", "--format", "csv", "--to", "."],
-    ));
+    succeeded(&typed(at, "export depth-2.5 --format csv --to ."));
     assert!(at.join("depth-2.5.csv").exists());
 }

@@ -1,6 +1,8 @@
 //! Pages and figures: what they hold, that nothing in them is markup that people wrote, and that hashes tell a change.
 
-use crate::support::{json, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    assert_prints, assert_refused, json, palpate, short_run, stderr, stdout, succeeded,
+};
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::Path;
@@ -198,12 +200,7 @@ fn a_page_holds_everything_and_nothing_in_it_is_markup() {
     // Five figures at most a few thousand points each: a page that can be mailed.
     assert!(page.len() < 1_000_000, "{}", page.len());
     let again = palpate(at, &["report", session, "--html", "page.html"]);
-    assert_eq!(again.status.code(), Some(2));
-    assert!(
-        stderr(&again).contains("exists already"),
-        "{}",
-        stderr(&again)
-    );
+    assert_refused(&again, 2, "exists already");
 }
 
 #[test]
@@ -250,11 +247,7 @@ fn a_page_proves_what_it_describes() {
     let check = |more: &[&str]| palpate(at, &[&["report", "--check"], more].concat());
     let whole = check(&["page.html"]);
     succeeded(&whole);
-    assert!(
-        stdout(&whole).contains("as described"),
-        "{}",
-        stdout(&whole)
-    );
+    assert_prints(&whole, "as described");
     succeeded(&check(&["page.html", "press"]));
     // Elsewhere it has to be told where the session is.
     fs::create_dir(at.join("mail")).unwrap();
@@ -266,12 +259,7 @@ fn a_page_proves_what_it_describes() {
     let page = fs::read_to_string(at.join("page.html")).unwrap();
     fs::write(at.join("changed.html"), page.replacen("Force", "Farce", 1)).unwrap();
     let changed = check(&["changed.html"]);
-    assert_eq!(changed.status.code(), Some(1));
-    assert!(
-        stderr(&changed).contains("was changed"),
-        "{}",
-        stderr(&changed)
-    );
+    assert_refused(&changed, 1, "was changed");
     // Something said since.
     let why = ["--reason", "hair under the probe", "--by", "Ada"];
     succeeded(&palpate(

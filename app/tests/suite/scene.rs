@@ -1,6 +1,6 @@
 //! `palpate scene`.
 
-use crate::support::{json, palpate, stderr, stdout};
+use crate::support::{assert_refused, json, palpate, stderr, stdout, typed};
 
 #[test]
 fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
@@ -35,8 +35,7 @@ fn a_recorded_poke_is_computed_again_and_a_changed_bit_is_found() {
     let lines = std::fs::read_to_string(&ticks).unwrap();
     std::fs::write(&ticks, lines.replacen("-0.5,", "-0.4,", 1)).unwrap();
     let damaged = palpate(at.path(), &["scene", "replay", "poke"]);
-    assert_eq!(damaged.status.code(), Some(2));
-    assert!(stderr(&damaged).contains("damaged"), "{}", stderr(&damaged));
+    assert_refused(&damaged, 2, "damaged");
     std::fs::write(&ticks, &lines[..lines.len() / 2]).unwrap();
     let cut = palpate(at.path(), &["scene", "replay", "poke"]);
     assert_eq!(cut.status.code(), Some(1), "{}", stderr(&cut));
@@ -95,10 +94,7 @@ fn a_mesh_is_planned_from_what_is_measured() {
     let coarse =
         "[mesh]\nauto = true\n[tolerances]\nshape_mm = 5\nforce_percent = 100\ntick_us = 100000\n";
     std::fs::write(at.path().join("coarse.toml"), coarse).unwrap();
-    let run = json(&palpate(
-        at.path(),
-        &["scene", "run", "coarse.toml", "--json"],
-    ));
+    let run = json(&typed(at.path(), "scene run coarse.toml --json"));
     assert_eq!(run["nodes"], 51, "{run}");
     assert_eq!(run["plan"]["mesh"]["nodes"], 51, "{run}");
     assert_eq!(run["plan"]["inert"][0][0], "MinDist", "{run}");
@@ -109,16 +105,8 @@ fn a_mesh_is_planned_from_what_is_measured() {
     )
     .unwrap();
     let none = palpate(at.path(), &["scene", "run", "exact.toml"]);
-    assert_eq!(none.status.code(), Some(1));
-    assert!(
-        stderr(&none).contains("nothing measured holds"),
-        "{}",
-        stderr(&none)
-    );
-    let bench = json(&palpate(
-        at.path(),
-        &["scene", "bench", "coarse.toml", "--json"],
-    ));
+    assert_refused(&none, 1, "nothing measured holds");
+    let bench = json(&typed(at.path(), "scene bench coarse.toml --json"));
     assert_eq!(bench["command"], "scene-bench");
     assert_eq!(bench["curves"]["meshes"][0]["nodes"], 51);
     assert_eq!(bench["plan"]["mesh"]["nodes"], 51, "{bench}");

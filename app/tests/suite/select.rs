@@ -1,6 +1,8 @@
 //! `palpate select` as a user meets it.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_refused, json, palpate, split_words, stderr, stdout, succeeded,
+};
 use palpate_model::{Depth, Seconds};
 use palpate_rheology::families::{Model, by_key};
 use serde_json::Value;
@@ -95,12 +97,10 @@ fn the_body_that_was_pressed_is_recommended() {
     assert!(plot.starts_with("<svg") && plot.contains("tolerance") && plot.contains("kelvin"));
 
     // A tolerance below the noise has no winner.
-    let fine = palpate(
+    let fine = answer(&palpate(
         at,
         &[&args[..], &["--tolerance", "0.1%", "--json"]].concat(),
-    );
-    succeeded(&fine);
-    let fine = json(&fine);
+    ));
     assert_eq!(fine["verdict"]["outcome"], "none-within");
     assert_eq!(fine["verdict"]["family"], Value::Null);
 }
@@ -110,16 +110,8 @@ fn one_record_is_split_in_time() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     table(at, "slow.csv", &kelvin(), [1.0, 10.0]);
-    let args = [
-        "select",
-        "slow.csv",
-        "--families",
-        "maxwell,kelvin,series-2",
-        "--json",
-    ];
-    let found = palpate(at, &args);
-    succeeded(&found);
-    let found = json(&found);
+    let args = split_words("select slow.csv --families maxwell,kelvin,series-2 --json");
+    let found = answer(&palpate(at, &args));
     let names: Vec<&Value> = found["candidates"]
         .as_array()
         .unwrap()
@@ -147,20 +139,11 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
         table(at, &format!("{name}-slow.csv"), body, [1.0, 10.0]);
         table(at, &format!("{name}-fast.csv"), body, [5.0, 10.0]);
     }
-    let args = [
-        "select",
-        "soft-slow.csv",
-        "soft-fast.csv",
-        "stiff-slow.csv",
-        "stiff-fast.csv",
-        "--families",
-        "maxwell,kelvin,series-2",
-        "--json",
-    ];
+    let args = split_words(
+        "select soft-slow.csv soft-fast.csv stiff-slow.csv stiff-fast.csv --families maxwell,kelvin,series-2 --json",
+    );
     // What two specimens differ by is no noise, whatever each alone would look like.
-    let found = palpate(at, &args);
-    succeeded(&found);
-    let found = json(&found);
+    let found = answer(&palpate(at, &args));
     assert_eq!(found["verdict"]["outcome"], "none-adequate", "{found}");
     assert!(found["effective_samples"].as_f64().unwrap() < 200.0);
     let candidates = found["candidates"].as_array().unwrap();
@@ -180,9 +163,7 @@ fn two_specimens_are_no_noise_and_each_is_held_out_whole() {
     let few = [&args[..], &specimen, &["--specimens", "A,B"]].concat();
     assert_eq!(palpate(at, &few).status.code(), Some(2));
     let named = [&args[..], &specimen, &["--specimens", "A,A,B,B"]].concat();
-    let held = palpate(at, &named);
-    succeeded(&held);
-    let held = json(&held);
+    let held = answer(&palpate(at, &named));
     // The other specimen is half or twice as stiff, and one factor makes up for it.
     let prediction = &candidate(&held, "kelvin")["prediction"];
     for record in prediction["records"].as_array().unwrap() {
@@ -269,6 +250,5 @@ fn wrong_use_is_told_in_one_sentence() {
         assert_eq!(stdout(&output), "");
     }
     let twice = palpate(at, &["select", "slow.csv", "./slow.csv"]);
-    assert_eq!(twice.status.code(), Some(2));
-    assert!(stderr(&twice).contains("is given twice"));
+    assert_refused(&twice, 2, "is given twice");
 }

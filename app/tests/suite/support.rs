@@ -2,16 +2,38 @@
 
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Command, Output, Stdio};
+use std::process::{Child, Command, Output, Stdio};
 
-pub fn palpate(folder: &Path, args: &[&str]) -> Output {
-    Command::new(env!("CARGO_BIN_EXE_palpate"))
+/// The program at work in a folder with a library of its own, without anybody at its terminal.
+pub fn command(folder: &Path, args: &[&str]) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_palpate"));
+    command
         .args(args)
         .current_dir(folder)
         .env("PALPATE_HOME", folder.join("library"))
-        .stdin(Stdio::null())
-        .output()
-        .expect("palpate starts")
+        .stdin(Stdio::null());
+    command
+}
+
+pub fn palpate(folder: &Path, args: &[&str]) -> Output {
+    command(folder, args).output().expect("palpate starts")
+}
+
+/// The program beside the test, unheard.
+pub fn background(folder: &Path, line: &str) -> Child {
+    let mut command = command(folder, &split_words(line));
+    let child = command.stdout(Stdio::null()).stderr(Stdio::null()).spawn();
+    child.expect("palpate starts")
+}
+
+/// As [`palpate`], of words with a blank between them.
+pub fn typed(folder: &Path, line: &str) -> Output {
+    palpate(folder, &split_words(line))
+}
+
+/// The words of a command line in which nothing is quoted.
+pub fn split_words(line: &str) -> Vec<&str> {
+    line.split(' ').collect()
 }
 
 pub fn stdout(output: &Output) -> String {
@@ -27,8 +49,37 @@ pub fn stderr(output: &Output) -> String {
     String::from_utf8_lossy(&output.stderr).into_owned()
 }
 
+#[track_caller]
 pub fn succeeded(output: &Output) {
     assert_eq!(output.status.code(), Some(0), "{}", stderr(output));
+}
+
+/// What it answered to `--json`, when it has succeeded.
+#[track_caller]
+pub fn answer(output: &Output) -> Value {
+    succeeded(output);
+    json(output)
+}
+
+/// What was said on stderr has this in it.
+#[track_caller]
+pub fn assert_says(output: &Output, fact: &str) {
+    let said = stderr(output);
+    assert!(said.contains(fact), "no {fact:?} in: {said}");
+}
+
+/// What was printed has this in it.
+#[track_caller]
+pub fn assert_prints(output: &Output, fact: &str) {
+    let said = stdout(output);
+    assert!(said.contains(fact), "no {fact:?} in: {said}");
+}
+
+/// It ended with this exit code, and a sentence that has this in it.
+#[track_caller]
+pub fn assert_refused(output: &Output, code: i32, fact: &str) {
+    assert_eq!(output.status.code(), Some(code), "{}", stderr(output));
+    assert_says(output, fact);
 }
 
 /// A run short enough for a test: about 90 s of session time, most of it finding contact.

@@ -1,6 +1,8 @@
 //! `palpate trade` as a user meets it.
 
-use crate::support::{json, palpate, stderr, stdout, succeeded};
+use crate::support::{
+    answer, assert_refused, assert_says, json, palpate, split_words, stderr, stdout, succeeded,
+};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
 
@@ -24,21 +26,10 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
     let nothing = palpate(at, &["trade", "--show"]);
-    assert_eq!(nothing.status.code(), Some(2));
-    assert!(stderr(&nothing).contains("no curves"));
+    assert_refused(&nothing, 2, "no curves");
 
-    let args = [
-        "trade",
-        "--quick",
-        "--json",
-        "--plot",
-        "trade.svg",
-        "--tolerance",
-        "2%",
-    ];
-    let measured = palpate(at, &args);
-    succeeded(&measured);
-    let measured = json(&measured);
+    let args = split_words("trade --quick --json --plot trade.svg --tolerance 2%");
+    let measured = answer(&palpate(at, &args));
     let curves = &measured["curves"];
     let rows = |table: &str| curves[table].as_array().unwrap().clone();
     // Seven integrators, two precisions, four steps.
@@ -119,12 +110,7 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
         error.poke_n *= 1.0001;
     });
     let check = palpate(at, &["trade", "--check"]);
-    assert_eq!(check.status.code(), Some(1));
-    assert!(
-        stderr(&check).contains("explicit Euler at 0.01 s"),
-        "{}",
-        stderr(&check)
-    );
+    assert_refused(&check, 1, "explicit Euler at 0.01 s");
 
     // Old and foreign curves are shown, with a word of warning.
     std::fs::write(&file, good).unwrap();
@@ -133,12 +119,12 @@ fn the_trade_is_measured_stored_shown_drawn_and_checked() {
     });
     let shown = palpate(at, &["trade", "--show"]);
     succeeded(&shown);
-    assert!(stderr(&shown).contains("stale"), "{}", stderr(&shown));
+    assert_says(&shown, "stale");
     resealed(&file, |curves| curves.machine.cpu = "Elsewhere".into());
     std::fs::remove_file(&file).unwrap();
     let shown = palpate(at, &["trade", "--show"]);
     succeeded(&shown);
-    assert!(stderr(&shown).contains("Elsewhere"), "{}", stderr(&shown));
+    assert_says(&shown, "Elsewhere");
 }
 
 #[test]

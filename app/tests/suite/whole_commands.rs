@@ -1,9 +1,12 @@
 //! Whole commands, their exit codes and their sentences.
 
-use crate::support::{SHORT, json, log_file, palpate, short_run, stderr, stdout, succeeded};
+use crate::support::{
+    SHORT, answer, assert_prints, assert_refused, assert_says, background, json, log_file, palpate,
+    short_run, stderr, stdout, succeeded, typed,
+};
 use palpate_test_support::wait::until;
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::Command;
 
 #[test]
 fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
@@ -11,41 +14,29 @@ fn a_run_says_that_its_live_errors_leave_the_calibration_out() {
     let at = folder.path();
     let run = short_run(at, "short", &[]);
     succeeded(&run);
-    let words = "live fit, its statistical part alone ('palpate fit short' tells what the calibration adds):";
+    let words = "'palpate fit short'";
     let told = stdout(&run);
     let live = told.split_once(words).map(|(_, live)| live);
     assert!(live.is_some_and(|live| live.contains("tau_eps")), "{told}");
     let fit = palpate(at, &["fit", "short"]);
     succeeded(&fit);
-    assert!(stdout(&fit).contains(" systematic"), "{}", stdout(&fit));
+    assert_prints(&fit, " systematic");
 }
 
 #[test]
 fn the_main_job_works_as_the_readme_writes_it() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let run = palpate(
+    let run = answer(&typed(
         at,
-        &[
-            "run",
-            "ramp-hold",
-            "--time-scale",
-            "max",
-            "--out",
-            "demo",
-            "--json",
-        ],
-    );
-    succeeded(&run);
-    let run = json(&run);
+        "run ramp-hold --time-scale max --out demo --json",
+    ));
     assert_eq!(
         (run["ending"].as_str(), run["command"].as_str()),
         (Some("finish"), Some("run"))
     );
 
-    let fit = palpate(at, &["fit", "demo", "--json"]);
-    succeeded(&fit);
-    let fit = json(&fit);
+    let fit = answer(&palpate(at, &["fit", "demo", "--json"]));
     let parameters = fit["parameters"].as_array().unwrap();
     let value = |name: &str| {
         let one = parameters.iter().find(|one| one["name"] == name);
@@ -63,18 +54,13 @@ fn the_main_job_works_as_the_readme_writes_it() {
     assert!(fit["r2"].as_f64().unwrap() > 0.999);
     assert_eq!(fit["samples"].as_u64().unwrap() / 1000, 90);
 
-    let replay = palpate(at, &["replay", "demo", "--json"]);
-    succeeded(&replay);
-    let replay = json(&replay);
+    let replay = answer(&palpate(at, &["replay", "demo", "--json"]));
     assert_eq!(replay["differing"], 0);
     assert!(replay["sessions"][0]["decisions"].as_u64().unwrap() > 30);
     assert_eq!(replay["sessions"][0]["force_difference_n"], 0.0);
 
     succeeded(&palpate(at, &["export", "demo", "--format", "parquet"]));
-    succeeded(&palpate(
-        at,
-        &["export", "demo", "--format", "csv", "--to", "."],
-    ));
+    succeeded(&typed(at, "export demo --format csv --to ."));
     assert!(at.join("demo.parquet").metadata().unwrap().len() > 100_000);
 
     // The exported table gives the fit of the session, within what equal weights change.
@@ -236,27 +222,12 @@ fn errors_reach_machines_as_one_object() {
 fn an_acknowledged_force_band_is_recorded() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let output = palpate(
+    let output = typed(
         at,
-        &[
-            "run",
-            "ramp-hold",
-            "--depth",
-            "45",
-            "--speed",
-            "6",
-            "--hold",
-            "1",
-            "--acknowledge",
-            "--time-scale",
-            "max",
-            "--out",
-            "deep",
-        ],
+        "run ramp-hold --depth 45 --speed 6 --hold 1 --acknowledge --time-scale max --out deep",
     );
     // The specimen is stiffer than the interlock allows at that depth: the run ends, data kept.
-    assert_eq!(output.status.code(), Some(1), "{}", stderr(&output));
-    assert!(stderr(&output).contains("interlock"), "{}", stderr(&output));
+    assert_refused(&output, 1, "interlock");
     let info = json(&palpate(at, &["info", "deep", "--json"]));
     assert_eq!(info["ending"], "interlock");
     assert!(
@@ -282,18 +253,11 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
     let pace = palpate_sessions::Pace::Virtual;
     drop(palpate_sessions::SessionWriter::start(newer, None, &manifest, pace).unwrap());
     let output = palpate(at, &["info", "newer"]);
-    assert_eq!(output.status.code(), Some(2), "{}", stderr(&output));
-    assert!(
-        stderr(&output).contains("update palpate"),
-        "{}",
-        stderr(&output)
-    );
+    assert_refused(&output, 2, "update palpate");
 
     let truncated = at.join("truncated.mcap");
     std::fs::write(&truncated, &bytes[..bytes.len() * 2 / 3]).unwrap();
-    let info = palpate(at, &["info", "truncated.mcap", "--json"]);
-    succeeded(&info);
-    let info = json(&info);
+    let info = answer(&palpate(at, &["info", "truncated.mcap", "--json"]));
     assert_eq!(info["is_complete"], false);
     assert!(info["notes"][0].as_str().unwrap().contains("no end record"));
 
@@ -312,7 +276,7 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
             "{command:?}: {}",
             stderr(&output)
         );
-        assert!(stderr(&output).contains("damaged"), "{}", stderr(&output));
+        assert_says(&output, "damaged");
     }
 }
 
@@ -320,14 +284,7 @@ fn a_newer_a_truncated_and_a_damaged_session_are_told_apart() {
 fn a_held_session_and_a_held_rig_name_their_holder() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut holder = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(["run", "ramp-hold", "--rig", "sim:bench", "--out", "held"])
-        .current_dir(at)
-        .env("PALPATE_HOME", at.join("library"))
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut holder = background(at, "run ramp-hold --rig sim:bench --out held");
     let lock = at.join("held/lock");
     let has_holder = || {
         let text = std::fs::read_to_string(&lock).ok()?;
@@ -363,22 +320,7 @@ fn a_held_session_and_a_held_rig_name_their_holder() {
 fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args([
-            "run",
-            "ramp-hold",
-            "--hold",
-            "5",
-            "--time-scale",
-            "50",
-            "--out",
-            "slept",
-        ])
-        .current_dir(at)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = background(at, "run ramp-hold --hold 5 --time-scale 50 --out slept");
     let pid = child.id();
     let signal = |name: &str| {
         let command = format!("kill -{name} {pid}");
@@ -411,13 +353,7 @@ fn a_run_that_was_put_to_sleep_goes_on_and_nothing_of_it_is_missing() {
 
 /// A run that is killed once its log has so many bytes; whether it was, rather than over before.
 fn is_killed(at: &Path, name: &str, bytes: u64) -> bool {
-    let mut child = Command::new(env!("CARGO_BIN_EXE_palpate"))
-        .args(["run", "ramp-hold", "--time-scale", "30", "--out", name])
-        .current_dir(at)
-        .stdout(Stdio::null())
-        .stderr(Stdio::null())
-        .spawn()
-        .unwrap();
+    let mut child = background(at, &format!("run ramp-hold --time-scale 30 --out {name}"));
     let log = at.join(name).join("000.mcap");
     let mut is_over = || {
         let length = log.metadata().map_or(0, |found| found.len());
@@ -441,9 +377,7 @@ fn a_killed_run_leaves_a_session_that_opens() {
             .map(|attempt| format!("killed-{bytes}-{attempt}"))
             .find(|name| is_killed(at, name, bytes));
         let name = name.expect("one run of twenty is killed before its end");
-        let info = palpate(at, &["info", &name, "--json"]);
-        succeeded(&info);
-        let info = json(&info);
+        let info = answer(&palpate(at, &["info", &name, "--json"]));
         assert_eq!(info["is_complete"], false, "{name}");
         samples.push(info["samples"].as_u64().unwrap());
         succeeded(&palpate(at, &["replay", &name]));

@@ -1,7 +1,7 @@
 //! `palpate rig`, and a run on a rig of a file, against an emulated controller on a port of this computer.
 
 use crate::emulate::{Emulator, emulate_galil};
-use crate::support::{json, palpate, stderr, stdout};
+use crate::support::{assert_prints, assert_refused, json, palpate, stderr, typed};
 use palpate_sessions::log::Session;
 use std::io::{BufRead, BufReader, Write};
 use std::path::Path;
@@ -48,7 +48,7 @@ fn a_rig_is_found_checked_and_watched() {
     assert!((mean - 1.28).abs() < 0.01, "{watched}");
     assert!(watched["age_within_s"].as_f64().unwrap() > 0.0, "{watched}");
     let text = palpate(folder.path(), &["rig", "monitor", &file, "--seconds", "1"]);
-    assert!(stdout(&text).contains("samples/s"), "{}", stdout(&text));
+    assert_prints(&text, "samples/s");
 }
 
 #[test]
@@ -62,31 +62,23 @@ fn what_is_not_as_the_file_says_is_told() {
     assert!(told.contains("77") && told.contains("78"), "{told}");
     let wrong = rig_file(folder.path(), &at, "travel = 3\n");
     let wrong = palpate(folder.path(), &["rig", "check", &wrong]);
-    assert_eq!(wrong.status.code(), Some(2));
-    assert!(
-        stderr(&wrong).contains("bench.toml, line 8: "),
-        "{}",
-        stderr(&wrong)
-    );
-    let nobody = palpate(
-        folder.path(),
-        &["rig", "detect", "--at", "/dev/there-is-no-such-port"],
-    );
-    assert!(
-        stdout(&nobody).contains("serial port"),
-        "{}",
-        stdout(&nobody)
-    );
+    assert_refused(&wrong, 2, "bench.toml, line 8: ");
+    let nobody = typed(folder.path(), "rig detect --at /dev/there-is-no-such-port");
+    assert_prints(&nobody, "serial port");
 }
+
+/// What is said where a busy computer has ended a run, or the retract after it.
+const LATE: [&str; 3] = ["sample age", "stood still", "samples arrived"];
 
 /// Runs a check of the home switch whose load cell fails under way, and answers the question that follows; how many
 /// mm from home the probe was, at most and at the end, and what was said.
 ///
 /// A computer busy with other tests may make a sample late, which stops the run before: then it is made again.
 fn stopped_run(answer: Option<&str>) -> ([f64; 2], String) {
+    let is_late = |said: &str| LATE.iter().any(|words| said.contains(words));
     (0..10)
         .map(|_| stopped_once(answer))
-        .find(|(_, said)| said.contains("the force is 55"))
+        .find(|(_, said)| said.contains("the force is 55") && !is_late(said))
         .expect("one run of ten that keeps up")
 }
 

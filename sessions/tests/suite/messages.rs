@@ -3,7 +3,7 @@
 use palpate_sessions::catalog::ConditionError;
 use palpate_sessions::{FolderError, LockError, LogError, ReadError};
 use palpate_tables::import::WeightsError;
-use palpate_test_support::messages::assert_messages;
+use palpate_test_support::assert_messages;
 use std::io::ErrorKind;
 use std::path::PathBuf;
 
@@ -13,161 +13,53 @@ fn path() -> PathBuf {
 
 #[test]
 fn what_a_reader_refuses_is_worded() {
-    assert_messages(&[
-        (ReadError::Missing { path: path() }, &["/data/one"][..]),
-        (
-            ReadError::NotASession {
-                path: path(),
-                reason: "it holds no log".into(),
-            },
-            &["/data/one", "it holds no log"],
-        ),
-        (
-            ReadError::Newer {
-                path: path(),
-                software_version: "3.1.4".into(),
-                record_version: 9,
-            },
-            &["/data/one", "3.1.4", "9", "update palpate"],
-        ),
-        (
-            ReadError::Damaged {
-                path: path(),
-                offset: 77,
-                reason: "a wrong checksum".into(),
-            },
-            &["/data/one", "byte 77", "a wrong checksum"],
-        ),
-        (
-            ReadError::Io {
-                path: path(),
-                source: ErrorKind::PermissionDenied.into(),
-            },
-            &["/data/one", "permission denied"],
-        ),
-    ]);
+    assert_messages! {
+        ReadError::Missing { path: path() } => ["/data/one"],
+        ReadError::NotASession { path: path(), reason: "it holds no log".into() } => ["/data/one", "it holds no log"],
+        ReadError::Newer { path: path(), software_version: "3.1.4".into(), record_version: 9 } => ["/data/one", "3.1.4", "9", "update palpate"],
+        ReadError::Damaged { path: path(), offset: 77, reason: "a wrong checksum".into() } => ["/data/one", "byte 77", "a wrong checksum"],
+        ReadError::Io { path: path(), source: ErrorKind::PermissionDenied.into() } => ["/data/one", "permission denied"],
+    }
 }
 
 #[test]
 fn what_a_writer_tells_is_worded() {
     let path = || "/data/000.mcap".to_owned();
-    assert_messages(&[
-        (
-            LogError::Disk {
-                reason: "no room".into(),
-                path: path(),
-            },
-            &["no room", "/data/000.mcap"][..],
-        ),
-        (
-            LogError::TooSlow {
-                seconds: 20,
-                path: path(),
-            },
-            &["20 s", "/data/000.mcap"],
-        ),
-        (
-            LogError::NotFinite {
-                what: "force".into(),
-            },
-            &["force"],
-        ),
-        (
-            LogError::OutOfOrder {
-                order: 3,
-                previous: 5,
-            },
-            &["3", "5"],
-        ),
-        (
-            LogError::Encode {
-                what: "manifest",
-                reason: "too long".into(),
-            },
-            &["manifest", "too long"],
-        ),
-        (LogError::Closed, &["closed"]),
-    ]);
+    assert_messages! {
+        LogError::Disk { reason: "no room".into(), path: path() } => ["no room", "/data/000.mcap"],
+        LogError::TooSlow { seconds: 20, path: path() } => ["20 s", "/data/000.mcap"],
+        LogError::NotFinite { what: "force".into() } => ["force"],
+        LogError::OutOfOrder { order: 3, previous: 5 } => ["3", "5"],
+        LogError::Encode { what: "manifest", reason: "too long".into() } => ["manifest", "too long"],
+        LogError::Closed => ["closed"],
+    }
 }
 
 #[test]
 fn what_a_folder_and_a_search_refuse_is_worded() {
-    assert_messages(&[
-        (FolderError::NotEmpty { path: path() }, &["/data/one"][..]),
-        (FolderError::NotAFolder { path: path() }, &["/data/one"]),
-        (
-            FolderError::Io {
-                path: path(),
-                source: ErrorKind::PermissionDenied.into(),
-            },
-            &["/data/one", "permission denied"],
-        ),
-        (
-            FolderError::Lock(LockError::Held {
-                path: path(),
-                holder: "4711".into(),
-            }),
-            &["/data/one", "4711"],
-        ),
-        (
-            FolderError::NoSpace {
-                path: path(),
-                free_bytes: 1_000_000,
-                needed_bytes: 9_000_000,
-            },
-            &["/data/one", "1", "9"],
-        ),
-        (FolderError::NoLibrary, &["PALPATE_HOME"]),
-    ]);
+    assert_messages! {
+        FolderError::NotEmpty { path: path() } => ["/data/one"],
+        FolderError::NotAFolder { path: path() } => ["/data/one"],
+        FolderError::Io { path: path(), source: ErrorKind::PermissionDenied.into() } => ["/data/one", "permission denied"],
+        FolderError::Lock(LockError::Held { path: path(), holder: "4711".into() }) => ["/data/one", "4711"],
+        FolderError::NoSpace { path: path(), free_bytes: 1_000_000, needed_bytes: 9_000_000 } => ["/data/one", "1", "9"],
+        FolderError::NoLibrary => ["PALPATE_HOME"],
+    }
     let text = || "depth=x".to_owned();
-    assert_messages(&[
-        (ConditionError::Form { text: text() }, &["'depth=x'"][..]),
-        (
-            ConditionError::Words {
-                text: text(),
-                value: "slow".into(),
-            },
-            &["'depth=x'", "'slow'"],
-        ),
-        (
-            ConditionError::Units {
-                text: text(),
-                name: "mm".into(),
-                value: "cm".into(),
-            },
-            &["'depth=x'", "mm", "cm"],
-        ),
-    ]);
+    assert_messages! {
+        ConditionError::Form { text: text() } => ["'depth=x'"],
+        ConditionError::Words { text: text(), value: "slow".into() } => ["'depth=x'", "'slow'"],
+        ConditionError::Units { text: text(), name: "mm".into(), value: "cm".into() } => ["'depth=x'", "mm", "cm"],
+    }
 }
 
 #[test]
 fn what_a_table_of_weights_refuses_is_worded() {
     let cell = || "one".to_owned();
-    assert_messages(&[
-        (WeightsError::NoColumn { wanted: "mass_g" }, &["mass_g"][..]),
-        (
-            WeightsError::Cell {
-                line: 3,
-                column: "volts",
-                cell: cell(),
-                wanted: "a number",
-            },
-            &["line 3", "\"one\"", "volts", "a number"],
-        ),
-        (
-            WeightsError::Comma {
-                line: 3,
-                cell: cell(),
-            },
-            &["line 3", "\"one\""],
-        ),
-        (
-            WeightsError::Falling {
-                line: 4,
-                mass_g: 50.0,
-                before_g: 100.0,
-            },
-            &["line 4", "50 g", "100 g"],
-        ),
-    ]);
+    assert_messages! {
+        WeightsError::NoColumn { wanted: "mass_g" } => ["mass_g"],
+        WeightsError::Cell { line: 3, column: "volts", cell: cell(), wanted: "a number" } => ["line 3", "\"one\"", "volts", "a number"],
+        WeightsError::Comma { line: 3, cell: cell() } => ["line 3", "\"one\""],
+        WeightsError::Falling { line: 4, mass_g: 50.0, before_g: 100.0 } => ["line 4", "50 g", "100 g"],
+    }
 }

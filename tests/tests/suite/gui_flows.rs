@@ -267,12 +267,7 @@ fn an_unusable_folder_is_refused_in_words_and_nothing_moves() {
     std::fs::write(&file, "not a folder").unwrap();
     flow.type_into("sessions in", &file.display().to_string());
     flow.click("Start  F5");
-    flow.wait("the refusal", |window| {
-        window
-            .query_all_by_label_contains("Not started:")
-            .next()
-            .is_some()
-    });
+    flow.wait_for_words("Not started:");
     assert!(flow.run().is_none());
     assert!(!is_motion_possible(flow.window.state().snapshot()));
 }

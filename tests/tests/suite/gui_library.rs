@@ -4,7 +4,7 @@ use egui_kittest::kittest::Queryable;
 use palpate_analysis::edited;
 use palpate_runner::TimeScale;
 use palpate_sessions::edits::{Change, Edits, Verdict};
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::Flow;
 use palpate_tests::many::{original, write};
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -22,15 +22,8 @@ fn opened() -> (Flow, Vec<PathBuf>) {
     let mut flow = Flow::open_in(folder, TimeScale::Max);
     flow.window
         .key_press_modifiers(Modifiers::COMMAND, Key::Num4);
-    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     (flow, sessions)
-}
-
-/// Waits until the window says so.
-fn says(flow: &mut Flow, words: &str) {
-    let is_said = |window: &Window| window.query_all_by_label_contains(words).next().is_some();
-    flow.wait(words, is_said);
-    flow.window.run_steps(2);
 }
 
 /// The row of a session, by its number.
@@ -67,29 +60,29 @@ fn sessions_are_found_by_words_conditions_and_choices() {
     // Latest first: that one is in sight.
     assert!(flow.says(&row(SESSIONS - 1)));
     flow.type_into("find", "pig ada depth>=1cm");
-    says(&mut flow, "3 sessions, found in");
+    flow.wait_for_words("3 sessions, found in");
     assert!(flow.says(&row(12)) && !flow.says(&row(13)) && !flow.says(&row(8)));
     // What is wrong with it is told in words, and the list stays.
     flow.type_into("find", "depth>=deep");
-    says(&mut flow, "'depth>=deep'");
+    flow.wait_for_words("'depth>=deep'");
     assert!(flow.says("3 sessions, found in"));
     flow.type_into("find", "thickness>=3");
-    says(&mut flow, "called thickness");
+    flow.wait_for_words("called thickness");
     flow.type_into("find", "");
-    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     flow.type_into("from", "yesterday");
-    says(&mut flow, "'yesterday'");
+    flow.wait_for_words("'yesterday'");
     flow.click("Show all");
     flow.click("verdict is");
     pick(&mut flow, "suspect");
-    says(&mut flow, "2 sessions, found in");
+    flow.wait_for_words("2 sessions, found in");
     assert!(flow.says(&row(8)) && flow.says(&row(17)));
     flow.click("operator is");
     pick(&mut flow, "Ada");
-    says(&mut flow, "1 session, found in");
+    flow.wait_for_words("1 session, found in");
     assert!(flow.says("Session stomach 8, ramp-hold, Ada"));
     flow.click("Show all");
-    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     flow.click("sort by specimen");
     flow.wait("the other order", |window| {
         let top = |number| {
@@ -108,20 +101,20 @@ fn sessions_are_chosen_by_keys_and_by_the_pointer_and_reviewed() {
     flow.window.key_press(Key::ArrowDown);
     flow.window.key_press(Key::ArrowDown);
     flow.window.run_steps(3);
-    says(&mut flow, "1 chosen");
+    flow.wait_for_words("1 chosen");
     flow.window
         .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
     flow.window
         .key_press_modifiers(Modifiers::SHIFT, Key::ArrowDown);
-    says(&mut flow, "3 chosen");
+    flow.wait_for_words("3 chosen");
     assert!(flow.says("3 sessions chosen"));
     flow.window.key_press(Key::End);
     flow.window.run_steps(4);
-    says(&mut flow, "1 chosen");
+    flow.wait_for_words("1 chosen");
     // Far below: scrolled into sight.
     assert!(flow.says(&row(0)));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::A);
-    says(&mut flow, &format!("{SESSIONS} chosen"));
+    flow.wait_for_words(&format!("{SESSIONS} chosen"));
     // Keys are the text field's while it is typed in.
     flow.type_into("note", "x");
     flow.window.key_press(Key::ArrowUp);
@@ -154,33 +147,33 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.type_into("by", "Grace");
     flow.type_into("new tags", "+pilot -absent");
     flow.click("Change tags");
-    says(&mut flow, "tags +pilot -absent on 3 sessions");
+    flow.wait_for_words("tags +pilot -absent on 3 sessions");
     for session in &sessions[18..21] {
         assert!(edits(session).tags().contains("pilot"));
     }
     flow.click("tag is");
     pick(&mut flow, "pilot");
-    says(&mut flow, "3 sessions, 3 chosen, found in");
+    flow.wait_for_words("3 sessions, 3 chosen, found in");
     flow.click("Undo: tags +pilot -absent on 3 sessions");
     // Nothing has that tag now.
-    says(&mut flow, "0 sessions, found in");
+    flow.wait_for_words("0 sessions, found in");
     assert!(edits(&sessions[19]).tags().is_empty());
     assert_eq!(edits(&sessions[19]).all.len(), 3, "both are in the record");
     flow.click("Redo: tags +pilot -absent on 3 sessions");
-    says(&mut flow, "3 sessions, found in");
+    flow.wait_for_words("3 sessions, found in");
     flow.click("Show all");
-    says(&mut flow, &format!("{SESSIONS} sessions, found in"));
+    flow.wait_for_words(&format!("{SESSIONS} sessions, found in"));
     click_row(&mut flow, 20, Modifiers::NONE);
     assert!(!flow.is_enabled("Suspect") && flow.says("reason first"));
     flow.type_into("reason", "hair under the probe");
     flow.click("Suspect");
-    says(&mut flow, "suspect: hair under the probe");
+    flow.wait_for_words("suspect: hair under the probe");
     flow.type_into("note", "the gel was warm");
     flow.click("Add note");
-    says(&mut flow, "the gel was warm (Grace)");
+    flow.wait_for_words("the gel was warm (Grace)");
     flow.type_into("reason", "looked at with the video");
     flow.click("Accept");
-    says(&mut flow, "accepted, by Grace: looked at with the video");
+    flow.wait_for_words("accepted, by Grace: looked at with the video");
     let told = edits(&sessions[20]);
     let (worth, why) = told.verdict().unwrap();
     assert_eq!((worth, why.by.as_str()), (Verdict::Suspect, "Grace"));
@@ -193,30 +186,27 @@ fn what_is_said_is_a_record_and_can_be_taken_back() {
     flow.window.check_accessibility();
     // Whoever types a note finds the session by it.
     flow.type_into("find", "warm gel");
-    says(&mut flow, "1 session, 1 chosen, found in");
+    flow.wait_for_words("1 session, 1 chosen, found in");
     flow.type_into("find", "");
-    says(
-        &mut flow,
-        &format!("{SESSIONS} sessions, 1 chosen, found in"),
-    );
+    flow.wait_for_words(&format!("{SESSIONS} sessions, 1 chosen, found in"));
     flow.click("Undo: verdict suspect on 1 session");
-    says(&mut flow, "valid: finished, no sample missing");
+    flow.wait_for_words("valid: finished, no sample missing");
     // The review saw another verdict.
-    says(&mut flow, "outdated, by Grace");
+    flow.wait_for_words("outdated, by Grace");
     assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Valid);
     // A verdict that somebody has given since is not taken back.
     flow.type_into("reason", "hair again");
     flow.click("Rejected");
-    says(&mut flow, "rejected: hair again");
+    flow.wait_for_words("rejected: hair again");
     let subject = palpate_analysis::edits::Subject::read(&sessions[20]).unwrap();
     let verdict = Verdict::Suspect;
     subject
         .say("Mary", "not that bad", Change::Verdict { verdict })
         .unwrap();
     flow.click("Undo: verdict rejected on 1 session");
-    says(&mut flow, "given again");
+    flow.wait_for_words("given again");
     assert_eq!(edits(&sessions[20]).verdict().unwrap().0, Verdict::Suspect);
-    says(&mut flow, "suspect: not that bad");
+    flow.wait_for_words("suspect: not that bad");
 }
 
 #[test]
@@ -232,15 +222,15 @@ fn damage_is_told_and_sessions_are_written_out() {
     bytes[middle] ^= 0x10;
     fs::write(log(7), bytes).unwrap();
     flow.click("Look for new sessions");
-    says(&mut flow, "damaged: ");
-    says(&mut flow, "unfinished");
+    flow.wait_for_words("damaged: ");
+    flow.wait_for_words("unfinished");
     let to = flow.folder.path().join("out/tables");
     click_row(&mut flow, 9, Modifiers::NONE);
     click_row(&mut flow, 7, Modifiers::SHIFT);
     assert!(!flow.is_enabled("Export") && flow.says("folder"));
     flow.type_into("to folder", &to.display().to_string());
     flow.click("Export");
-    says(&mut flow, "2 of 3 sessions written");
+    flow.wait_for_words("2 of 3 sessions written");
     assert!(flow.says(&format!("{}: ", row(7))), "what was not is told");
     let text = fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap();
     let rows = edited::open(&sessions[8]).unwrap().session.rows.len();
@@ -248,8 +238,8 @@ fn damage_is_told_and_sessions_are_written_out() {
     // Nothing is written over.
     fs::write(to.join(format!("{}.csv", row(8))), "mine").unwrap();
     flow.click("Export");
-    says(&mut flow, "0 of 3 sessions written");
-    says(&mut flow, "exists already");
+    flow.wait_for_words("0 of 3 sessions written");
+    flow.wait_for_words("exists already");
     assert_eq!(
         fs::read_to_string(to.join(format!("{}.csv", row(8)))).unwrap(),
         "mine"
@@ -259,11 +249,11 @@ fn damage_is_told_and_sessions_are_written_out() {
     flow.click("as");
     pick(&mut flow, "one data set (lake)");
     flow.click("Export");
-    says(&mut flow, "2 of 3 sessions added to");
+    flow.wait_for_words("2 of 3 sessions added to");
     let listed = palpate_tests::files_below(&lake, "parquet");
     assert_eq!(listed.len(), 6);
     flow.click("Export");
-    says(&mut flow, "0 of 3 sessions added to");
+    flow.wait_for_words("0 of 3 sessions added to");
     assert!(flow.says("2 were there"));
 }
 
@@ -280,16 +270,16 @@ fn files_of_other_testers_become_sessions() {
     assert!(!flow.is_enabled("Import") && flow.says("name a file first"));
     flow.type_into("files", "/nowhere/at-all.csv");
     flow.click("Import");
-    says(&mut flow, "cannot read /nowhere/at-all.csv");
+    flow.wait_for_words("cannot read /nowhere/at-all.csv");
     flow.type_into("files", &file.display().to_string());
     flow.type_into("of what", "gelatine");
     flow.click("See how it reads");
-    says(&mut flow, "none made: a dry run");
+    flow.wait_for_words("none made: a dry run");
     assert!(flow.says("200 over 19.900 s"));
     assert!(flow.says(&format!("{SESSIONS} sessions, found in")));
     flow.click("Import");
-    says(&mut flow, &format!("{} sessions, found in", SESSIONS + 1));
+    flow.wait_for_words(&format!("{} sessions, found in", SESSIONS + 1));
     flow.type_into("find", "gelatine zug");
-    says(&mut flow, "1 session, found in");
+    flow.wait_for_words("1 session, found in");
     flow.window.check_accessibility();
 }

@@ -320,10 +320,7 @@ fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
     flow.click("Lift off");
     flow.wait("none", |window| felt(window)[1] == 0.0);
     flow.window.key_press(Key::Escape);
-    flow.wait("the end of the recording", |window| {
-        let mut found = window.query_all_by_label_contains("ticks recorded, none lost");
-        found.next().is_some()
-    });
+    flow.wait_for_words("ticks recorded, none lost");
     flow.click("Replay it");
     flow.wait("the replay", |window| {
         screen::<HapticsScreen>(window).replayed().is_some()

@@ -8,6 +8,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_runner::replay::Player;
 use palpate_runner::{RunView, TimeScale};
 use palpate_sessions::Session;
+use palpate_test_support::wait::Deadline;
 use palpate_tests::workspace;
 use palpate_window::playback::PlaybackApp;
 use std::time::Duration;
@@ -109,17 +110,15 @@ fn a_session_plays_to_its_end_and_any_moment_can_be_gone_to() {
     });
     click(&mut window, "Pause");
     // What was asked for before is still shown, and then nothing moves any more.
-    let mut paused = run(&window).now;
-    for _ in 0..200 {
+    let (mut paused, mut still) = (run(&window).now, 0);
+    let patience = Deadline::new();
+    while still < 20 {
+        assert!(!patience.is_over(), "it goes on at {paused}");
         std::thread::sleep(Duration::from_millis(50));
         window.step();
         let now = run(&window).now;
-        if std::mem::replace(&mut paused, now) == now {
-            break;
-        }
+        still = if now == paused { still + 1 } else { 0 };
+        paused = now;
     }
-    std::thread::sleep(Duration::from_millis(300));
-    window.step();
-    assert_eq!(run(&window).now, paused);
     assert!(paused < end.now, "{paused}");
 }

@@ -137,10 +137,7 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
     assert!(!flow.is_enabled("Open"));
     flow.type_into("protocol file", &file.display().to_string());
     flow.click("Open");
-    flow.wait("the file", |window| {
-        let mut found = window.query_all_by_label_contains("line 15: ");
-        found.next().is_some()
-    });
+    flow.wait_for_words("line 15: ");
     assert!(flow.says("did you mean 'ramp'?"));
     assert!(!flow.is_enabled("Start  F5"));
     assert!(flow.says("correct the protocol file or choose another"));
@@ -163,10 +160,7 @@ fn a_file_with_a_mistake_shows_its_line_and_runs_once_corrected() {
 fn a_calibration_is_measured_by_prompts_kept_and_used() {
     let mut flow = Flow::open(TimeScale::Factor(30.0));
     flow.click("Calibration");
-    flow.wait("the library", |window| {
-        let mut found = window.query_all_by_label_contains("(built in)");
-        found.next().is_some()
-    });
+    flow.wait_for_words("(built in)");
     flow.window.check_accessibility();
     assert!(!flow.is_enabled("Use this one  F6") && flow.says("it is in use"));
     assert!(!flow.is_enabled("Keep the last run's"));
@@ -204,10 +198,7 @@ fn a_calibration_is_measured_by_prompts_kept_and_used() {
     assert_eq!(run.outcome.unwrap().ending, EndingKind::Finish);
     flow.window.run_steps(2);
     flow.click("Keep this calibration");
-    flow.wait("the calibration kept", |window| {
-        let mut found = window.query_all_by_label_contains("kept as ");
-        found.next().is_some()
-    });
+    flow.wait_for_words("kept as ");
     flow.window.run_steps(2);
     let shelf = Shelf::open(flow.folder.path());
     let kept = shelf.in_force("sim").unwrap();

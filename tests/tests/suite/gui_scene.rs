@@ -122,10 +122,7 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
     flow.click("Stop the scene");
     std::fs::write(&path, text.replace("40.0", "-1.0")).unwrap();
     flow.click("Open");
-    flow.wait("the refusal", |window| {
-        let mut found = window.query_all_by_label_contains("side_mm");
-        found.next().is_some()
-    });
+    flow.wait_for_words("side_mm");
     assert_eq!(
         screen::<SceneScreen>(&flow.window)
             .touch()
@@ -162,10 +159,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     });
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(2);
-    flow.wait("the end of the recording", |window| {
-        let mut found = window.query_all_by_label_contains("ticks recorded, none lost");
-        found.next().is_some()
-    });
+    flow.wait_for_words("ticks recorded, none lost");
     flow.click("Replay it");
     flow.wait("the replay", |window| replayed(window).is_some());
     flow.window.run_steps(3);

@@ -1,7 +1,6 @@
 //! Recordings of what is felt in the window: which tick differs, of what kind they are, and how they end.
 use eframe::App;
 use eframe::egui::{DroppedFile, Key, Modifiers};
-use egui_kittest::kittest::Queryable;
 use palpate_runner::TimeScale;
 use palpate_tests::flow::{Flow, Window, screen};
 use palpate_window::screens::haptics::HapticsScreen;
@@ -23,14 +22,6 @@ fn record(flow: &mut Flow, name: &str) -> PathBuf {
     folder
 }
 
-/// Waits for words on the screen.
-fn hear(flow: &mut Flow, words: &str) {
-    flow.wait(words, |window| {
-        let mut found = window.query_all_by_label_contains(words);
-        found.next().is_some()
-    });
-}
-
 fn is_deep(window: &Window) -> bool {
     let touch = screen::<SceneScreen>(window).touch();
     touch.is_some_and(|touch| touch.moment().tick.depth > 1.0)
@@ -47,7 +38,7 @@ fn write(folder: &Path, lines: &[String]) {
 
 /// What was recorded is told as it stands on disk. A changed digit of a column is refused, and named where no end tells of it.
 fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
-    hear(flow, "ticks recorded, none lost");
+    flow.wait_for_words("ticks recorded, none lost");
     let whole = lines(folder);
     let end: Vec<&str> = whole.last().unwrap().split(',').collect();
     assert_eq!(end[0], "end");
@@ -57,7 +48,7 @@ fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
     );
     assert!(flow.says(&told), "{told}");
     flow.click("Replay it");
-    hear(flow, "every number bit for bit as recorded");
+    flow.wait_for_words("every number bit for bit as recorded");
 
     let middle = whole.len() / 2;
     let at = whole[0].split(',').position(|name| name == column).unwrap();
@@ -70,10 +61,10 @@ fn check_told(flow: &mut Flow, folder: &Path, column: &str) {
     changed[middle] = cells.join(",");
     write(folder, &changed);
     flow.click("Replay it");
-    hear(flow, "the recording is damaged");
+    flow.wait_for_words("the recording is damaged");
     write(folder, &changed[..=middle]);
     flow.click("Replay it");
-    hear(flow, &format!("tick {tick}: {column} is "));
+    flow.wait_for_words(&format!("tick {tick}: {column} is "));
     assert!(!flow.says("bit for bit"));
     write(folder, &whole);
 }
@@ -133,7 +124,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let elsewhere = elsewhere.map(|line| line.replace(",30.0,", ",-2.0,"));
     write(&folder, &elsewhere.collect::<Vec<_>>());
     flow.click("Replay it");
-    hear(&mut flow, "was recorded as");
+    flow.wait_for_words("was recorded as");
     write(&folder, &whole);
 
     // Another kind is refused and not misread, and goes to its own screen when it is dropped.
@@ -141,21 +132,18 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let scene = scene.join("../protocols/tests/recordings/scene-poke");
     flow.type_into("replay", &scene.display().to_string());
     flow.click("Replay it");
-    hear(
-        &mut flow,
-        "has no columns of a master and slave's recording",
-    );
+    flow.wait_for_words("has no columns of a master and slave's recording");
     drop_on(&mut flow, &scene);
     assert!(flow.says("Start the scene"));
     flow.click("Replay it");
-    hear(&mut flow, "every number bit for bit as recorded");
+    flow.wait_for_words("every number bit for bit as recorded");
     flow.type_into("replay", &folder.display().to_string());
     flow.click("Replay it");
-    hear(&mut flow, "has no columns of a scene's recording");
+    flow.wait_for_words("has no columns of a scene's recording");
     drop_on(&mut flow, &folder);
     assert!(flow.says("Start the loop"));
     flow.click("Replay it");
-    hear(&mut flow, "master and slave, led by hand: ");
+    flow.wait_for_words("master and slave, led by hand: ");
 }
 
 /// A folder dropped on the window.

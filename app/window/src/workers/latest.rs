@@ -73,9 +73,9 @@ impl<Q: Send + 'static, A: Send + 'static> Latest<Q, A> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_test_support::wait::until;
     use std::sync::Mutex;
     use std::sync::mpsc::{Receiver, sync_channel};
-    use std::time::Duration;
 
     fn answers<Q: Send + 'static>(
         latest: &mut Latest<Q, u32>,
@@ -83,14 +83,12 @@ mod tests {
     ) -> Vec<Result<u32, String>> {
         let ctx = Context::default();
         let mut all = Vec::new();
-        for _ in 0..2000 {
+        let have_come = || {
             all.extend(latest.poll(&ctx));
-            if all.len() == count && !latest.is_busy() {
-                return all;
-            }
-            std::thread::sleep(Duration::from_millis(2));
-        }
-        panic!("{} of {count} answers came", all.len());
+            (all.len() == count && !latest.is_busy()).then_some(())
+        };
+        until(have_come, || format!("{count} answers"));
+        all
     }
 
     #[test]

@@ -106,13 +106,11 @@ mod tests {
         let mut job: Job<u32> = Job::default();
         job.start("test-job", || panic!("on purpose"), || {})
             .unwrap();
-        for _ in 0..500 {
-            if !job.is_busy() {
-                return;
-            }
+        let is_idle = || {
+            let is_idle = !job.is_busy();
             assert_eq!(job.poll(), None);
-            std::thread::sleep(std::time::Duration::from_millis(10));
-        }
-        panic!("the job stayed busy");
+            is_idle.then_some(())
+        };
+        palpate_test_support::wait::until(is_idle, || "a job that is not busy".into());
     }
 }

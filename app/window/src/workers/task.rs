@@ -119,18 +119,16 @@ impl<T: Send + 'static> Task<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_test_support::wait::until;
     use std::sync::mpsc::{Receiver, sync_channel};
     use std::time::Duration;
 
     fn finish<T: Send + 'static>(task: &mut Task<T>) {
-        for _ in 0..1000 {
+        let is_done = || {
             task.poll();
-            if task.standing().is_none() {
-                return;
-            }
-            std::thread::sleep(Duration::from_millis(5));
-        }
-        panic!("the task stayed busy");
+            task.standing().is_none().then_some(())
+        };
+        until(is_done, || "the end of the task".into());
     }
 
     /// A task that does `of` pieces, each when `go` says so.

@@ -222,14 +222,11 @@ mod tests {
     fn what_cannot_be_read_says_why_and_what_nobody_wants_ends() {
         let ctx = Context::default();
         let finish = |recording: &mut Recording| {
-            for _ in 0..2000 {
+            let is_read = || {
                 recording.poll();
-                if !recording.is_reading() {
-                    return;
-                }
-                std::thread::sleep(std::time::Duration::from_millis(5));
-            }
-            panic!("it stayed busy");
+                (!recording.is_reading()).then_some(())
+            };
+            palpate_test_support::wait::until(is_read, || "the end of reading".into());
         };
         let mut missing = Recording::new(Path::new("/nowhere/at-all"), None);
         missing.start(&ctx);

@@ -7,8 +7,8 @@
 )]
 
 use super::bench::{thesis, to};
-use super::wires::clock;
-use palpate_drivers::galil::{GalilDevice, GalilRig, GalilSettings, Sampling};
+use super::wires::opened;
+use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
 use palpate_drivers::wire::Place;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::Device;
@@ -159,14 +159,13 @@ fn run(seed: u64) -> Result<(), String> {
         sampling: [Sampling::Poll, Sampling::Record][random.below(2)],
         ..thesis()
     };
-    // A computer that stands still for a second may well hear no answer: who opens a rig tries again.
-    let open = || GalilRig::open(GalilDevice::new(place.clone(), settings.clone()), clock());
-    let opened = open().or_else(|_| open()).or_else(|_| open());
-    let verdict = opened.map_err(|err| err.to_string()).and_then(|rig| {
-        drive(rig, &mut random, &mut story, &|order| {
-            drop(orders.try_send(order));
-        })
-    });
+    let verdict = opened(&place, &settings)
+        .map_err(|err| err.to_string())
+        .and_then(|rig| {
+            drive(rig, &mut random, &mut story, &|order| {
+                drop(orders.try_send(order));
+            })
+        });
     // Whatever was still under way: two looks of the watchdog and the brake.
     std::thread::sleep(Duration::from_millis(1500));
     stop.store(true, Ordering::Relaxed);

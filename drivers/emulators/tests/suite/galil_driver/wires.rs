@@ -6,7 +6,8 @@
 )]
 
 use super::bench::{thesis, to};
-use palpate_drivers::galil::{GalilDevice, GalilRig, GalilSettings};
+use palpate_drivers::device::OpenError;
+use palpate_drivers::galil::{GalilDevice, GalilOpenError, GalilRig, GalilSettings};
 use palpate_drivers::wire::{HostClock, Place, WireError};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
@@ -14,7 +15,7 @@ use palpate_emulators::serve::{Place as At, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, Reading, RigCommand};
 use palpate_test_support::skip;
-use palpate_test_support::wait::PATIENCE;
+use palpate_test_support::wait::{PATIENCE, until};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::{SyncSender, sync_channel};
@@ -78,6 +79,16 @@ pub fn clock() -> HostClock {
     Arc::new(move || Nanos(start.elapsed().as_nanos() as u64))
 }
 
+/// The rig at a place, asked for as often as it takes: a computer with much else to do may hear no answer in time.
+pub fn opened(place: &Place, settings: &GalilSettings) -> Result<GalilRig, OpenError> {
+    let device = || GalilDevice::new(place.clone(), settings.clone());
+    let attempt = || match GalilRig::open(device(), clock()) {
+        Err(OpenError::Galil(GalilOpenError::Silent)) => None,
+        other => Some(other),
+    };
+    until(attempt, || "nothing answers".into())
+}
+
 /// The rig with somebody who takes its reports.
 pub struct Runner {
     pub rig: GalilRig,
@@ -88,8 +99,7 @@ pub struct Runner {
 
 impl Runner {
     pub fn open(place: &Place, settings: &GalilSettings) -> Self {
-        let device = GalilDevice::new(place.clone(), settings.clone());
-        let rig = GalilRig::open(device, clock()).expect("it is a Galil controller");
+        let rig = opened(place, settings).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
         Self {
             rig,
