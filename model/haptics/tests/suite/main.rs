@@ -7,6 +7,7 @@ mod haptics_margin;
 mod haptics_model;
 mod haptics_system;
 mod messages;
+mod renderer;
 mod scene;
 mod surface_plan;
 mod surface_shape;
