@@ -6,7 +6,7 @@
 
 use crate::chain::{self, ChainError, Head};
 use crate::edits::EDITS_FILE;
-use crate::folder::{LOCK_FILE, segment_number};
+use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
 use crate::log::ReadError;
 use crate::log::files::find_files;
@@ -117,16 +117,6 @@ pub enum AnalysisError {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A later version wrote it.
-    #[error("line {line} of {} is an analysis that this palpate does not know ({detail}); update palpate", path.display())]
-    Unknown {
-        /// The file.
-        path: PathBuf,
-        /// Which line, from 1.
-        line: usize,
-        /// The parser's words.
-        detail: String,
-    },
     /// A name that cannot be.
     #[error("'{name}' cannot be the name of an analysis; give 1 to {NAME_MAX} letters on one line")]
     Name {
@@ -183,19 +173,12 @@ impl Analyses {
         session_id: &str,
         since: Head,
     ) -> Result<Self, AnalysisError> {
-        let Some(path) = file_beside(session) else {
+        let Some(path) = file_beside(session, ANALYSES_FILE) else {
             return Ok(Self::default());
         };
         let chain = chain::read_since(&path, session_id, since)?;
         let head = chain.head();
-        let all: Vec<Analysis> =
-            chain
-                .records()
-                .map_err(|(line, detail)| AnalysisError::Unknown {
-                    path: path.clone(),
-                    line,
-                    detail,
-                })?;
+        let all: Vec<Analysis> = chain.records(&path, "an analysis")?;
         let sha256 = if all.is_empty() {
             String::new()
         } else {
@@ -241,14 +224,6 @@ impl Analyses {
                 },
             })
     }
-}
-
-fn file_beside(session: &Path) -> Option<PathBuf> {
-    if session.is_dir() {
-        return Some(session.join(ANALYSES_FILE));
-    }
-    let name = session.file_name()?.to_str()?;
-    segment_number(name).map(|_| session.with_file_name(ANALYSES_FILE))
 }
 
 /// The files of a session that any analysis goes by: its log and its edits, with their hashes.
@@ -334,12 +309,7 @@ pub fn add_analysis(
         return Err(AnalysisError::Taken { name: name.clone() });
     }
     let path = folder.join(ANALYSES_FILE);
-    let body = serde_json::to_value(analysis).map_err(|err| ChainError::Io {
-        what: "added to",
-        path: path.clone(),
-        source: err.into(),
-    })?;
-    Ok(chain::append(&path, session_id, body)?)
+    Ok(chain::append(&path, session_id, analysis)?)
 }
 
 #[cfg(test)]

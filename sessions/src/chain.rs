@@ -61,6 +61,18 @@ pub enum ChainError {
         /// What is wrong with it.
         reason: String,
     },
+    /// A later version wrote a line.
+    #[error("line {line} of {} is {what} that this palpate does not know ({detail}); update palpate", path.display())]
+    Unknown {
+        /// What every line is, with its article.
+        what: &'static str,
+        /// The file.
+        path: PathBuf,
+        /// Which line, from 1.
+        line: usize,
+        /// The parser's words.
+        detail: String,
+    },
     /// Another program has locked the file and does not let go.
     #[error(transparent)]
     Busy(#[from] Busy),
@@ -189,12 +201,21 @@ impl Chain {
         }
     }
 
-    /// The bodies as what they are, or the first line, from 1, that is not and why.
-    pub fn records<T: DeserializeOwned>(&self) -> Result<Vec<T>, (usize, String)> {
-        let bodies = self.bodies.iter().enumerate();
-        bodies
-            .map(|(index, body)| T::deserialize(body).map_err(|err| (index + 1, err.to_string())))
-            .collect()
+    /// The lines of the file `path` as what they are; `what` is one of them with its article.
+    pub fn records<T: DeserializeOwned>(
+        &self,
+        path: &Path,
+        what: &'static str,
+    ) -> Result<Vec<T>, ChainError> {
+        let record = |(index, body): (usize, &Value)| {
+            T::deserialize(body).map_err(|err| ChainError::Unknown {
+                what,
+                path: path.into(),
+                line: index + 1,
+                detail: err.to_string(),
+            })
+        };
+        self.bodies.iter().enumerate().map(record).collect()
     }
 }
 
@@ -259,12 +280,13 @@ fn parse(path: &Path, name: &str, bytes: &[u8]) -> Result<Chain, ChainError> {
 
 /// Adds a line and sees it to the disk. What a crash left unfinished at the end is first moved to a file beside it,
 /// which is named like it with `.torn` behind.
-pub(crate) fn append(path: &Path, name: &str, body: Value) -> Result<(), ChainError> {
+pub(crate) fn append(path: &Path, name: &str, body: &impl Serialize) -> Result<(), ChainError> {
     let failed = |source| ChainError::Io {
         what: "added to",
         path: path.into(),
         source,
     };
+    let body = serde_json::to_value(body).map_err(|err| failed(err.into()))?;
     if let Some(folder) = path.parent() {
         create_folder(folder).map_err(failed)?;
     }
@@ -341,7 +363,7 @@ mod tests {
             append(
                 path,
                 "session",
-                json!({"word": word, "depth": 0.1 * f64::from(number)}),
+                &json!({"word": word, "depth": 0.1 * f64::from(number)}),
             )
             .unwrap();
         }
@@ -379,7 +401,7 @@ mod tests {
                 "{refusal}"
             );
             // Nothing is added to what was changed.
-            assert!(append(&path, "session", json!({})).is_err());
+            assert!(append(&path, "session", &json!({})).is_err());
         }
         // The file of another session, whole as it is.
         fs::write(&path, text).unwrap();
@@ -404,7 +426,7 @@ mod tests {
             };
             assert_eq!(told(read(&path, "session")), Some((kept as u64, 3)));
             // Nothing is added that would hide it.
-            assert!(append(&path, "session", json!({})).is_err());
+            assert!(append(&path, "session", &json!({})).is_err());
             // Without the file only who remembers notices.
             fs::remove_file(&head_file).unwrap();
             assert_eq!(read(&path, "session").unwrap().bodies.len(), kept);
@@ -420,7 +442,7 @@ mod tests {
         let two: Vec<&str> = text.split_inclusive('\n').take(2).collect();
         fs::write(&path, two.concat()).unwrap();
         fs::remove_file(&head_file).unwrap();
-        append(&path, "session", json!({"word": "four"})).unwrap();
+        append(&path, "session", &json!({"word": "four"})).unwrap();
         assert_eq!(read(&path, "session").unwrap().head().lines, 3);
         assert!(read_since(&path, "session", known).is_err());
         for bad in ["", "{}", "{\"head_version\":2,\"lines\":1,\"checksum\":1}"] {
@@ -436,7 +458,7 @@ mod tests {
         let path = folder.path().join("lines.jsonl");
         let heads: Vec<Vec<u8>> = (0..3)
             .map(|number| {
-                append(&path, "session", json!(number)).unwrap();
+                append(&path, "session", &json!(number)).unwrap();
                 fs::read(Head::file_of(&path)).unwrap()
             })
             .collect();
@@ -475,7 +497,7 @@ mod tests {
         fs::remove_file(Head::file_of(&path)).unwrap();
         let torn = read(&path, "session").unwrap();
         assert!(torn.is_torn && torn.bodies.len() == 2);
-        append(&path, "session", json!({"word": "four"})).unwrap();
+        append(&path, "session", &json!({"word": "four"})).unwrap();
         let chain = read(&path, "session").unwrap();
         assert_eq!(chain.bodies[2], json!({"word": "four"}));
         let kept = fs::read(folder.path().join("lines.jsonl.torn")).unwrap();

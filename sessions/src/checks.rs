@@ -4,7 +4,6 @@ use crate::chain::{self, ChainError};
 use chrono::{DateTime, Local, Utc};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
-use thiserror::Error;
 
 /// One thing that was checked.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -46,25 +45,6 @@ impl DailyCheck {
     }
 }
 
-/// Daily checks could not be read or kept.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum CheckFileError {
-    /// The file is not as it was written, or the disk refuses.
-    #[error(transparent)]
-    Chain(#[from] ChainError),
-    /// A later version wrote it.
-    #[error("line {line} of {} is a check that this palpate does not know ({detail}); update palpate", path.display())]
-    Unknown {
-        /// The file.
-        path: PathBuf,
-        /// Which line, from 1.
-        line: usize,
-        /// The parser's words.
-        detail: String,
-    },
-}
-
 /// The file of a rig: its name, with what a file name cannot hold replaced and told apart by a checksum.
 fn file_of(library: &Path, rig: &str) -> PathBuf {
     let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
@@ -79,28 +59,14 @@ fn file_of(library: &Path, rig: &str) -> PathBuf {
 }
 
 /// Every check of a rig, oldest first; a rig that was never checked has none.
-pub fn read_checks(library: &Path, rig: &str) -> Result<Vec<DailyCheck>, CheckFileError> {
+pub fn read_checks(library: &Path, rig: &str) -> Result<Vec<DailyCheck>, ChainError> {
     let path = file_of(library, rig);
-    let chain = chain::read(&path, rig)?;
-    let check = |(index, body)| {
-        serde_json::from_value(body).map_err(|err| CheckFileError::Unknown {
-            path: path.clone(),
-            line: index + 1,
-            detail: err.to_string(),
-        })
-    };
-    chain.bodies.into_iter().enumerate().map(check).collect()
+    chain::read(&path, rig)?.records(&path, "a check")
 }
 
 /// Keeps a check.
-pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), CheckFileError> {
-    let path = file_of(library, &check.rig);
-    let body = serde_json::to_value(check).map_err(|err| ChainError::Io {
-        what: "added to",
-        path: path.clone(),
-        source: err.into(),
-    })?;
-    Ok(chain::append(&path, &check.rig, body)?)
+pub fn add_check(library: &Path, check: &DailyCheck) -> Result<(), ChainError> {
+    chain::append(&file_of(library, &check.rig), &check.rig, check)
 }
 
 /// The last check of the day of `now`, by this computer's calendar.

@@ -4,7 +4,7 @@
 
 use crate::analyses::Input;
 use crate::chain::{self, ChainError, Head};
-use crate::folder::{LOCK_FILE, segment_number};
+use crate::folder::{LOCK_FILE, file_beside, segment_number};
 use crate::lock::{HolderLock, LockError};
 use chrono::{DateTime, Utc};
 use palpate_model::units::Position;
@@ -163,16 +163,6 @@ pub enum EditError {
     /// The session is still being recorded.
     #[error(transparent)]
     Lock(#[from] LockError),
-    /// A later version wrote it.
-    #[error("line {line} of {} is an edit that this palpate does not know ({detail}); update palpate", path.display())]
-    Unknown {
-        /// The file.
-        path: PathBuf,
-        /// Which line, from 1.
-        line: usize,
-        /// The parser's words.
-        detail: String,
-    },
     /// Nobody would know why.
     #[error("an edit needs a reason, and a note its words; say it in a few words")]
     NoReason,
@@ -214,18 +204,14 @@ impl Edits {
         session_id: &str,
         since: Head,
     ) -> Result<Self, EditError> {
-        let Some(path) = edits_file(session) else {
+        let Some(path) = file_beside(session, EDITS_FILE) else {
             return Ok(Self::default());
         };
         let chain = chain::read_since(&path, session_id, since)?;
-        let head = chain.head();
-        let all = chain
-            .records()
-            .map_err(|(line, detail)| EditError::Unknown { path, line, detail })?;
         Ok(Self {
-            all,
+            all: chain.records(&path, "an edit")?,
             is_torn: chain.is_torn,
-            head,
+            head: chain.head(),
         })
     }
 
@@ -321,14 +307,6 @@ fn check_tag(tag: &str) -> Result<(), EditError> {
     })
 }
 
-fn edits_file(session: &Path) -> Option<PathBuf> {
-    if session.is_dir() {
-        return Some(session.join(EDITS_FILE));
-    }
-    let name = session.file_name()?.to_str()?;
-    segment_number(name).map(|_| session.with_file_name(EDITS_FILE))
-}
-
 /// Adds an edit to a session folder whose recording has ended.
 pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), EditError> {
     match &edit.change {
@@ -346,13 +324,7 @@ pub fn add_edit(folder: &Path, session_id: &str, edit: &Edit) -> Result<(), Edit
         });
     }
     let _lock = HolderLock::acquire_soon(&folder.join(LOCK_FILE))?;
-    let path = folder.join(EDITS_FILE);
-    let body = serde_json::to_value(edit).map_err(|err| ChainError::Io {
-        what: "added to",
-        path: path.clone(),
-        source: err.into(),
-    })?;
-    Ok(chain::append(&path, session_id, body)?)
+    Ok(chain::append(&folder.join(EDITS_FILE), session_id, edit)?)
 }
 
 #[cfg(test)]

@@ -149,6 +149,16 @@ pub(crate) fn segment_number(name: &str) -> Option<u32> {
     (segment_file(number) == name).then_some(number)
 }
 
+/// A file beside the log of a session, given its folder or a log file in it. A log file under another name than a
+/// session's has none.
+pub(crate) fn file_beside(session: &Path, name: &str) -> Option<PathBuf> {
+    if session.is_dir() {
+        return Some(session.join(name));
+    }
+    segment_number(session.file_name()?.to_str()?)?;
+    Some(session.with_file_name(name))
+}
+
 /// The folder of all sessions: `PALPATE_HOME`, or `palpate` in the user's home.
 pub fn library_folder() -> Result<PathBuf, FolderError> {
     library_from(std::env::var_os("PALPATE_HOME"), std::env::home_dir())

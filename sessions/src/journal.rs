@@ -116,10 +116,9 @@ impl Journal {
             path: self.path.clone(),
             source,
         };
-        let body = serde_json::to_value(entry).map_err(|err| failed(err.into()))?;
         match self.is_plain {
-            true => push_plain(&self.path, &body).map_err(failed),
-            false => chain::append(&self.path, JOURNAL_FILE, body).map_err(told),
+            true => push_plain(&self.path, entry).map_err(failed),
+            false => chain::append(&self.path, JOURNAL_FILE, entry).map_err(told),
         }
     }
 }
@@ -142,10 +141,12 @@ fn plain_lines(path: &Path, bytes: &[u8]) -> Result<Vec<Value>, JournalError> {
     lines.collect()
 }
 
-fn push_plain(path: &Path, body: &Value) -> io::Result<()> {
+fn push_plain(path: &Path, entry: &impl Serialize) -> io::Result<()> {
     let length = whole(&fs::read(path)?);
     let mut file = OpenOptions::new().append(true).open(path)?;
     file.set_len(length as u64)?;
+    // Keys in alphabetical order, as in a chain.
+    let body = serde_json::to_value(entry)?;
     file.write_all(format!("{body}\n").as_bytes())?;
     file.sync_data()
 }

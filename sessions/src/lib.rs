@@ -12,6 +12,7 @@
 
 pub mod analyses;
 pub mod atomic;
+pub mod block;
 pub mod calibrations;
 pub mod catalog;
 mod chain;
@@ -37,6 +38,7 @@ pub mod ticks;
 pub mod trade;
 
 pub use analyses::{ANALYSES_FILE, Analyses, Analysis, AnalysisError, add_analysis};
+pub use block::Block;
 pub use calibrations::{Kept, Shelf, read_calibration};
 pub use catalog::{Catalog, CatalogError};
 pub use chain::{ChainError, Head};
@@ -54,5 +56,5 @@ pub use log::{
 };
 pub use manifest::{Manifest, RECORD_VERSION, new_session_id};
 pub use raw::{RawBlock, RawPiece};
-pub use record::{Block, EndRecord, Entry, EntryKind, Row};
+pub use record::{EndRecord, Entry, EntryKind, Row};
 pub use shelf::{Document, LibraryError, age_days, save, supersede, taken_at};

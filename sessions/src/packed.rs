@@ -77,7 +77,7 @@ pub(crate) fn extend_numbers<T>(
     of: impl Fn(u64) -> T,
 ) -> Result<(), String> {
     // No number is shorter than a byte.
-    values.reserve(bytes.len().min(crate::record::BLOCK_ROWS_MAX));
+    values.reserve(bytes.len().min(crate::block::BLOCK_ROWS_MAX));
     while !bytes.is_empty() {
         if let Some((eight, rest)) = bytes.split_first_chunk::<8>()
             && u64::from_le_bytes(*eight) & 0x8080_8080_8080_8080 == 0

@@ -304,8 +304,8 @@ const HEALTH_SCHEMA: &str = r#"{"type":"object","properties":{"now_ns":{"type":"
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::block::{DaqBlock, DerivedBlock};
     use crate::raw::RawMessage;
-    use crate::record::{DaqBlock, DerivedBlock};
     use prost::encoding::{WireType, decode_key, decode_varint};
 
     /// The (number, wire type) pairs of an encoded message, in order.

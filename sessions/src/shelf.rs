@@ -5,6 +5,7 @@
 //! KIND: the document}` and is called by its id, `20260305-bench-cell-9f31c2aa`: day, name, checksum.
 
 use crate::atomic;
+use crate::text::json_files;
 use chrono::{DateTime, FixedOffset, Utc};
 use serde::Serialize;
 use serde::de::{DeserializeOwned, Error as _};
@@ -175,11 +176,7 @@ impl<D: Document> Shelf<D> {
     #[must_use]
     pub fn open(library: &Path) -> Self {
         let mut shelf = Self::default();
-        let entries = fs::read_dir(library.join(D::FOLDER)).map(|entries| entries.flatten());
-        let paths = entries.into_iter().flatten().map(|entry| entry.path());
-        let mut paths: Vec<PathBuf> = paths.filter(|path| is_whole(path)).collect();
-        paths.sort();
-        for path in paths {
+        for path in json_files(&library.join(D::FOLDER)) {
             match read(&path) {
                 Ok(document) => shelf.kept.push(Kept {
                     id: path
@@ -237,11 +234,6 @@ impl<D: Document> Shelf<D> {
             }),
         }
     }
-}
-
-fn is_whole(path: &Path) -> bool {
-    let name = path.file_name().unwrap_or_default().to_string_lossy();
-    name.ends_with(".json") && !name.starts_with('.')
 }
 
 fn checksum(document: &Value) -> serde_json::Result<u32> {

@@ -4,7 +4,7 @@ use crate::atomic;
 use sha2::{Digest, Sha256};
 use std::fs::{self, File};
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// The text of a file, or one sentence that names it.
 pub fn read(path: &Path) -> Result<String, String> {
@@ -15,6 +15,18 @@ pub fn read(path: &Path) -> Result<String, String> {
 pub fn write(path: &Path, text: &str) -> Result<(), String> {
     atomic::replace(path, text.as_bytes())
         .map_err(|err| format!("cannot write {} ({err})", path.display()))
+}
+
+/// The JSON files of a folder that are not hidden, by name; none where there is no such folder.
+pub(crate) fn json_files(folder: &Path) -> Vec<PathBuf> {
+    let entries = fs::read_dir(folder).into_iter().flatten().flatten();
+    let is_whole = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy();
+        name.ends_with(".json") && !name.starts_with('.')
+    };
+    let mut files: Vec<PathBuf> = entries.map(|entry| entry.path()).filter(is_whole).collect();
+    files.sort();
+    files
 }
 
 /// SHA-256 of some bytes (FIPS 180-4) as 64 hexadecimal digits.

@@ -3,6 +3,7 @@
 //! A file is `{"checksum": CRC-32 of the compact JSON of the curves, "curves": ...}`.
 
 use crate::atomic;
+use crate::text::json_files;
 use palpate_rheology::trade::{CurveError, Machine, TRADE_FORMAT, TradeCurves};
 use serde::{Deserialize, Serialize};
 use std::fs;
@@ -88,17 +89,7 @@ pub fn quick_trade_file(library: &Path, machine: &Machine) -> PathBuf {
 /// All files of curves in a library, by name; none where there is no such folder.
 #[must_use]
 pub fn trade_files(library: &Path) -> Vec<PathBuf> {
-    let Ok(entries) = fs::read_dir(folder(library)) else {
-        return Vec::new();
-    };
-    let paths = entries.flatten().map(|entry| entry.path());
-    let is_whole = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy();
-        name.ends_with(".json") && !name.starts_with('.')
-    };
-    let mut files: Vec<PathBuf> = paths.filter(is_whole).collect();
-    files.sort();
-    files
+    json_files(&folder(library))
 }
 
 /// Stores curves in place of those of their kind, full or quick, that the machine had. The file is whole

@@ -7,7 +7,8 @@ use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
 use palpate_protocols::weighed::{Readings, Weighed};
-use palpate_sessions::checks::{CheckFileError, CheckPart, DailyCheck, last_of_day, read_checks};
+use palpate_sessions::ChainError;
+use palpate_sessions::checks::{CheckPart, DailyCheck, last_of_day, read_checks};
 use palpate_sessions::log::Session;
 use std::path::Path;
 use std::time::SystemTime;
@@ -170,7 +171,7 @@ impl Gate {
         rig: &str,
         is_virtual: bool,
         now: SystemTime,
-    ) -> Result<Self, CheckFileError> {
+    ) -> Result<Self, ChainError> {
         if !is_gated(plan) {
             return Ok(Self::Open);
         }

@@ -219,10 +219,9 @@ pub(super) fn withdraw(args: &WithdrawArgs, output: &Output) -> Result<(), Failu
 /// An analysis that cannot be had: names are the user's, files are not.
 pub(super) fn failure(err: AnalysisError) -> Failure {
     match err {
-        AnalysisError::Chain(_)
-        | AnalysisError::Input { .. }
-        | AnalysisError::Unknown { .. }
-        | AnalysisError::Lock(_) => Failure::failed(err),
+        AnalysisError::Chain(_) | AnalysisError::Input { .. } | AnalysisError::Lock(_) => {
+            Failure::failed(err)
+        }
         AnalysisError::Session(err) => super::read_failure(err),
         _ => Failure::usage(err),
     }

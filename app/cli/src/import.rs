@@ -16,8 +16,7 @@ use std::path::PathBuf;
 /// Arguments of `palpate import`.
 #[derive(Debug, Args)]
 pub struct ImportArgs {
-    /// Files: delimited text, a Mach-1's, a rheometer's, or a workbook (.xlsx, .xls)
-    #[arg(required = true)]
+    #[arg(required = true, help = format!("Files: {}", Format::sources()))]
     files: Vec<PathBuf>,
     /// Folder for the new session folders; without it they go to the library (~/palpate or PALPATE_HOME)
     #[arg(long, value_name = "FOLDER")]
@@ -47,8 +46,7 @@ pub struct ImportArgs {
 /// What is told of the files; all else is detected.
 #[derive(Debug, Args)]
 struct ToldArgs {
-    /// Layout: table, mach-1, rheometer or workbook
-    #[arg(long)]
+    #[arg(long, help = format!("Layout: {}", Format::names()))]
     format: Option<Format>,
     /// What stands between cells: tab, comma, semicolon, space or one character
     #[arg(long, value_name = "NAME")]

@@ -94,7 +94,7 @@ enum Command {
     Recover(doctor::RecoverArgs),
     /// Find how far a rig gives way, from a session of stiff-surface
     Compliance(compliance::ComplianceArgs),
-    /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
+    /// Make sessions of other programs' files
     Import(Box<import::ImportArgs>),
     /// Write a session's samples as a table, or add sessions to a lake
     Export(export::ExportArgs),

@@ -96,7 +96,7 @@ impl DecisionArgs {
 /// What is wrong with an edit: the user's words are, the disk's state is not.
 pub(super) fn edit_failure(err: EditError) -> Failure {
     match err {
-        EditError::Chain(_) | EditError::Unknown { .. } => Failure::failed(err),
+        EditError::Chain(_) => Failure::failed(err),
         _ => Failure::usage(err),
     }
 }

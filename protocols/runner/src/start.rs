@@ -10,13 +10,14 @@ use palpate_model::calibration::Calibration;
 use palpate_model::rig::{Limits, RigDescription};
 use palpate_protocols::engine::{Config, ENGINE_VERSION};
 use palpate_protocols::plans::Plan;
-use palpate_protocols::preview::preview;
+use palpate_protocols::preview::{Preview, preview};
 use palpate_sessions::{
     Manifest, Pace, RECORD_VERSION, SessionFolder, SessionWriter, check_free_space, library_folder,
     new_session_folder, new_session_id, spare_folder,
 };
 use std::path::PathBuf;
 use std::sync::Arc;
+use std::time::SystemTime;
 use thiserror::Error;
 
 /// What happens when a run stopped before its plan was complete.
@@ -122,44 +123,7 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
     check_free_space(&path, preview.storage_bytes).map_err(|err| refused(err.to_string()))?;
     let folder = SessionFolder::create(&path).map_err(|err| refused(err.to_string()))?;
 
-    let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
-        value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
-    };
-    let acknowledgements = if request.is_acknowledged {
-        let beside = request.to_acknowledge.iter();
-        preview
-            .acknowledgements
-            .iter()
-            .chain(beside)
-            .cloned()
-            .collect()
-    } else {
-        Vec::new()
-    };
-    let mut signal = bench.rig.signal();
-    if let Some(filter) = request.labels.about.get("signal.filter") {
-        signal.filter = filter.as_str().unwrap_or_default().into();
-    }
-    let manifest = Manifest {
-        record_version: RECORD_VERSION,
-        session_id: session_id.clone(),
-        software_version: env!("CARGO_PKG_VERSION").into(),
-        engine_version: ENGINE_VERSION,
-        started_at: started_at.into(),
-        operator: request.labels.operator.clone(),
-        specimen: request.labels.specimen.clone(),
-        indenter: request.labels.indenter.clone(),
-        about: request.labels.about.clone(),
-        signal: Some(signal),
-        imported: None,
-        rig: Some(bench.rig.as_ref().clone()),
-        limits: Some(request.limits),
-        calibration: json("calibration", serde_json::to_value(&request.calibration))?,
-        plan: json("plan", serde_json::to_value(&request.plan))?,
-        settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
-        acknowledgements,
-        recovered: None,
-    };
+    let manifest = manifest(request, &bench, &preview, session_id.clone(), started_at)?;
     let pace = if bench.is_virtual {
         Pace::Virtual
     } else {
@@ -184,4 +148,47 @@ pub(super) fn start(request: &RunRequest, bench: Bench<'_>) -> Result<ActiveRun,
         bench.watch,
     );
     Ok(run.led_by(request.leader.clone()))
+}
+
+/// What the session says about itself.
+fn manifest(
+    request: &RunRequest,
+    bench: &Bench<'_>,
+    preview: &Preview,
+    session_id: String,
+    started_at: SystemTime,
+) -> Result<Manifest, StartError> {
+    let json = |what: &str, value: serde_json::Result<serde_json::Value>| {
+        value.map_err(|err| StartError::Failed(format!("cannot record the {what}: {err}")))
+    };
+    let mut acknowledgements = Vec::new();
+    if request.is_acknowledged {
+        acknowledgements.extend_from_slice(&preview.acknowledgements);
+        acknowledgements.extend_from_slice(&request.to_acknowledge);
+    }
+    let mut signal = bench.rig.signal();
+    if let Some(filter) = request.labels.about.get("signal.filter") {
+        signal.filter = filter.as_str().unwrap_or_default().into();
+    }
+    let labels = request.labels.clone();
+    Ok(Manifest {
+        record_version: RECORD_VERSION,
+        session_id,
+        software_version: env!("CARGO_PKG_VERSION").into(),
+        engine_version: ENGINE_VERSION,
+        started_at: started_at.into(),
+        operator: labels.operator,
+        specimen: labels.specimen,
+        indenter: labels.indenter,
+        about: labels.about,
+        signal: Some(signal),
+        imported: None,
+        rig: Some(bench.rig.as_ref().clone()),
+        limits: Some(request.limits),
+        calibration: json("calibration", serde_json::to_value(&request.calibration))?,
+        plan: json("plan", serde_json::to_value(&request.plan))?,
+        settings: serde_json::json!({ "is_homed_at_start": bench.is_homed }),
+        acknowledgements,
+        recovered: None,
+    })
 }

@@ -1,7 +1,7 @@
 //! Between two steps: the axis comes to rest, goes back if the step is tried again, and what follows begins.
 
 use super::context::Context;
-use super::input::{EndingKind, Record, Recovery};
+use super::record::{EndingKind, Record, Recovery};
 use super::state::{Activity, Power, Then};
 use super::{step, stop};
 use crate::plans::OnFailure;

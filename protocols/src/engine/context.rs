@@ -1,7 +1,8 @@
 //! What a step may see and do while it runs: ask for motion, write records.
 
-use super::input::{Effect, Record};
+use super::input::Effect;
 use super::pause;
+use super::record::Record;
 use super::state::{Contact, Derived, MoveInFlight, Pause, Power, State, UnloadedSignal};
 use palpate_model::Nanos;
 use palpate_model::calibration::Curve;

@@ -1,8 +1,8 @@
 //! The plan's own conditions, judged on every sample after the interlocks.
 
 use super::context::Context;
-use super::input::{EndingKind, Record};
 use super::pause::By;
+use super::record::{EndingKind, Record};
 use super::state::Activity;
 use super::{pause, stop};
 use crate::plans::{Action, Source};

@@ -2,7 +2,7 @@
 //! ramp that was interrupted can be finished early or given up, not resumed.
 
 use super::context::Context;
-use super::input::Record;
+use super::record::Record;
 use super::state::{Activity, Pause, Then};
 use super::{between, step};
 use crate::steps::{Pausing, Step};

@@ -1,8 +1,8 @@
 //! The engine's state: a plain value, cloneable, comparable, printable.
 
-use super::input::{EndingKind, Outcome};
 use super::interlock::Watch;
 use super::monitor::Condition;
+use super::record::{EndingKind, Outcome};
 use crate::plans::Plan;
 use crate::steps::{Active, Step};
 use palpate_model::Nanos;

@@ -1,8 +1,9 @@
 //! The one entry point: interlocks first, then the plan.
 
 use super::context::Context;
-use super::input::{Answer, Effect, EndingKind, Input, Operator, Outcome, Record};
+use super::input::{Effect, Input, Operator};
 use super::interlock::{self, Interlock, Trip};
+use super::record::{Answer, EndingKind, Outcome, Record};
 use super::state::{Activity, Derived, Pause, PauseView, Power, State};
 use super::{between, monitor, pause, stop};
 use crate::steps::{Active, Progress, Step, StepEvent};

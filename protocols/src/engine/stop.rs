@@ -4,8 +4,9 @@
 //! operator asks for a retract, and never on a reading that was just distrusted.
 
 use super::context::Context;
-use super::input::{Effect, EndingKind, Outcome, Record};
+use super::input::Effect;
 use super::interlock::Interlock;
+use super::record::{EndingKind, Outcome, Record};
 use super::state::{Activity, Power, State};
 use palpate_model::Nanos;
 use palpate_model::rig::{Phase, RigCommand};

@@ -83,29 +83,19 @@ impl Args {
                 None => {}
             }
         }
+        let mut args = Self(args);
         for key in all() {
-            if table.get(key.name).is_some() && !matches!(key.need, KeyNeed::Usual(_)) {
-                continue;
-            }
             match key.need {
+                KeyNeed::Required if table.get(key.name).is_some() => {}
                 KeyNeed::Required if meant.contains(&key.name) => {}
-                KeyNeed::Required => problems.error(
-                    table.line,
-                    format!(
-                        "{what} needs '{}': {}; write {} = {}",
-                        key.name,
-                        key.about,
-                        key.name,
-                        key.kind.example()
-                    ),
-                ),
-                KeyNeed::Usual(text) if !args.iter().any(|(name, _)| *name == key.name) => {
-                    args.push((key.name, Given::of_text(text)));
+                KeyNeed::Required => problems.error(table.line, missing(what, key)),
+                KeyNeed::Usual(text) if !args.has(key.name) => {
+                    args.0.push((key.name, Given::of_text(text)));
                 }
                 KeyNeed::Usual(_) | KeyNeed::Optional => {}
             }
         }
-        Self(args)
+        args
     }
 
     fn get(&self, key: &str) -> Option<&Given> {
@@ -212,4 +202,12 @@ pub(super) fn check_range(kind: Kind, range: Range, number: f64) -> Result<(), S
         Range::Any | Range::OneOf(_) => format!("give -{most} to {most} {unit}"),
         _ => format!("give {least} and at most {most} {unit}"),
     })
+}
+
+fn missing(what: &str, key: &Key) -> String {
+    let (name, example) = (key.name, key.kind.example());
+    format!(
+        "{what} needs '{name}': {}; write {name} = {example}",
+        key.about
+    )
 }

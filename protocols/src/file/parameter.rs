@@ -154,28 +154,7 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
         return None;
     };
     let default = problems.take(default.line, Given::of_node(default))?;
-    let unit = text_of("unit");
-    let kind = match (default.kind(), unit.as_str()) {
-        (Some(kind), "") => kind,
-        (None, "") => {
-            problems.error(line, format!("the default of '{name}' does not tell its unit; add unit = \"mm\" or whatever it is"));
-            return None;
-        }
-        (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
-            Some(kind) if found.is_none_or(|found| found == kind) => kind,
-            Some(kind) => {
-                problems.error(
-                    line,
-                    format!("the default of '{name}' is wrong: {}", default.is_not(kind)),
-                );
-                return None;
-            }
-            None => {
-                problems.error(line, format!("'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"));
-                return None;
-            }
-        },
-    };
+    let kind = problems.take(line, kind_of(name, &default, &text_of("unit")))?;
     let mut bound = |key: &str| {
         let node = keys.get(key)?;
         let number = Given::of_node(node).and_then(|given| given.number(kind));
@@ -202,4 +181,24 @@ fn parameter(name: &str, keys: &Table, problems: &mut Problems) -> Option<Parame
         );
     }
     Some(parameter)
+}
+
+/// What kind of value a parameter takes, from its default and the unit that is written beside it.
+fn kind_of(name: &str, default: &Given, unit: &str) -> Result<Kind, String> {
+    match (default.kind(), unit) {
+        (Some(kind), "") => Ok(kind),
+        (None, "") => Err(format!(
+            "the default of '{name}' does not tell its unit; add unit = \"mm\" or whatever it is"
+        )),
+        (found, unit) => match Kind::of_unit(unit).or((unit == "text").then_some(Kind::Text)) {
+            Some(kind) if found.is_none_or(|found| found == kind) => Ok(kind),
+            Some(kind) => Err(format!(
+                "the default of '{name}' is wrong: {}",
+                default.is_not(kind)
+            )),
+            None => Err(format!(
+                "'{unit}' of '{name}' is no unit; write mm, mm/s, N, s, g, Hz, N/min, V or text"
+            )),
+        },
+    }
 }

@@ -249,16 +249,7 @@ impl Writer<'_> {
             };
             let begun = self.steps.len();
             self.steps(steps, cycle, depth + 1);
-            if let Some(node) = table.get("checkpoint") {
-                let named = self.scope.value(node, Kind::Text);
-                let named = self.problems.take(
-                    node.line,
-                    named.map_err(|why| format!("'checkpoint' of a loop: {why}")),
-                );
-                if let Some(last) = self.steps[begun..].last_mut() {
-                    last.planned.checkpoint = named.map(|given| given.text);
-                }
-            }
+            self.name_checkpoint(table, begun);
             self.scope.shorten(outside);
         }
         if count > 0 && matches!(&steps.value, Value::List(items) if items.is_empty()) {
@@ -266,6 +257,19 @@ impl Writer<'_> {
                 table.line,
                 "the loop has no steps; put some between its brackets or take it out",
             );
+        }
+    }
+
+    /// Names the checkpoint behind a pass of a loop, whose steps begin at an index.
+    fn name_checkpoint(&mut self, table: &Table, begun: usize) {
+        let Some(node) = table.get("checkpoint") else {
+            return;
+        };
+        let named = self.scope.value(node, Kind::Text);
+        let named = named.map_err(|why| format!("'checkpoint' of a loop: {why}"));
+        let named = self.problems.take(node.line, named);
+        if let Some(last) = self.steps[begun..].last_mut() {
+            last.planned.checkpoint = named.map(|given| given.text);
         }
     }
 

@@ -1,10 +1,12 @@
 //! Which sessions a library holds, and what would show that one has changed.
 
 use crate::folder::{LOCK_FILE, SPARE_FILE, segment_number};
+use std::ffi::OsString;
 use std::fs;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::time::UNIX_EPOCH;
+use walkdir::WalkDir;
 
 /// A session folder.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -23,87 +25,81 @@ pub(super) struct Place {
 /// Links are not followed, so no walk is endless and nothing counts twice; hidden folders are left alone.
 pub(super) fn walk(library: &Path) -> (Vec<Place>, Vec<String>) {
     let (mut places, mut remarks) = (Vec::new(), Vec::new());
-    below(library, "", &mut places, &mut remarks);
+    let mut entries = WalkDir::new(library).into_iter();
+    while let Some(entry) = entries.next() {
+        let entry = match entry {
+            Ok(entry) => entry,
+            Err(err) => {
+                remarks.push(remark(library, err));
+                continue;
+            }
+        };
+        let is_below = entry.depth() > 0;
+        if is_below && entry.file_name().to_string_lossy().starts_with('.') {
+            if entry.file_type().is_dir() {
+                entries.skip_current_dir();
+            }
+        } else if (entry.file_type().is_dir() || !is_below)
+            // Where it cannot be looked into, the walk says so.
+            && let Ok(files) = files_of(entry.path())
+            && files.iter().any(is_segment)
+        {
+            places.push(Place {
+                name: name_below(library, entry.path()),
+                fingerprint: fingerprint(entry.path(), &files),
+                path: entry.into_path(),
+            });
+            entries.skip_current_dir();
+        }
+    }
     places.sort_by(|a, b| a.name.cmp(&b.name));
     (places, remarks)
 }
 
-fn below(folder: &Path, name: &str, places: &mut Vec<Place>, remarks: &mut Vec<String>) {
-    let content = match Content::of(folder) {
-        Ok(content) => content,
-        Err(err) => {
-            remarks.push(format!(
-                "{} cannot be looked into ({err}); sessions in it are not in the catalog",
-                folder.display()
-            ));
-            return;
-        }
-    };
-    if content.is_session() {
-        places.push(Place {
-            name: name.to_owned(),
-            path: folder.to_owned(),
-            fingerprint: content.fingerprint(folder),
-        });
-        return;
-    }
-    for inner in content.folders {
-        let path = folder.join(&inner);
-        let own = inner.to_string_lossy();
-        if own.starts_with('.') {
-            continue;
-        }
-        let name = match name {
-            "" => own.into_owned(),
-            outer => format!("{outer}/{own}"),
-        };
-        below(&path, &name, places, remarks);
-    }
+fn remark(library: &Path, err: walkdir::Error) -> String {
+    let folder = err.path().unwrap_or(library).display().to_string();
+    let words = err.to_string();
+    let reason = err.into_io_error().map_or(words, |err| err.to_string());
+    format!("{folder} cannot be looked into ({reason}); sessions in it are not in the catalog")
 }
 
-/// What is in a folder.
-#[derive(Default)]
-struct Content {
-    folders: Vec<std::ffi::OsString>,
-    files: Vec<std::ffi::OsString>,
+fn name_below(library: &Path, folder: &Path) -> String {
+    let below = folder.strip_prefix(library).unwrap_or(folder);
+    let parts = below.iter().map(|part| part.to_string_lossy());
+    parts.collect::<Vec<_>>().join("/")
 }
 
-impl Content {
-    fn of(folder: &Path) -> io::Result<Self> {
-        let mut content = Self::default();
-        for item in fs::read_dir(folder)? {
-            let item = item?;
-            if item.file_type()?.is_dir() {
-                content.folders.push(item.file_name());
-            } else {
-                content.files.push(item.file_name());
+/// The names of what is in a folder and is none, in order.
+fn files_of(folder: &Path) -> io::Result<Vec<OsString>> {
+    let mut files = Vec::new();
+    for item in fs::read_dir(folder)? {
+        let item = item?;
+        if !item.file_type()?.is_dir() {
+            files.push(item.file_name());
+        }
+    }
+    files.sort();
+    Ok(files)
+}
+
+fn is_segment(name: &OsString) -> bool {
+    name.to_str().and_then(segment_number).is_some()
+}
+
+fn fingerprint(folder: &Path, files: &[OsString]) -> String {
+    let mut text = String::new();
+    for name in files.iter().filter(|name| *name != LOCK_FILE) {
+        text += &stamp(&folder.join(name), &name.to_string_lossy());
+        if name == SPARE_FILE
+            && let Ok(spare) = fs::read_to_string(folder.join(name))
+            && let Ok(files) = files_of(Path::new(&spare))
+        {
+            for name in &files {
+                text += &stamp(&Path::new(&spare).join(name), &name.to_string_lossy());
             }
         }
-        content.files.sort();
-        Ok(content)
     }
-
-    fn is_session(&self) -> bool {
-        let is_segment =
-            |name: &std::ffi::OsString| name.to_str().and_then(segment_number).is_some();
-        self.files.iter().any(is_segment)
-    }
-
-    fn fingerprint(&self, folder: &Path) -> String {
-        let mut text = String::new();
-        for name in self.files.iter().filter(|name| *name != LOCK_FILE) {
-            text += &stamp(&folder.join(name), &name.to_string_lossy());
-            if name == SPARE_FILE
-                && let Ok(spare) = fs::read_to_string(folder.join(name))
-                && let Ok(content) = Self::of(Path::new(&spare))
-            {
-                for name in &content.files {
-                    text += &stamp(&Path::new(&spare).join(name), &name.to_string_lossy());
-                }
-            }
-        }
-        text
-    }
+    text
 }
 
 /// One file: its name, bytes, and nanoseconds of its last change.

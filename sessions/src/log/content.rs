@@ -2,10 +2,11 @@
 
 use super::frames::{Fields, frame_at};
 use super::segment::PROFILE;
+use crate::block::Block;
 use crate::health::{Health, HealthSummary};
 use crate::manifest::{Manifest, RECORD_VERSION};
 use crate::raw::RawBlock;
-use crate::record::{Block, EndRecord, Entry, EntryKind, EntryMessage};
+use crate::record::{EndRecord, Entry, EntryKind, EntryMessage};
 use crate::schema::Channel;
 use mcap::records::op;
 use palpate_model::Nanos;

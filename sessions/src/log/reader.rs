@@ -12,10 +12,11 @@ use super::files::{absent_spare, away, check_files, find_files};
 use super::frames::ChunkReader;
 use super::source::Source;
 use super::walk::walk;
+use crate::block::Block;
 use crate::folder::LOG_FILE;
 use crate::health::HealthSummary;
 use crate::manifest::{Manifest, RECORD_VERSION};
-use crate::record::{Block, EndRecord, Entry, Row};
+use crate::record::{EndRecord, Entry, Row};
 use palpate_model::Nanos;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -205,6 +206,18 @@ struct Damage {
     is_torn: bool,
 }
 
+impl Damage {
+    /// Damage that no interrupted write explains.
+    fn at(path: &Path, offset: u64, reason: &str) -> Self {
+        Self {
+            path: path.into(),
+            offset,
+            reason: reason.into(),
+            is_torn: false,
+        }
+    }
+}
+
 /// Reads the files of one session in order.
 struct Reader<'v> {
     files: Vec<PathBuf>,
@@ -350,12 +363,7 @@ impl<'v> Reader<'v> {
         is_first: bool,
         is_alone: bool,
     ) -> Result<Result<Outcome, Damage>, ReadError> {
-        let damage = |offset: u64, reason: &str| Damage {
-            path: path.into(),
-            offset,
-            reason: reason.into(),
-            is_torn: false,
-        };
+        let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
         let failed = |source| ReadError::Io {
             path: path.into(),
             source,
@@ -380,9 +388,24 @@ impl<'v> Reader<'v> {
             self.broken_off.push(damage(0, NO_BEGINNING));
             return Ok(Ok(Outcome::GoOn));
         }
+        self.read_segment(path, &source, is_first)
+    }
+
+    /// As [`read_file`](Self::read_file), of a file that begins like a segment.
+    fn read_segment(
+        &mut self,
+        path: &Path,
+        source: &Source,
+        is_first: bool,
+    ) -> Result<Result<Outcome, Damage>, ReadError> {
+        let damage = |offset: u64, reason: &str| Damage::at(path, offset, reason);
+        let failed = |source| ReadError::Io {
+            path: path.into(),
+            source,
+        };
         let had_end = self.content.end.is_some();
         self.content.begin_segment();
-        let walked = walk(&source, &mut self.chunks, &mut self.content).map_err(failed)?;
+        let walked = walk(source, &mut self.chunks, &mut self.content).map_err(failed)?;
         self.last_sample = self.last_sample.max(self.content.last_sample);
         if let Some(refusal) = self.content.refusal.take() {
             return Err(refused(path, refusal));

@@ -131,15 +131,8 @@ fn folder_of(path: &Path) -> Option<&Path> {
 }
 
 fn write_lines<T: Serialize>(path: &Path, name: &str, lines: &[T]) -> Result<(), ChainError> {
-    for line in lines {
-        let body = serde_json::to_value(line).map_err(|err| ChainError::Io {
-            what: "added to",
-            path: path.into(),
-            source: err.into(),
-        })?;
-        chain::append(path, name, body)?;
-    }
-    Ok(())
+    let mut lines = lines.iter();
+    lines.try_for_each(|line| chain::append(path, name, line))
 }
 
 /// Copies the files of a folder; on disk when this returns.

@@ -1,6 +1,7 @@
 //! Goes through a session's files and keeps everything that is whole.
 
 use super::{Gap, Missing, Wound};
+use crate::block::Block;
 use crate::log::content::{Content, Part};
 use crate::log::files::{check_files, find_files};
 use crate::log::frames::{ChunkReader, FRAME_HEADER_BYTES};
@@ -9,7 +10,7 @@ use crate::log::source::Source;
 use crate::log::walk::next_chunk;
 use crate::log::{ReadError, Session};
 use crate::manifest::Manifest;
-use crate::record::{Block, EndRecord, Entry};
+use crate::record::{EndRecord, Entry};
 use mcap::records::op;
 use std::io;
 use std::path::{Path, PathBuf};
@@ -67,28 +68,12 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         path: path.into(),
         source,
     };
-    let mut kept = 0;
-    let mut last_s = 0.0;
-    let mut gaps = Vec::new();
-    let mut expected = 0;
+    let mut tally = Tally::default();
     let mut note = |part: Part<'_>| {
         visit(part);
-        let Part::Samples(block) = part else { return };
-        let from = block
-            .rows()
-            .next()
-            .map_or(last_s, |row| row.host.seconds().0);
-        if block.first_sample() > expected {
-            gaps.push(Gap {
-                after_sample: kept,
-                samples: block.first_sample() - expected,
-                from_s: last_s,
-                to_s: Some(from),
-            });
+        if let Part::Samples(block) = part {
+            tally.count(block);
         }
-        expected = block.first_sample() + block.len() as u64;
-        kept += block.len() as u64;
-        last_s = block.last_time().map_or(last_s, |time| time.seconds().0);
     };
     let mut content = Content::new(!path.is_dir(), &mut note);
     content.allow_gaps();
@@ -117,16 +102,10 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
     let Some(manifest) = manifest else {
         return Err(damaged(path, 0, NOT_BEGUN));
     };
-    if let Some(end) = &end
-        && end.samples > expected
-    {
-        gaps.push(Gap {
-            after_sample: kept,
-            samples: end.samples - expected,
-            from_s: last_s,
-            to_s: None,
-        });
+    if let Some(end) = &end {
+        tally.expect(end.samples, None);
     }
+    let Tally { kept, mut gaps, .. } = tally;
     let mut lost_after_last = 0;
     if let Some(end) = &end
         && (!later || path.is_dir())
@@ -161,6 +140,42 @@ pub(super) fn parts(path: &Path, visit: &mut dyn FnMut(Part<'_>)) -> Result<Salv
         entries,
         end,
     })
+}
+
+/// Counts the samples that are whole, and those that are missing between them.
+#[derive(Default)]
+struct Tally {
+    kept: u64,
+    /// Number of the sample that comes next where none is missing.
+    expected: u64,
+    /// Session time of the last sample, in s.
+    last_s: f64,
+    gaps: Vec<Gap>,
+}
+
+impl Tally {
+    fn count(&mut self, block: &Block) {
+        let first = block.rows().next();
+        let from_s = first.map_or(self.last_s, |row| row.host.seconds().0);
+        self.expect(block.first_sample(), Some(from_s));
+        let count = block.len() as u64;
+        self.expected = block.first_sample() + count;
+        self.kept += count;
+        let last = block.last_time();
+        self.last_s = last.map_or(self.last_s, |time| time.seconds().0);
+    }
+
+    /// The next sample has this number, and this session time in s where it is known.
+    fn expect(&mut self, number: u64, to_s: Option<f64>) {
+        if number > self.expected {
+            self.gaps.push(Gap {
+                after_sample: self.kept,
+                samples: number - self.expected,
+                from_s: self.last_s,
+                to_s,
+            });
+        }
+    }
 }
 
 /// Goes through the files of a session.

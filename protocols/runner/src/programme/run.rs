@@ -255,31 +255,8 @@ impl Work<'_> {
             leader: None,
         };
         let later = self.time_after(&place).map_err(refused)?;
-        self.journal.push(&Entry::Begun {
-            place: place.clone(),
-            session: session.clone(),
-            at: stamp(wall_now()),
-        })?;
-        self.progress
-            .runs
-            .push((place.clone(), session.clone(), None));
-        let (reply, answer) = sync_channel(1);
-        let asked = Request::Run(Box::new(request), reply);
-        self.laboratory
-            .runner
-            .request(asked)
-            .map_err(|_| RunError::NoRunner)?;
-        match answer.recv() {
-            Ok(Ok(())) => {}
-            Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
-                self.journal.push(&Entry::Ended {
-                    place: place.clone(),
-                    outcome: REFUSED.into(),
-                    reason: reason.clone(),
-                })?;
-                return Err(refused(reason));
-            }
-            Err(_) => return Err(RunError::NoRunner),
+        if let Some(reason) = self.begin(&place, session, request)? {
+            return Err(refused(reason));
         }
         let finished = |run: &&(Place, PathBuf, Option<String>)| run.2.as_deref() == Some(FINISHED);
         let done = self.progress.runs.iter().filter(finished).count() as u32;
@@ -299,6 +276,37 @@ impl Work<'_> {
         }
         (self.tell)(Event::Finished(&place, &folder));
         self.calibrate(place.task, &folder)
+    }
+
+    /// Begins a run; or why it is refused.
+    fn begin(
+        &mut self,
+        place: &Place,
+        session: PathBuf,
+        request: RunRequest,
+    ) -> Result<Option<String>, RunError> {
+        self.journal.push(&Entry::Begun {
+            place: place.clone(),
+            session: session.clone(),
+            at: stamp(wall_now()),
+        })?;
+        self.progress.runs.push((place.clone(), session, None));
+        let (reply, answer) = sync_channel(1);
+        let asked = Request::Run(Box::new(request), reply);
+        let sent = self.laboratory.runner.request(asked);
+        sent.map_err(|_| RunError::NoRunner)?;
+        match answer.recv() {
+            Ok(Ok(())) => Ok(None),
+            Ok(Err(StartError::Refused(reason) | StartError::Failed(reason))) => {
+                self.journal.push(&Entry::Ended {
+                    place: place.clone(),
+                    outcome: REFUSED.into(),
+                    reason: reason.clone(),
+                })?;
+                Ok(Some(reason))
+            }
+            Err(_) => Err(RunError::NoRunner),
+        }
     }
 
     /// Waits until the run in a folder has ended and its log is closed.

@@ -96,6 +96,16 @@ fn is_known_unit(text: &str) -> bool {
         .any(|one| one.scale(text).is_some())
 }
 
+/// Names of columns that only one layout has.
+type Words = &'static [(Quantity, &'static [&'static str])];
+
+fn quantity_in(name: &str, words: Words) -> Option<Quantity> {
+    let name = name.trim().to_lowercase();
+    let of_name =
+        |(_, words): &&(Quantity, &'static [&'static str])| words.contains(&name.as_str());
+    words.iter().find(of_name).map(|(quantity, _)| *quantity)
+}
+
 fn quantity_of(name: &str) -> Option<Quantity> {
     let name = name.trim().replace('_', " ").to_lowercase();
     Quantity::ALL
@@ -168,13 +178,19 @@ pub(super) enum Unknown {
 }
 
 /// Finds the columns of a part.
-pub(super) fn find(header: &Header, told: &Told, said: &mut Said) -> Result<Columns, Unknown> {
+pub(super) fn find(
+    header: &Header,
+    words: Words,
+    told: &Told,
+    said: &mut Said,
+) -> Result<Columns, Unknown> {
     let other = Unknown::Other;
-    let time = column(Quantity::Time, header, told, said)
+    let mut column = |quantity| column(quantity, header, words, told, said);
+    let time = column(Quantity::Time)
         .map_err(other)?
         .ok_or_else(|| Unknown::NoMeasurement(missing(Quantity::Time, header)))?;
     let mut needed = |quantity| {
-        column(quantity, header, told, said)
+        column(quantity)
             .and_then(|found| found.ok_or_else(|| missing(quantity, header)))
             .map_err(other)
     };
@@ -182,7 +198,7 @@ pub(super) fn find(header: &Header, told: &Told, said: &mut Said) -> Result<Colu
         time,
         depth: needed(Quantity::Depth)?,
         force: needed(Quantity::Force)?,
-        signal: column(Quantity::Signal, header, told, said).map_err(other)?,
+        signal: column(Quantity::Signal).map_err(other)?,
         phase: header.names.iter().position(|name| name == "phase"),
     })
 }
@@ -205,6 +221,7 @@ fn missing(quantity: Quantity, header: &Header) -> String {
 fn column(
     quantity: Quantity,
     header: &Header,
+    words: Words,
     told: &Told,
     said: &mut Said,
 ) -> Result<Option<Column>, String> {
@@ -212,7 +229,7 @@ fn column(
     let choice = told.columns.iter().rfind(|one| one.quantity == quantity);
     let found = match choice {
         Some(choice) => Some(chosen(&choice.name, header)?),
-        None => named(quantity, header)?.map(|index| (index, false)),
+        None => named(quantity, header, words)?.map(|index| (index, false)),
     };
     let Some((index, is_turned)) = found else {
         return Ok(None);
@@ -310,9 +327,11 @@ fn chosen(name: &str, header: &Header) -> Result<(usize, bool), String> {
     }
 }
 
-fn named(quantity: Quantity, header: &Header) -> Result<Option<usize>, String> {
+fn named(quantity: Quantity, header: &Header, words: Words) -> Result<Option<usize>, String> {
     let is_it = |cell: &str| {
-        quantity_of(cell) == Some(quantity) || quantity_of(split_unit(cell).0) == Some(quantity)
+        let is_name =
+            |name: &str| quantity_of(name).or_else(|| quantity_in(name, words)) == Some(quantity);
+        is_name(cell) || is_name(split_unit(cell).0)
     };
     let names = header.names.iter().enumerate();
     let found: Vec<usize> = names

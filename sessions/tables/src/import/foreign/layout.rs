@@ -2,6 +2,7 @@
 
 use super::columns::{is_known_unit_cell, is_named, is_unit_cell};
 use super::decimal::{Decimal, Evidence, evidence};
+use super::formats::Head;
 use super::rows::{Cell, Rows};
 use super::said::Said;
 use super::told::Told;
@@ -80,6 +81,7 @@ fn is_names(cells: &[Cell]) -> bool {
 pub(super) fn find(
     rows: &Rows<'_>,
     told: &Told,
+    known: Option<Head>,
     said: &mut Said,
 ) -> Result<Option<Header>, String> {
     let row_told = |what: &str, number: usize| {
@@ -90,35 +92,17 @@ pub(super) fn find(
             )
         })
     };
-    let header_told = told
-        .header_row
-        .map(|number| row_told("header", number))
-        .transpose()?;
-    let units_told = match told.units_row {
+    let names = told.header_row.or(known.map(|head| head.names));
+    let header = names.map(|number| row_told("header", number)).transpose()?;
+    let units = match told.units_row.or(known.and_then(|head| head.units)) {
         None | Some(0) => None,
         Some(number) => Some(row_told("units", number)?),
     };
-    let from = header_told.max(units_told).map_or(0, |index| index + 1);
+    let from = header.max(units).map_or(0, |index| index + 1);
     let Some(first) = first_numbers(rows, from) else {
         return Ok(None);
     };
-    let may_have_units = told.units_row.is_none();
-    let mut units = units_told;
-    let mut header = header_told;
-    if header.is_none() && told.names.is_empty() {
-        let nearest = above(rows, units.unwrap_or(first));
-        header = nearest;
-        if let (Some(index), true) = (nearest, may_have_units) {
-            let next = above(rows, index).filter(|&next| is_names(&rows.words(next)));
-            let cells = rows.words(index);
-            if is_units(&cells) && (next.is_some() || !is_names(&cells)) {
-                (units, header) = (Some(index), next);
-            }
-        }
-    } else if let (Some(index), None, true) = (header, units, may_have_units) {
-        let between = (index + 1..first).find(|&i| is_units(&rows.words(i)));
-        units = between;
-    }
+    let (header, units) = header_and_units(rows, told, first, header, units);
     let is_header = |index: &usize| {
         rows.words(*index)
             .iter()
@@ -171,6 +155,35 @@ pub(super) fn find(
         place,
         first,
     }))
+}
+
+/// The rows of names and of units, where they are not told: above the first row of numbers.
+fn header_and_units(
+    rows: &Rows<'_>,
+    told: &Told,
+    first: usize,
+    header: Option<usize>,
+    units: Option<usize>,
+) -> (Option<usize>, Option<usize>) {
+    let may_have_units = told.units_row.is_none();
+    match header {
+        None if told.names.is_empty() => {
+            let nearest = above(rows, units.unwrap_or(first));
+            if let (Some(index), true) = (nearest, may_have_units) {
+                let next = above(rows, index).filter(|&next| is_names(&rows.words(next)));
+                let cells = rows.words(index);
+                if is_units(&cells) && (next.is_some() || !is_names(&cells)) {
+                    return (next, Some(index));
+                }
+            }
+            (nearest, units)
+        }
+        Some(index) if units.is_none() && may_have_units => {
+            let between = (index + 1..first).find(|&i| is_units(&rows.words(i)));
+            (header, between)
+        }
+        _ => (header, units),
+    }
 }
 
 /// Rows looked at before it is believed that none will tell the decimal sign otherwise; a number that

@@ -6,26 +6,25 @@
 mod columns;
 pub(super) mod decimal;
 mod encoding;
+mod formats;
 mod keep;
 mod layout;
-mod legacy;
-mod parts;
 mod rows;
 mod said;
 mod samples;
 mod told;
-mod unzipped;
-mod workbook;
 
 pub use decimal::Decimal;
 pub use encoding::TextEncoding;
+pub use formats::Format;
 pub use keep::{KeepError, Kept, folder_name, keep};
 pub use rows::Delimiter;
 pub use samples::Sample;
-pub use told::{ColumnChoice, Fault, Format, Told, UnitChoice, ZeroChoice};
+pub use told::{ColumnChoice, Fault, Told, UnitChoice, ZeroChoice};
 
 use super::torn;
 use columns::Unknown;
+use formats::{Content, Head, Layout};
 use palpate_sessions::imported::Imported;
 use rows::Rows;
 use said::Said;
@@ -35,9 +34,6 @@ use thiserror::Error;
 
 /// Largest text read, in bytes: with what is made of it, about four times as much memory.
 const TEXT_BYTES_MAX: u64 = 256 << 20;
-
-/// Largest workbook read, in bytes: packed, as many cells as are read take about half of it. It is kept in memory.
-const WORKBOOK_BYTES_MAX: u64 = 8 << 20;
 
 /// A foreign file could not be read.
 #[derive(Debug, Error)]
@@ -111,87 +107,22 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
     if bytes.is_empty() {
         return Err("it is empty".into());
     }
-    let is_workbook = match told.format {
-        Some(format) => format == Format::Workbook,
-        None => workbook::is_one(&bytes),
-    };
-    let mut said = Said::default();
-    let mut origin = Imported {
-        file: file.into(),
-        bytes: bytes.len() as u64,
-        checksum: format!("{:08x}", crc32fast::hash(&bytes)),
-        format: Format::Workbook.name().into(),
-        part: String::new(),
-        first_time_s: 0.0,
-        readings: Vec::new(),
-        facts: Vec::new(),
-        remarks: Vec::new(),
-    };
-    if is_workbook {
-        if bytes.len() as u64 > WORKBOOK_BYTES_MAX {
-            return Err(format!(
-                "the workbook has {} bytes, and {WORKBOOK_BYTES_MAX} are the most; export the measurement as text",
-                bytes.len()
-            ));
-        }
-        said.say(
-            "layout",
-            origin.format.as_str(),
-            told.format.is_some(),
-            "--format NAME",
-        );
-        origin.readings = said.0;
-        let sheets = workbook::sheets(&bytes)?
-            .into_iter()
-            .map(|(name, rows)| RawPart {
+    let format = told.format.or_else(|| Format::of_bytes(&bytes));
+    let (parts, left_out) = match format.map(|format| (format, &format.0.content)) {
+        Some((format, Content::Sheets { read, .. })) => {
+            let sheets = read(&bytes)?.into_iter().map(|(name, rows)| RawPart {
                 name,
                 facts: Vec::new(),
+                layout: format.0,
+                head: None,
                 rows: Rows::Cells(rows),
             });
-        let (parts, left_out) = understand(sheets.collect(), &origin, told)?;
-        return Ok(Foreign {
-            bytes,
-            parts,
-            left_out,
-        });
-    }
-    let (text, how) = encoding::decode(&bytes, told.encoding)?;
-    let lines = parts::lines_of(&text);
-    let format = told.format.unwrap_or_else(|| parts::detect(&lines));
-    said.say(
-        "layout",
-        format.name(),
-        told.format.is_some(),
-        "--format NAME",
-    );
-    said.say("encoding", how, told.encoding.is_some(), "--encoding NAME");
-    let delimiter = told.delimiter.or_else(|| Delimiter::detect(&lines));
-    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say so with --delimiter")?;
-    said.say(
-        "delimiter",
-        delimiter.name(),
-        told.delimiter.is_some(),
-        "--delimiter NAME",
-    );
-    let cut = parts::cut(format, lines)?
-        .into_iter()
-        .map(|part| RawPart {
-            name: part.name,
-            facts: part.facts,
-            rows: Rows::Lines {
-                lines: part.lines,
-                delimiter,
-            },
-        })
-        .collect();
-    origin.format = format.name().into();
-    origin.readings = said.0;
-    let (mut parts, left_out) = understand(cut, &origin, told)?;
-    let last_cell = |line: &str| Some(delimiter.cells(line, 0).ok()?.pop()?.text());
-    if let Some(last) = parts.last_mut() {
-        let remark = torn::remark(&text, last_cell);
-        last.imported.remarks.extend(remark);
-    }
+            let mut said = Said::default();
+            said.layout(format, told);
+            understand(sheets.collect(), &origin(file, &bytes, format, said), told)?
+        }
+        _ => parse_text(file, &bytes, told)?,
+    };
     Ok(Foreign {
         bytes,
         parts,
@@ -199,19 +130,75 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
     })
 }
 
+/// What every part of a file says of where it comes from.
+fn origin(file: &str, bytes: &[u8], format: Format, said: Said) -> Imported {
+    Imported {
+        file: file.into(),
+        bytes: bytes.len() as u64,
+        checksum: format!("{:08x}", crc32fast::hash(bytes)),
+        format: format.name().into(),
+        part: String::new(),
+        first_time_s: 0.0,
+        readings: said.0,
+        facts: Vec::new(),
+        remarks: Vec::new(),
+    }
+}
+
+/// The parts of a file, and what in it is none.
+type Understood = (Vec<ForeignPart>, Vec<String>);
+
+fn parse_text(file: &str, bytes: &[u8], told: &Told) -> Result<Understood, String> {
+    let (text, how) = encoding::decode(bytes, told.encoding)?;
+    let lines = formats::lines_of(&text);
+    let delimiter = told.delimiter.or_else(|| Delimiter::detect(&lines));
+    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say so with --delimiter")?;
+    let detect = || Format::of_text(&lines, delimiter);
+    let format = told.format.unwrap_or_else(detect);
+    let Content::Text { cut, .. } = format.0.content else {
+        return Err(format!("it is text, and no {}", format.name()));
+    };
+    let mut said = Said::default();
+    said.layout(format, told);
+    said.say("encoding", how, told.encoding.is_some(), "--encoding NAME");
+    let option = "--delimiter NAME";
+    said.say(
+        "delimiter",
+        delimiter.name(),
+        told.delimiter.is_some(),
+        option,
+    );
+    let parts = cut(lines, delimiter)?.into_iter().map(|part| RawPart {
+        name: part.name,
+        facts: part.facts,
+        layout: format.0,
+        head: part.head,
+        rows: Rows::Lines {
+            lines: part.lines,
+            delimiter,
+        },
+    });
+    let origin = origin(file, bytes, format, said);
+    let (mut parts, left_out) = understand(parts.collect(), &origin, told)?;
+    let last_cell = |line: &str| Some(delimiter.cells(line, 0).ok()?.pop()?.text());
+    if let Some(last) = parts.last_mut() {
+        let remark = torn::remark(&text, last_cell);
+        last.imported.remarks.extend(remark);
+    }
+    Ok((parts, left_out))
+}
+
 /// A part before its columns are known.
 struct RawPart<'a> {
     name: String,
     facts: Vec<(String, String)>,
+    layout: &'static Layout,
+    head: Option<Head>,
     rows: Rows<'a>,
 }
 
 /// Reads the parts that are wanted; one without a time is left out.
-fn understand(
-    cut: Vec<RawPart<'_>>,
-    origin: &Imported,
-    told: &Told,
-) -> Result<(Vec<ForeignPart>, Vec<String>), String> {
+fn understand(cut: Vec<RawPart<'_>>, origin: &Imported, told: &Told) -> Result<Understood, String> {
     let is_whole = cut.len() == 1 && cut[0].name.is_empty();
     let is_wanted = |index: usize, name: &str| {
         let is_it = |wanted: &String| {
@@ -265,14 +252,14 @@ fn understand_one(
     told: &Told,
 ) -> Result<ForeignPart, Unknown> {
     let mut said = Said(origin.readings.clone());
-    let header = layout::find(&part.rows, told, &mut said)
+    let header = layout::find(&part.rows, told, part.head, &mut said)
         .map_err(Unknown::NoMeasurement)?
         .ok_or_else(|| Unknown::NoMeasurement("it has no rows of numbers".into()))?;
     if part.rows.len() - header.first < 2 {
         let reason = "it has fewer than two rows of numbers".into();
         return Err(Unknown::NoMeasurement(reason));
     }
-    let columns = columns::find(&header, told, &mut said)?;
+    let columns = columns::find(&header, part.layout.words, told, &mut said)?;
     let mut read = vec![columns.time.index, columns.depth.index, columns.force.index];
     read.extend(columns.signal.as_ref().map(|column| column.index));
     let decimal = layout::decimal(&part.rows, &header, &read, told.decimal, &mut said)

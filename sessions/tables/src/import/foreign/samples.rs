@@ -69,6 +69,71 @@ impl Reader<'_> {
         }
     }
 
+    fn check_width(&self, cells: &[Cell], width: usize, number: usize) -> Result<(), String> {
+        let mut beyond = cells.iter().skip(width);
+        match beyond.position(|cell| !cell.is_empty()) {
+            None => Ok(()),
+            Some(place) => Err(format!(
+                "{} {number} has a cell in column {} where the header has {width}; mend the {0}, or say the delimiter or decimal sign if these were taken wrongly",
+                self.rows.word(),
+                width + place + 1,
+            )),
+        }
+    }
+
+    /// The sample in a row; none where the row is left out, as told. `last` is the time of the sample before in s.
+    fn sample(
+        &mut self,
+        cells: &[Cell],
+        columns: &Columns,
+        number: usize,
+        last: Option<f64>,
+    ) -> Result<Option<Sample>, String> {
+        let one = |column: &Column, what| match self.value(cells, column, what, number) {
+            Ok(Value::Number(number)) => Ok(Some(number)),
+            Ok(Value::Missing) => Ok(None),
+            Err(reason) => Err(reason),
+        };
+        let t = one(&columns.time, Quantity::Time)?;
+        let depth = one(&columns.depth, Quantity::Depth)?;
+        let force = one(&columns.force, Quantity::Force)?;
+        let signal = columns
+            .signal
+            .as_ref()
+            .map(|column| one(column, Quantity::Signal));
+        let signal = signal.transpose()?.flatten();
+        let phase = columns.phase.and_then(|place| cells.get(place));
+        let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
+        let is_needed = matches!(
+            phase,
+            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
+        );
+        let missing = |what: &str| (Fault::Missing, format!("there is no {what}"));
+        let (fault, what) = match (t, depth, force, last) {
+            (None, ..) => missing("time"),
+            (_, None, ..) if is_needed => missing("depth"),
+            (_, _, None, _) if is_needed => missing("force"),
+            (Some(t), .., Some(last)) if t == last => (
+                Fault::Repeated,
+                format!("the time {t} s is that of the row before"),
+            ),
+            (Some(t), .., Some(last)) if t < last => (
+                Fault::Backward,
+                format!("the time goes back from {last} to {t} s"),
+            ),
+            (Some(t), ..) => {
+                return Ok(Some(Sample {
+                    t,
+                    depth,
+                    force,
+                    signal,
+                    phase,
+                }));
+            }
+        };
+        self.fault(fault, number, &what).map(|()| None)
+    }
+
     /// Refuses a row, or counts it among those left out.
     fn fault(&mut self, fault: Fault, number: usize, what: &str) -> Result<(), String> {
         if !self.skip.contains(&fault) {
@@ -109,75 +174,12 @@ pub(super) fn read(
         if cells.iter().all(Cell::is_empty) {
             continue;
         }
-        let beyond = cells
-            .iter()
-            .skip(header.width)
-            .position(|cell| !cell.is_empty());
-        if let Some(place) = beyond {
-            return Err(format!(
-                "{} {number} has a cell in column {} where the header has {}; mend the {0}, or say the delimiter or decimal sign if these were taken wrongly",
-                rows.word(),
-                header.width + place + 1,
-                header.width
-            ));
+        reader.check_width(&cells, header.width, number)?;
+        let last = samples.last().map(|last| last.t);
+        if let Some(sample) = reader.sample(&cells, columns, number, last)? {
+            samples.push(sample);
+            numbers.push(number);
         }
-        let one = |column: &Column, what| match reader.value(&cells, column, what, number) {
-            Ok(Value::Number(number)) => Ok(Some(number)),
-            Ok(Value::Missing) => Ok(None),
-            Err(reason) => Err(reason),
-        };
-        let t = one(&columns.time, Quantity::Time)?;
-        let depth = one(&columns.depth, Quantity::Depth)?;
-        let force = one(&columns.force, Quantity::Force)?;
-        let signal = columns
-            .signal
-            .as_ref()
-            .map(|column| one(column, Quantity::Signal));
-        let signal = signal.transpose()?.flatten();
-        let phase = columns.phase.and_then(|place| cells.get(place));
-        let phase = phase.map_or(Phase::Imported, |cell| phase_of(&cell.text()));
-        let is_needed = matches!(
-            phase,
-            Phase::Imported | Phase::Ramp | Phase::Hold | Phase::Unload
-        );
-        let Some(t) = t else {
-            reader.fault(Fault::Missing, number, "there is no time")?;
-            continue;
-        };
-        let absent = [(depth, "depth"), (force, "force")];
-        let absent = absent
-            .into_iter()
-            .find(|(value, _)| is_needed && value.is_none());
-        if let Some((_, what)) = absent {
-            reader.fault(Fault::Missing, number, &format!("there is no {what}"))?;
-            continue;
-        }
-        if let Some(last) = samples.last().map(|last| last.t) {
-            if t == last {
-                reader.fault(
-                    Fault::Repeated,
-                    number,
-                    &format!("the time {t} s is that of the row before"),
-                )?;
-                continue;
-            }
-            if t < last {
-                reader.fault(
-                    Fault::Backward,
-                    number,
-                    &format!("the time goes back from {last} to {t} s"),
-                )?;
-                continue;
-            }
-        }
-        samples.push(Sample {
-            t,
-            depth,
-            force,
-            signal,
-            phase,
-        });
-        numbers.push(number);
     }
     if samples.len() < 2 {
         return Err("it has fewer than two rows of numbers".into());

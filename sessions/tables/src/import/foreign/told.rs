@@ -3,6 +3,7 @@
 use super::super::header::Quantity;
 use super::decimal::Decimal;
 use super::encoding::TextEncoding;
+use super::formats::Format;
 use super::rows::Delimiter;
 
 /// Everything that can be said. What is not said is detected.
@@ -32,43 +33,6 @@ pub struct Told {
     pub parts: Vec<String>,
     /// Rows that are left out instead of refused.
     pub skip: Vec<Fault>,
-}
-
-/// A layout that is known.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Format {
-    /// Delimited text with one header.
-    Table,
-    /// Blocks of a Biomomentum Mach-1.
-    Mach1,
-    /// Intervals or steps of a rheometer.
-    Rheometer,
-    /// Sheets of an .xlsx or .xls workbook.
-    Workbook,
-}
-
-impl Format {
-    const ALL: [Self; 4] = [Self::Table, Self::Mach1, Self::Rheometer, Self::Workbook];
-
-    /// The name on the command line and in a session.
-    #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Table => "table",
-            Self::Mach1 => "mach-1",
-            Self::Rheometer => "rheometer",
-            Self::Workbook => "workbook",
-        }
-    }
-}
-
-impl std::str::FromStr for Format {
-    type Err = String;
-
-    fn from_str(text: &str) -> Result<Self, String> {
-        let found = Self::ALL.into_iter().find(|one| one.name() == text);
-        found.ok_or_else(|| format!("give {}", Self::ALL.map(Self::name).join(", ")))
-    }
 }
 
 /// A row that is not as it should be.

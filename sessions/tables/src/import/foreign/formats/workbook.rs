@@ -1,10 +1,23 @@
 //! The sheets of a workbook, .xlsx or .xls. What could make the reader of cells take more memory than the
 //! file deserves is looked for before it is called.
 
-use super::rows::Cell;
-use super::{legacy, unzipped};
+use super::super::rows::Cell;
+use super::{Content, Layout, Sheet, legacy, unzipped};
 use calamine::{Data, DataRef, Reader, Xls, Xlsx};
 use std::io::Cursor;
+
+pub(super) const LAYOUT: Layout = Layout {
+    name: "workbook",
+    of: "a workbook (.xlsx, .xls)",
+    content: Content::Sheets {
+        is_it: |bytes| bytes.starts_with(ZIP) || bytes.starts_with(COMPOUND),
+        read: sheets,
+    },
+    words: &[],
+};
+
+/// Largest one read, in bytes: packed, as many cells as are read take about half of it. It is kept in memory.
+const BYTES_MAX: usize = 8 << 20;
 
 /// Most cells kept of all sheets, so that the whole import takes less than 64 MiB: 17 MB here, and as much again
 /// for the samples made of them.
@@ -17,16 +30,14 @@ const ZIP: &[u8] = b"PK\x03\x04";
 /// First bytes of a compound file, which an .xls is ([MS-CFB], section 2.2).
 const COMPOUND: &[u8] = b"\xd0\xcf\x11\xe0\xa1\xb1\x1a\xe1";
 
-/// A sheet by name, its rows with their numbers.
-pub(super) type Sheet = (String, Vec<(usize, Vec<Cell>)>);
-
-/// Whether bytes begin like a workbook.
-pub(super) fn is_one(bytes: &[u8]) -> bool {
-    bytes.starts_with(ZIP) || bytes.starts_with(COMPOUND)
-}
-
 /// Every sheet in order; the error is one sentence.
-pub(super) fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
+fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
+    if bytes.len() > BYTES_MAX {
+        return Err(format!(
+            "the workbook has {} bytes, and {BYTES_MAX} are the most; export the measurement as text",
+            bytes.len()
+        ));
+    }
     if bytes.starts_with(ZIP) {
         unzipped::check(bytes)?;
         modern(bytes)
