@@ -10,10 +10,9 @@ use palpate_tables::import::{
     UnitChoice, ZeroChoice,
 };
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Arguments of `palpate import`.
+/// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
 #[derive(Debug, Args)]
 pub struct ImportArgs {
     /// Files: delimited text, a Mach-1's, a rheometer's, or a workbook (.xlsx, .xls)
@@ -39,9 +38,6 @@ pub struct ImportArgs {
     /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     about: Vec<String>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// What is told of the files; all else is detected.
@@ -106,7 +102,6 @@ impl ToldArgs {
 
 #[derive(Serialize)]
 struct Report {
-    command: &'static str,
     is_dry_run: bool,
     files: Vec<FileReport>,
 }
@@ -120,20 +115,12 @@ pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
         library: None,
         is_dry_run: args.dry_run,
     };
-    let bar = output.count_bar(0);
-    let files = import(&request, &mut |done, of, path| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-        bar.set_message(path.display().to_string());
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
+    let files = import(&request, &output.count_bar(0));
     let report = Report {
-        command: "import",
         is_dry_run: args.dry_run,
         files: files.map_err(import_failure)?,
     };
-    output.result(&report, || {
+    output.answer("import", &report, || {
         let files = report.files.iter().map(text);
         files.collect::<Vec<_>>().join("\n\n")
     });
@@ -156,6 +143,7 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Foreign(ForeignError::Io { .. }) => Failure::failed(err),
         ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
         ImportFailure::Keep(_) => Failure::failed(err),
+        ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
         _ => Failure::usage(err),
     }
 }

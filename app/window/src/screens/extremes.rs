@@ -69,8 +69,7 @@ impl ExtremesScreen {
     pub fn start(&mut self, ctx: &Context) {
         let extent = self.extent;
         self.task.start("extremes", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            let rows = survey(extent, None, &tell).map_err(|err| err.to_string())?;
+            let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
             let rows = rows.ok_or("ended before it was done")?;
             Ok(Found {
                 groups: summary(&rows),
