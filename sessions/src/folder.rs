@@ -143,6 +143,15 @@ pub fn segment_file(number: u32) -> String {
     format!("{number:03}.mcap")
 }
 
+/// Whether a folder is a session's: it has a segment of a log, the first or, where that was lost, a later one.
+#[must_use]
+pub fn is_session_folder(folder: &Path) -> bool {
+    let is_segment = |name: std::ffi::OsString| name.to_str().and_then(segment_number).is_some();
+    std::fs::read_dir(folder).is_ok_and(|mut items| {
+        items.any(|item| item.is_ok_and(|item| is_segment(item.file_name())))
+    })
+}
+
 /// The number in a segment's name, if it is one.
 pub(crate) fn segment_number(name: &str) -> Option<u32> {
     let number = name.strip_suffix(".mcap")?.parse().ok()?;

@@ -4,6 +4,7 @@ use crate::edited;
 use crate::source::{
     SourceError, calibration_of, decisions, is_saturated, table_of_imported, trusted_samples,
 };
+use crate::sources::is_session;
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::{AxisStatus, Oscillation, Phase, RigCommand};
 use palpate_model::units::{Depth, Newtons, Position, Seconds};
@@ -42,8 +43,7 @@ impl CycleSource {
 
 /// Reads a session folder, a session file or a table; `columns` names the columns of a table without a header.
 pub fn read(path: &Path, columns: Option<&ColumnNames>) -> Result<CycleSource, SourceError> {
-    let is_session = path.is_dir() || path.extension().is_some_and(|name| name == "mcap");
-    if is_session || !path.exists() {
+    if is_session(path) {
         return of_session(&edited::open(path)?.session);
     }
     let mut table = read_table(path, columns)?;

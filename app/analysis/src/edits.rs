@@ -9,8 +9,8 @@ use palpate_sessions::edits::{
     Change, Decision, EDITS_FILE, Edit, EditError, Edits, Verdict, add_edit,
 };
 use palpate_sessions::log::{ReadError, Summary};
-use std::fmt;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// The name given, or that of the login.
 #[must_use]
@@ -23,42 +23,17 @@ pub fn author(given: Option<&str>) -> String {
 }
 
 /// Nothing was said of a session.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum SayFailure {
     /// It cannot be read.
-    Read(ReadError),
+    #[error(transparent)]
+    Read(#[from] ReadError),
     /// Its analyses cannot be read.
-    Analyses(AnalysisError),
+    #[error(transparent)]
+    Analyses(#[from] AnalysisError),
     /// Its edits cannot be read or added to.
-    Edit(EditError),
-}
-
-impl fmt::Display for SayFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Read(err) => err.fmt(f),
-            Self::Analyses(err) => err.fmt(f),
-            Self::Edit(err) => err.fmt(f),
-        }
-    }
-}
-
-impl From<ReadError> for SayFailure {
-    fn from(err: ReadError) -> Self {
-        Self::Read(err)
-    }
-}
-
-impl From<AnalysisError> for SayFailure {
-    fn from(err: AnalysisError) -> Self {
-        Self::Analyses(err)
-    }
-}
-
-impl From<EditError> for SayFailure {
-    fn from(err: EditError) -> Self {
-        Self::Edit(err)
-    }
+    #[error(transparent)]
+    Edit(#[from] EditError),
 }
 
 /// A session of which something is to be said.
@@ -190,7 +165,7 @@ fn sessions(count: usize) -> String {
 fn each<T>(
     words: &str,
     of: &[T],
-    progress: &Progress,
+    progress: &dyn Progress,
     folder: impl Fn(&T) -> &Path,
     one: impl Fn(&T) -> Result<(Option<Step>, bool), String>,
 ) -> Said {
@@ -226,7 +201,7 @@ fn each<T>(
 
 /// Says something of sessions. Notes and reviews stay: only tags and verdicts can be taken back.
 #[must_use]
-pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &Progress) -> Said {
+pub fn say(saying: &Saying, folders: &[PathBuf], by: &str, progress: &dyn Progress) -> Said {
     let folder = |folder: &PathBuf| -> Result<_, String> {
         say_one(saying, folder, by).map_err(|err| err.to_string())
     };
@@ -298,7 +273,7 @@ fn say_one(saying: &Saying, folder: &Path, by: &str) -> Result<(Option<Step>, bo
 
 /// Writes the opposite of edits, as records of their own. What can be taken back of that is the way to do them again.
 #[must_use]
-pub fn take_back(act: &Act, by: &str, progress: &Progress) -> Said {
+pub fn take_back(act: &Act, by: &str, progress: &dyn Progress) -> Said {
     let one = |step: &Step| take_back_one(step, by).map(|step| (Some(step), true));
     let mut said = each("", &act.steps, progress, |step| &step.folder, one);
     said.words = match said.act {

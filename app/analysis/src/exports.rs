@@ -10,44 +10,23 @@ use palpate_sessions::recover::is_in_use;
 use palpate_tables::export::{Beside, ExportError, Feed, Format, Selection, Table};
 use palpate_tables::lake::{self, Added, Told};
 use std::collections::BTreeSet;
-use std::fmt;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// Nothing was written of a session.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum ExportFailure {
     /// It cannot be read.
-    Source(SourceError),
+    #[error(transparent)]
+    Source(#[from] SourceError),
     /// It cannot be written.
-    Export(ExportError),
+    #[error(transparent)]
+    Export(#[from] ExportError),
     /// It is being recorded, and what is in a lake never changes.
+    #[error(
+        "{} is being recorded, and files of a lake never change; add it when the run has ended", .0.display()
+    )]
     BeingRecorded(PathBuf),
-}
-
-impl fmt::Display for ExportFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Source(err) => err.fmt(f),
-            Self::Export(err) => err.fmt(f),
-            Self::BeingRecorded(session) => write!(
-                f,
-                "{} is being recorded, and files of a lake never change; add it when the run has ended",
-                session.display()
-            ),
-        }
-    }
-}
-
-impl From<SourceError> for ExportFailure {
-    fn from(err: SourceError) -> Self {
-        Self::Source(err)
-    }
-}
-
-impl From<ExportError> for ExportFailure {
-    fn from(err: ExportError) -> Self {
-        Self::Export(err)
-    }
 }
 
 /// What a session is written as.
@@ -212,7 +191,7 @@ pub struct Exported {
 }
 
 /// Writes every session, one after the other. A file that is there is never written over: it is told.
-pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &Progress) -> Exported {
+pub fn export_all(sessions: Vec<PathBuf>, to: &Destination, progress: &dyn Progress) -> Exported {
     let of = sessions.len();
     let (sessions, copied) = match to {
         Destination::Tables(..) => (sessions, Vec::new()),

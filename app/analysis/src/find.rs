@@ -81,7 +81,7 @@ pub fn entries((library, folders): &(PathBuf, Vec<String>)) -> Result<Vec<Entry>
 }
 
 /// Reads the sessions that are new or have changed.
-pub fn update(library: &std::path::Path, progress: &Progress) -> Result<Changes, String> {
+pub fn update(library: &std::path::Path, progress: &dyn Progress) -> Result<Changes, String> {
     let mut remarks = Vec::new();
     let done = Catalog::with(library, |catalog| {
         remarks.append(&mut catalog.remarks);

@@ -11,39 +11,28 @@ use palpate_tables::import::{
 };
 use serde::Serialize;
 use std::collections::BTreeSet;
-use std::fmt;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
 
 /// No session was made.
-#[derive(Debug)]
+#[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum ImportFailure {
     /// A file cannot be read or is not understood.
-    Foreign(ForeignError),
+    #[error(transparent)]
+    Foreign(#[from] ForeignError),
     /// A session cannot be kept.
-    Keep(KeepError),
+    #[error(transparent)]
+    Keep(#[from] KeepError),
     /// There is no library.
-    Library(FolderError),
+    #[error(transparent)]
+    Library(#[from] FolderError),
     /// A folder is there already or would be made twice.
+    #[error("{} is there already or would be made twice; choose another folder", .0.display())]
     Taken(PathBuf),
     /// Nobody wants the rest.
+    #[error("cancelled")]
     Cancelled,
-}
-
-impl fmt::Display for ImportFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Foreign(err) => err.fmt(f),
-            Self::Keep(err) => err.fmt(f),
-            Self::Library(err) => err.fmt(f),
-            Self::Taken(folder) => write!(
-                f,
-                "{} is there already or would be made twice; choose another folder with --into",
-                folder.display()
-            ),
-            Self::Cancelled => f.write_str("cancelled"),
-        }
-    }
 }
 
 /// Where sessions go, and what is told of them.
@@ -88,17 +77,20 @@ pub struct PartReport {
     pub imported: Imported,
 }
 
-/// Makes sessions of files. `tell` hears how many of how many steps are done and which file is next, and may break it.
+/// Makes sessions of files. `progress` hears which file is next, and may end it before the first session is made.
 pub fn import(
     request: &Request,
-    tell: &mut dyn FnMut(usize, usize, &Path) -> ControlFlow<()>,
+    progress: &dyn Progress,
 ) -> Result<Vec<FileReport>, ImportFailure> {
     let read = |path: &PathBuf| open_foreign(path, &request.told).map_err(ImportFailure::Foreign);
     // Every file is read before the first session is made: a refusal leaves nothing behind.
     let of = request.files.len() * if request.is_dry_run { 1 } else { 2 };
     let (mut taken, mut reports) = (BTreeSet::new(), Vec::new());
     for (done, path) in request.files.iter().enumerate() {
-        if tell(done, of, path).is_break() {
+        if progress
+            .tell(done, of, &path.display().to_string())
+            .is_break()
+        {
             return Err(ImportFailure::Cancelled);
         }
         let foreign = read(path)?;
@@ -108,7 +100,8 @@ pub fn import(
     if !request.is_dry_run {
         for (done, (path, file)) in request.files.iter().zip(&mut reports).enumerate() {
             // Sessions that are made stay.
-            let _ = tell(request.files.len() + done, of, path);
+            let name = path.display().to_string();
+            let _ = progress.tell(request.files.len() + done, of, &name);
             let foreign = read(path)?;
             for (part, told) in foreign.parts.iter().zip(&mut file.parts) {
                 told.session = Some(make(part, &foreign.bytes, request)?);
@@ -193,8 +186,7 @@ pub fn text(file: &FileReport) -> String {
 }
 
 /// Makes sessions of files and tells what was made of each, in lines; for the window.
-pub fn import_and_tell(request: &Request, progress: &Progress) -> Result<Vec<String>, String> {
-    let mut tell = |done, of, path: &Path| progress.tell(done, of, &path.display().to_string());
-    let reports = import(request, &mut tell).map_err(|err| err.to_string())?;
+pub fn import_and_tell(request: &Request, progress: &dyn Progress) -> Result<Vec<String>, String> {
+    let reports = import(request, progress).map_err(|err| err.to_string())?;
     Ok(reports.iter().map(text).collect())
 }

@@ -5,6 +5,7 @@
 //!
 //! Start reading at [`source`], which makes samples of a session or a table, and [`fit`].
 
+pub mod analyse;
 pub mod analysed;
 pub mod analyses;
 pub mod calibrations;
@@ -25,6 +26,7 @@ pub mod imports;
 pub mod margin;
 pub mod opening;
 pub mod origin;
+pub mod plan;
 pub mod pool;
 pub mod progress;
 pub mod recorded;
@@ -33,4 +35,5 @@ pub mod scene;
 pub mod scene_bench;
 pub mod select;
 pub mod source;
+pub mod sources;
 pub mod trade;

@@ -4,30 +4,61 @@ use std::ops::ControlFlow;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-/// What a worker tells while it works.
+/// Whoever watches work: a bar, a window, a test.
+pub trait Progress {
+    /// `done` of `of` pieces of like length are done and `what` comes next. Break: nobody wants the rest.
+    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()>;
+
+    /// This share of the whole is done, 0 to 1. False: nobody wants the rest.
+    fn share(&self, share: f64, what: &str) -> bool {
+        let done = (SHARES as f64 * share) as usize;
+        self.tell(done, SHARES, what).is_continue()
+    }
+}
+
+/// Parts of a whole that can be told apart.
+const SHARES: usize = 1000;
+
+impl<F: Fn(usize, usize, &str) -> ControlFlow<()>> Progress for F {
+    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+        self(done, of, what)
+    }
+}
+
+/// Nobody watches, and everything is wanted.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Unwatched;
+
+impl Progress for Unwatched {
+    fn tell(&self, _: usize, _: usize, _: &str) -> ControlFlow<()> {
+        ControlFlow::Continue(())
+    }
+}
+
+/// The progress of a task on another thread, which may be cancelled from here.
 #[derive(Debug, Default)]
-pub struct Progress {
+pub struct TaskProgress {
     done: AtomicUsize,
     of: AtomicUsize,
     what: Mutex<String>,
     is_cancelled: AtomicBool,
 }
 
-impl Progress {
-    /// `done` of `of` pieces of like length are done and `what` comes next. Break: nobody wants the rest.
-    pub fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+impl Progress for TaskProgress {
+    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
         self.done.store(done, Ordering::Relaxed);
         self.of.store(of, Ordering::Relaxed);
         let mut text = self.what.lock().unwrap_or_else(PoisonError::into_inner);
         text.clear();
         text.push_str(what);
-        if self.is_cancelled.load(Ordering::Relaxed) {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
+        match self.is_cancelled() {
+            true => ControlFlow::Break(()),
+            false => ControlFlow::Continue(()),
         }
     }
+}
 
+impl TaskProgress {
     /// Asks the work to end at its next piece.
     pub fn cancel(&self) {
         self.is_cancelled.store(true, Ordering::Relaxed);

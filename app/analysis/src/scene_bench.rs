@@ -1,5 +1,6 @@
 //! What exactness costs in a scene on this computer, and the cheapest way that a scene's tolerances allow.
 
+use crate::progress::Progress;
 use crate::trade::{self, Extent, SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 use palpate_haptics::surface::{
     Contact, Cut, Grid, HeightField, Method, Needs, NoPlan, Recovery, SceneCurves, ScenePlan, Side,
@@ -53,7 +54,7 @@ pub struct Bench {
 pub fn bench(
     file: &SceneFile,
     extent: Extent,
-    progress: &trade::Progress<'_>,
+    progress: &dyn Progress,
 ) -> Result<Option<Bench>, String> {
     let Some(curves) = measure_scene(extent, progress)? else {
         return Ok(None);

@@ -1,23 +1,30 @@
-//! From sources on disk to a comparison of models, as the command line and the window both make it.
+//! From recordings on disk to a comparison of models.
 
-use crate::source::{self, SourceError, Stretch};
-use palpate_rheology::fit::FitSample;
+use crate::compliance::Corrections;
+use crate::progress::Progress;
+use crate::source::Wanted;
+use crate::sources::{self, Naming, Reading, Recordings, SourcesError};
 use palpate_rheology::select::{SelectError, SelectOptions, Selection, select};
-use std::fmt;
-use std::ops::ControlFlow;
-use std::path::{Path, PathBuf};
+use palpate_runner::Stopwatch;
+use palpate_tables::import::ColumnNames;
+use std::path::PathBuf;
+use thiserror::Error;
 
-/// A source read for a comparison.
-#[derive(Clone, Debug)]
-pub struct SelectSource {
-    /// Its name: that of the folder or file.
-    pub name: String,
-    /// What is fitted.
-    pub samples: Vec<FitSample>,
-    /// What its reader remarked.
-    pub notes: Vec<String>,
-    /// The specimen pressed, where the source says so.
-    pub specimen: Option<String>,
+/// What is compared on what.
+#[derive(Debug, Default)]
+pub struct SelectRequest {
+    /// Recordings, or folders of them.
+    pub paths: Vec<PathBuf>,
+    /// Names of the columns of tables without a header.
+    pub columns: Option<ColumnNames>,
+    /// Which part of each, and whether rejected ones are taken.
+    pub wanted: Wanted,
+    /// Families, tolerance and what is held out; specimens are those of `specimens`.
+    pub options: SelectOptions,
+    /// The specimen of each recording in turn; without it what they say of themselves.
+    pub specimens: Option<Vec<String>>,
+    /// What the recordings are called.
+    pub naming: Naming,
 }
 
 /// A comparison and what it was made of.
@@ -25,74 +32,71 @@ pub struct SelectSource {
 pub struct Selected {
     /// The comparison.
     pub selection: Selection,
-    /// Remarks about the sources, each with the name of its source.
+    /// Remarks about the recordings, each with the name of its own.
     pub notes: Vec<String>,
+    /// Wall seconds of the comparison alone.
+    pub seconds: f64,
 }
 
 /// No comparison.
-#[derive(Debug)]
+#[derive(Debug, Error)]
+#[non_exhaustive]
 pub enum SelectFailure {
-    /// This source cannot be read.
-    Source(PathBuf, Box<SourceError>),
+    /// The recordings cannot be read.
+    #[error(transparent)]
+    Sources(#[from] SourcesError),
+    /// There is not a specimen's name for each of them.
+    #[error("{names} specimens are named and there are {sources} sources; give one name for each")]
+    Specimens {
+        /// Names that are not empty.
+        names: usize,
+        /// Recordings.
+        sources: usize,
+    },
     /// The records cannot be compared.
-    Select(SelectError),
+    #[error(transparent)]
+    Select(#[from] SelectError),
 }
 
-impl fmt::Display for SelectFailure {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Source(path, reason) => write!(f, "{}: {reason}", path.display()),
-            Self::Select(reason) => reason.fmt(f),
-        }
-    }
-}
-
-/// Reads every source and compares models on all of them together.
+/// Reads every recording and compares models on all of them together.
 pub fn select_sources(
-    paths: &[PathBuf],
-    stretch: Stretch,
-    mut options: SelectOptions,
-    progress: &dyn Fn(usize, usize, &str) -> ControlFlow<()>,
+    mut request: SelectRequest,
+    progress: &dyn Progress,
 ) -> Result<Selected, SelectFailure> {
-    let sources = paths
-        .iter()
-        .map(|path| read(path, stretch))
-        .collect::<Result<Vec<SelectSource>, _>>()?;
-    let records: Vec<(&str, &[FitSample])> = sources
-        .iter()
-        .map(|source| (source.name.as_str(), source.samples.as_slice()))
-        .collect();
-    options.specimens = sources
-        .iter()
-        .map(|source| source.specimen.clone())
-        .collect();
-    let selection = select(&records, &options, &|news| {
-        progress(news.done, news.total, &format!("fitting {}", news.family))
-    })
-    .map_err(SelectFailure::Select)?;
-    let notes = sources.iter().flat_map(|source| {
-        source
-            .notes
-            .iter()
-            .map(|note| format!("{}: {note}", source.name))
-    });
+    let found = sources::find(&request.paths)?;
+    let how = Reading {
+        columns: request.columns.as_ref(),
+        wanted: request.wanted,
+        corrections: &Corrections::none(None),
+        naming: request.naming,
+    };
+    let records = sources::read(&found.paths, how)?;
+    request.options.specimens = specimens(request.specimens.take(), &records)?;
+    let watch = Stopwatch::start();
+    let selection = select(&records.borrowed(), &request.options, &|news| {
+        progress.tell(news.done, news.total, &news.family)
+    })?;
     Ok(Selected {
-        notes: notes.collect(),
         selection,
+        seconds: watch.seconds(),
+        notes: found.note().into_iter().chain(records.notes).collect(),
     })
 }
 
-fn read(path: &Path, stretch: Stretch) -> Result<SelectSource, SelectFailure> {
-    let source = source::read_stretch(path, None, stretch)
-        .map_err(|reason| SelectFailure::Source(path.to_path_buf(), Box::new(reason)))?;
-    let name = path.file_stem().map_or_else(
-        || path.display().to_string(),
-        |stem| stem.to_string_lossy().into_owned(),
-    );
-    Ok(SelectSource {
-        name,
-        samples: source.samples,
-        notes: source.notes,
-        specimen: source.specimen,
-    })
+fn specimens(
+    names: Option<Vec<String>>,
+    records: &Recordings,
+) -> Result<Vec<Option<String>>, SelectFailure> {
+    let Some(names) = names else {
+        let told = records.all.iter().map(|one| one.specimen.clone());
+        return Ok(told.collect());
+    };
+    let known = names.iter().filter(|name| !name.is_empty()).count();
+    if known != names.len() || known != records.all.len() {
+        return Err(SelectFailure::Specimens {
+            names: known,
+            sources: records.all.len(),
+        });
+    }
+    Ok(names.into_iter().map(Some).collect())
 }

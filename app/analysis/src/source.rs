@@ -14,6 +14,7 @@ use thiserror::Error;
 
 use crate::analysed::{self, Opened};
 use crate::compliance::CorrectionError;
+use crate::sources::is_session;
 use palpate_protocols::engine::{Effect, Record};
 
 /// Samples for a fit, and what a reader should know about them.
@@ -59,6 +60,17 @@ impl Wanted {
         Self {
             is_rejected_included: true,
             ..Self::default()
+        }
+    }
+}
+
+impl Stretch {
+    /// With the way back or without.
+    #[must_use]
+    pub fn with_unload(is_wanted: bool) -> Self {
+        match is_wanted {
+            true => Self::WithUnload,
+            false => Self::RampHold,
         }
     }
 }
@@ -219,11 +231,7 @@ pub fn read_analysed(
         stretch,
         is_rejected_included,
     } = wanted.into();
-    let is_session = path.is_dir()
-        || path
-            .extension()
-            .is_some_and(|extension| extension == "mcap");
-    if !is_session && path.exists() {
+    if !is_session(path) {
         if let Some(name) = analysis {
             return Err(SourceError::TableAnalysis {
                 name: name.to_owned(),

@@ -1,18 +1,16 @@
 //! `palpate analyse`: what the cycles of a record show.
 
 use super::output::Output;
-use super::{Failure, last_fit, new_file, source_failure};
+use super::{Failure, known_fit_failure, new_file, source_failure};
 use clap::Args;
-use palpate_analysis::report::cycles::{CycleReport, Question, object, picture, whole};
-use palpate_analysis::{cycles, source};
+use palpate_analysis::analyse::{AnalyseFailure, analyse};
+use palpate_analysis::fit::KnownFit;
+use palpate_analysis::report::cycles::{Question, object, picture, whole};
 use palpate_model::units::Depth;
-use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::cycles::SteadyRule;
-use palpate_rheology::fit::{FitOptions, fit};
-use palpate_tables::import::ColumnNames;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
-/// Arguments of `palpate analyse`.
+/// Tell what the cycles of a record show: loops, shift, decay, relaxation
 #[derive(Debug, Args)]
 pub struct AnalyseArgs {
     /// Session folders, or delimited tables with columns for time, depth and force
@@ -36,9 +34,6 @@ pub struct AnalyseArgs {
     /// Draw loops, peaks, shift and relaxation of a single source as a new SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 fn positive(text: &str) -> Result<f64, String> {
@@ -57,10 +52,8 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("plot", args.plot.as_deref())?;
     let columns = args.columns.as_deref().map(str::parse).transpose();
     let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
-    let body = args
-        .validate
-        .as_deref()
-        .map(|path| fitted(path, columns.as_ref()));
+    let fitted = args.validate.as_deref();
+    let fitted = fitted.map(|path| KnownFit::of(path, columns.as_ref())?.0.body());
     let question = Question {
         at: args.at.map(Depth),
         rule: SteadyRule {
@@ -68,23 +61,15 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
             ..SteadyRule::default()
         },
         frequency: args.frequency,
-        body: body.transpose()?,
+        body: fitted.transpose().map_err(known_fit_failure)?,
     };
-    let mut reports = Vec::new();
-    let bar = output.count_bar(args.sources.len() as u64);
-    for path in &args.sources {
-        let source = cycles::read(path, columns.as_ref()).map_err(source_failure)?;
-        let report = CycleReport::of(path.display().to_string(), source, &question);
-        if report.cycles.is_empty() && report.sines.is_empty() {
-            return Err(Failure::failed(format!(
-                "no way in with at least 20 samples was found in {}; record one, or name the frequency of a sine",
-                path.display()
-            )));
-        }
-        reports.push(report);
-        bar.inc(1);
-    }
-    bar.finish_and_clear();
+    let bar = output.count_bar(0);
+    let reports = analyse(&args.sources, columns.as_ref(), &question, &bar);
+    drop(bar);
+    let reports = reports.map_err(|err| match err {
+        AnalyseFailure::Source(err) => source_failure(err),
+        err => Failure::failed(err),
+    })?;
     let fitted = args
         .validate
         .as_ref()
@@ -95,17 +80,4 @@ pub(super) fn run(args: &AnalyseArgs, output: &Output) -> Result<(), Failure> {
         parts.join("\n\n")
     });
     new_file::write("plot", args.plot.as_deref(), || picture(&reports[0]))
-}
-
-/// The body to predict with: as it was fitted, or fitted now.
-fn fitted(path: &Path, columns: Option<&ColumnNames>) -> Result<ModifiedKelvin, Failure> {
-    if path.extension().is_some_and(|ending| ending == "json") {
-        return last_fit::read(path)?.body().map_err(Failure::usage);
-    }
-    let source = source::read_named(path, columns).map_err(source_failure)?;
-    let report = fit(&source.samples, &FitOptions::default())
-        .map_err(|err| Failure::failed(format!("{} cannot be fitted: {err}", path.display())))?;
-    report
-        .kelvin()
-        .ok_or_else(|| Failure::failed("the fit is of another body"))
 }

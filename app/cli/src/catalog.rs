@@ -1,52 +1,33 @@
 //! `palpate catalog`: the file in which `palpate find` looks, made anew or compared with the sessions.
 
 use super::Failure;
-use super::output::Output;
-use clap::{Args, Subcommand};
-use indicatif::ProgressBar;
+use super::output::{Bar, Output};
+use clap::Subcommand;
 use palpate_runner::Stopwatch;
 use palpate_sessions::catalog::{CATALOG_FILE, Catalog, CatalogError, Changes, Doubt};
 use palpate_sessions::library_folder;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// The commands on the catalog.
+/// Make the catalog of the library anew, or check it
 #[derive(Debug, Subcommand)]
 pub enum CatalogCommand {
     /// Make the catalog anew from the sessions of the library
-    Rebuild(CatalogArgs),
+    Rebuild,
     /// Read every session and compare it with the catalog
-    Check(CatalogArgs),
-}
-
-/// Arguments of `palpate catalog ...`.
-#[derive(Debug, Args)]
-pub struct CatalogArgs {
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-impl CatalogCommand {
-    /// Whether it prints JSON.
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::Rebuild(args) | Self::Check(args) => args.json,
-        }
-    }
+    Check,
 }
 
 pub(super) fn run(command: &CatalogCommand, output: &Output) -> Result<(), Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     match command {
-        CatalogCommand::Rebuild(_) => rebuild(&library, output),
-        CatalogCommand::Check(_) => check(&library, output),
+        CatalogCommand::Rebuild => rebuild(&library, output),
+        CatalogCommand::Check => check(&library, output),
     }
 }
 
 #[derive(Serialize)]
 struct RebuildReport {
-    command: &'static str,
     file: PathBuf,
     #[serde(flatten)]
     changes: Changes,
@@ -75,14 +56,13 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
         })
     });
     let report = RebuildReport {
-        command: "catalog rebuild",
         file: library.join(CATALOG_FILE),
         changes,
         unreadable: unreadable.collect(),
         seconds: watch.seconds(),
     };
     say(&report.changes.remarks, output);
-    output.result(&report, || {
+    output.answer("catalog rebuild", &report, || {
         let mut lines = vec![format!(
             "{} sessions read in {:.2} s, {}",
             report.changes.sessions,
@@ -98,7 +78,6 @@ fn rebuild(library: &Path, output: &Output) -> Result<(), Failure> {
 
 #[derive(Serialize)]
 struct CheckReport {
-    command: &'static str,
     file: PathBuf,
     sessions: usize,
     doubts: Vec<Doubt>,
@@ -112,16 +91,17 @@ fn check(library: &Path, output: &Output) -> Result<(), Failure> {
     })?;
     drop(bar);
     let report = CheckReport {
-        command: "catalog check",
         file: library.join(CATALOG_FILE),
         sessions,
         doubts,
     };
-    output.result(&report, || match report.doubts.as_slice() {
-        [] => format!("the catalog agrees with its {sessions} sessions"),
-        doubts => {
-            let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
-            doubts.iter().map(line).collect::<Vec<_>>().join("\n")
+    output.answer("catalog check", &report, || {
+        match report.doubts.as_slice() {
+            [] => format!("the catalog agrees with its {sessions} sessions"),
+            doubts => {
+                let line = |one: &Doubt| format!("{}: {}", one.folder, one.sentence);
+                doubts.iter().map(line).collect::<Vec<_>>().join("\n")
+            }
         }
     });
     match report.doubts.len() {
@@ -171,7 +151,7 @@ struct LateBar<'a> {
     output: &'a Output,
     message: &'static str,
     watch: Stopwatch,
-    bar: Option<ProgressBar>,
+    bar: Option<Bar>,
 }
 
 /// Seconds of work that nobody needs a bar for.
@@ -195,14 +175,6 @@ impl<'a> LateBar<'a> {
         }
         if let Some(bar) = &self.bar {
             bar.set_position(done as u64);
-        }
-    }
-}
-
-impl Drop for LateBar<'_> {
-    fn drop(&mut self) {
-        if let Some(bar) = &self.bar {
-            bar.finish_and_clear();
         }
     }
 }

@@ -13,7 +13,7 @@ use palpate_sessions::shelf::{LibraryError, save, supersede};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Arguments of `palpate compliance`.
+/// Find how far a rig gives way, from a session of stiff-surface
 #[derive(Debug, Args)]
 pub struct ComplianceArgs {
     /// Session folder of a stiff-surface run
@@ -24,14 +24,10 @@ pub struct ComplianceArgs {
     /// Keep it in the library, in the place of the one in force for the rig
     #[arg(long)]
     save: bool,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
 struct Report<'a> {
-    command: &'static str,
     /// Its id in the library, null where it was not kept.
     id: Option<&'a str>,
     file: Option<&'a PathBuf>,
@@ -63,14 +59,13 @@ pub(super) fn run(args: &ComplianceArgs, output: &Output) -> Result<(), Failure>
     let kept = args.save.then(|| keep(&found)).transpose()?;
     let document = kept.as_ref().map_or(&found, |kept| &kept.document);
     let report = Report {
-        command: "compliance",
         id: kept.as_ref().map(|kept| kept.id.as_str()),
         file: kept.as_ref().map(|kept| &kept.path),
         um_per_n: 1e3 * document.mm_per_n,
         std_error_um_per_n: 1e3 * document.std_error_mm_per_n,
         document,
     };
-    output.result(&report, || text(document, kept.as_ref()));
+    output.answer("compliance", &report, || text(document, kept.as_ref()));
     Ok(())
 }
 

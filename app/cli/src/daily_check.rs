@@ -17,7 +17,7 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// Arguments of `palpate daily-check`.
+/// Check zero, one known weight and the way home; the result counts for the day
 #[derive(Debug, Args)]
 pub struct DailyCheckArgs {
     /// The known weight in g
@@ -31,14 +31,10 @@ pub struct DailyCheckArgs {
     /// Who makes the check
     #[arg(long, default_value = "")]
     operator: String,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
 struct Checked<'a> {
-    command: &'static str,
     rig: &'a str,
     session: PathBuf,
     calibration: &'a str,
@@ -105,14 +101,13 @@ pub(super) fn run(args: &DailyCheckArgs, output: &Output) -> Result<(), Failure>
     };
     add_check(&library, &check).map_err(Failure::failed)?;
     let checked = Checked {
-        command: "daily-check",
         rig: &check.rig,
         session: view.folder.clone(),
         calibration: &check.calibration,
         is_passed: check.is_passed,
         parts: &check.parts,
     };
-    output.result(&checked, || text(&checked));
+    output.answer("daily-check", &checked, || text(&checked));
     match check.is_passed {
         true => Ok(()),
         false => Err(Failure::failed(format!(

@@ -1,42 +1,23 @@
-//! `palpate doctor` and `palpate recover`: in which state sessions are, and what can be kept of them.
+//! `palpate doctor`: in which state sessions are.
 
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_runner::wall_now;
 use palpate_sessions::atomic::leftovers;
 use palpate_sessions::library_folder;
-use palpate_sessions::recover::{
-    Health, Missing, Patient, RecoverError, examine, examine_library, recover, recover_library,
-};
+use palpate_sessions::recover::{Health, Patient, examine};
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-const VERSION: &str = env!("CARGO_PKG_VERSION");
-
-/// Arguments of `palpate doctor`.
+/// Tell in which state sessions are: whole, interrupted, damaged, newer or something else
 #[derive(Debug, Args)]
 pub struct DoctorArgs {
     /// Session folders or files; without any, every session of the library (~/palpate or PALPATE_HOME)
     sessions: Vec<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
-}
-
-/// Arguments of `palpate recover`.
-#[derive(Debug, Args)]
-pub struct RecoverArgs {
-    /// Session folders; without any, every unfinished session of the library
-    sessions: Vec<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
 struct Visit {
-    command: &'static str,
     sessions: Vec<Patient>,
     /// How many cannot be used as they are.
     unwell: usize,
@@ -44,34 +25,7 @@ struct Visit {
     leftovers: Vec<PathBuf>,
 }
 
-#[derive(Serialize)]
-struct Recovered {
-    session: PathBuf,
-    recovered: PathBuf,
-    session_id: String,
-    samples: u64,
-    raw_bytes: u64,
-    missing: Missing,
-    #[serde(skip)]
-    sentences: Vec<String>,
-}
-
-/// A session that was not recovered.
-#[derive(Serialize)]
-struct NotRecovered {
-    session: PathBuf,
-    error: String,
-    exit: u8,
-}
-
-#[derive(Serialize)]
-struct Recoveries {
-    command: &'static str,
-    sessions: Vec<Recovered>,
-    not_recovered: Vec<NotRecovered>,
-}
-
-pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
+pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
     let (paths, places) = if args.sessions.is_empty() {
         let library = library_folder().map_err(Failure::usage)?;
         // Exports go to where the user is, if nothing else is said.
@@ -91,12 +45,11 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
     let leftovers: Vec<PathBuf> = left.collect();
     let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
     let visit = Visit {
-        command: "doctor",
         sessions,
         unwell,
         leftovers,
     };
-    output.result(&visit, || {
+    output.answer("doctor", &visit, || {
         let count = visit.sessions.len();
         let mut lines: Vec<String> = visit.sessions.iter().map(patient_text).collect();
         lines.extend(visit.leftovers.iter().map(|path| {
@@ -121,7 +74,7 @@ pub(super) fn doctor(args: &DoctorArgs, output: &Output) -> Result<(), Failure> 
 }
 
 /// One session after the other, with progress.
-fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec<T> {
+pub(super) fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec<T> {
     let bar = output.count_bar(paths.len() as u64);
     let done = paths
         .iter()
@@ -132,7 +85,7 @@ fn each<T>(paths: &[PathBuf], output: &Output, work: impl Fn(&Path) -> T) -> Vec
             done
         })
         .collect();
-    bar.finish_and_clear();
+    drop(bar);
     done
 }
 
@@ -201,83 +154,4 @@ fn all_sessions(library: &Path) -> Result<Vec<PathBuf>, Failure> {
     }
     paths.sort_unstable();
     Ok(paths)
-}
-
-pub(super) fn run_recover(args: &RecoverArgs, output: &Output) -> Result<(), Failure> {
-    let paths = if args.sessions.is_empty() {
-        unfinished(&library_folder().map_err(Failure::usage)?)?
-    } else {
-        args.sessions.clone()
-    };
-    let mut recoveries = Recoveries {
-        command: "recover",
-        sessions: Vec::new(),
-        not_recovered: Vec::new(),
-    };
-    let mut lines = Vec::new();
-    for (path, outcome) in paths.iter().zip(each(&paths, output, one)) {
-        match outcome {
-            Ok(one) => {
-                lines.extend(one.sentences.iter().cloned());
-                recoveries.sessions.push(one);
-            }
-            // With one session there is nothing to go on with, and the error is the answer.
-            Err(failure) if paths.len() == 1 => return Err(failure),
-            Err(failure) => {
-                lines.push(format!("not recovered: {}", failure.sentence()));
-                recoveries.not_recovered.push(NotRecovered {
-                    session: path.clone(),
-                    error: failure.sentence().into(),
-                    exit: failure.code(),
-                });
-            }
-        }
-    }
-    output.result(&recoveries, || match lines.is_empty() {
-        true => "nothing to recover".into(),
-        false => lines.join("\n"),
-    });
-    let failed = &recoveries.not_recovered;
-    let sentence = || format!("{} of {} were not recovered", failed.len(), paths.len());
-    // A failure weighs more than wrong use.
-    match failed.iter().map(|one| one.exit).min() {
-        None => Ok(()),
-        Some(1) => Err(Failure::failed(sentence())),
-        Some(_) => Err(Failure::usage(sentence())),
-    }
-}
-
-fn unfinished(library: &Path) -> Result<Vec<PathBuf>, Failure> {
-    examine_library(library).map_err(|err| {
-        Failure::failed(format!(
-            "cannot read {} ({err}); check its permissions",
-            library.display()
-        ))
-    })
-}
-
-fn one(path: &Path) -> Result<Recovered, Failure> {
-    let recovery = recover(path, VERSION, wall_now().into()).map_err(|err| match err {
-        RecoverError::Read(err) => super::read_failure(err),
-        RecoverError::Whole { .. }
-        | RecoverError::InUse { .. }
-        | RecoverError::InProgress { .. }
-        | RecoverError::Before { .. } => Failure::usage(err),
-        _ => Failure::failed(err),
-    })?;
-    Ok(Recovered {
-        sentences: recovery.sentences(path),
-        session: path.into(),
-        recovered: recovery.folder,
-        session_id: recovery.session_id,
-        samples: recovery.salvage.samples,
-        raw_bytes: recovery.salvage.raw_bytes,
-        missing: recovery.salvage.missing,
-    })
-}
-
-/// Recovers what a crash left unfinished in a library, and says so; what fails is only told.
-pub(super) fn recover_unfinished(library: &Path, output: &Output) {
-    let told = recover_library(library, VERSION, wall_now().into());
-    told.iter().for_each(|line| output.note(line));
 }

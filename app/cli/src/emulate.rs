@@ -27,7 +27,7 @@ const UNO: f64 = 1.003;
 /// Orders that may wait; a person types them.
 const ORDERS_MAX: usize = 16;
 
-/// Which device.
+/// Answer like a controller on a wire, with the simulated bench behind it
 #[derive(Debug, Subcommand)]
 pub enum EmulateCommand {
     /// A Galil DMC controller: axis A the slide with the probe, analog input 1 the load cell
@@ -36,17 +36,6 @@ pub enum EmulateCommand {
     Grbl(GrblArgs),
     /// A Mark-10 stand ESM303 with a force gauge on it
     Mark10(Mark10Args),
-}
-
-impl EmulateCommand {
-    /// Whether one object is printed.
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::Galil(args) => args.wire.json,
-            Self::Grbl(args) => args.wire.json,
-            Self::Mark10(args) => args.wire.json,
-        }
-    }
 }
 
 /// The wire to an emulated device.
@@ -67,9 +56,6 @@ struct WireArgs {
     /// A fault, KIND@SECONDS[:DURATION]: garbage, drop, duplicate, partial, late, deaf, mute, reset, disconnect, stuck, saturated or wrong-device; may be repeated. Lines KIND[:DURATION] on standard input begin at once; so do load GRAMS, mount NUMBER and unmount
     #[arg(long, value_name = "FAULT")]
     fault: Vec<ScheduledFault>,
-    /// Print one JSON object when it is ready
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate emulate galil`.
@@ -168,7 +154,6 @@ fn ppm(text: &str) -> Result<f64, String> {
 
 #[derive(Serialize)]
 struct Ready<'a> {
-    command: &'static str,
     device: &'static str,
     model: String,
     at: &'a str,
@@ -200,14 +185,13 @@ fn galil(args: &GalilArgs, output: &Output) -> Result<(), Failure> {
     });
     let mut ready = |at: &str| {
         let object = Ready {
-            command: "emulate",
             device: "galil",
             model: args.model.to_string(),
             at,
             cell_at: None,
             is_serial,
         };
-        output.result(&object, || {
+        output.answer("emulate", &object, || {
             format!("{} at {at}; Ctrl-C ends it", args.model)
         });
     };
@@ -253,14 +237,13 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
     let mut ready = |places: &str| {
         let (at, cell_at) = places.split_once(", ").unwrap_or((places, ""));
         let object = Ready {
-            command: "emulate",
             device: "grbl",
             model: format!("1.1h with {model}"),
             at,
             cell_at: Some(cell_at),
             is_serial: args.wire.tcp.is_none(),
         };
-        output.result(&object, || {
+        output.answer("emulate", &object, || {
             format!("Grbl 1.1h at {at}, {model} at {cell_at}; Ctrl-C ends it")
         });
     };
@@ -281,14 +264,15 @@ fn mark10(args: &Mark10Args, output: &Output) -> Result<(), Failure> {
     let is_serial = args.wire.tcp.is_none();
     let mut ready = |at: &str| {
         let object = Ready {
-            command: "emulate",
             device: "mark10",
             model: "ESM303".into(),
             at,
             cell_at: None,
             is_serial,
         };
-        output.result(&object, || format!("ESM303 at {at}; Ctrl-C ends it"));
+        output.answer("emulate", &object, || {
+            format!("ESM303 at {at}; Ctrl-C ends it")
+        });
     };
     emulate(&mut device, &args.wire, None, seed, &mut ready, output)
 }

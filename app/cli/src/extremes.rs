@@ -6,12 +6,10 @@ use super::output::Output;
 use clap::Args;
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{PAGE_HEAD, page, text};
-use palpate_rheology::extremes::{Extent, Row, Verdict};
-use serde::Serialize;
-use std::ops::ControlFlow;
+use palpate_rheology::extremes::{Extent, Verdict};
 use std::path::{Path, PathBuf};
 
-/// Arguments of `palpate extremes`.
+/// Test numerical stability at the extremes, every family, integrator and fit
 #[derive(Debug, Args)]
 pub struct ExtremesArgs {
     /// Corners and middles of every table only, in seconds
@@ -26,20 +24,6 @@ pub struct ExtremesArgs {
     /// Write the page with all tables here
     #[arg(long, value_name = "FILE.md")]
     page: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Serialize)]
-struct Extremes<'a> {
-    command: &'static str,
-    extent: &'static str,
-    right: usize,
-    refused: usize,
-    flagged: usize,
-    wrong: usize,
-    rows: &'a [Row],
 }
 
 pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
@@ -51,30 +35,16 @@ pub(super) fn run(args: &ExtremesArgs, output: &Output) -> Result<(), Failure> {
     if !args.page.as_deref().is_some_and(is_own_page) {
         new_file::check("page", args.page.as_deref())?;
     }
-    let bar = output.share_bar(0);
-    let rows = survey(extent, args.family.as_deref(), &|done, of, what| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-        bar.set_message(what.to_owned());
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
+    let rows = survey(extent, args.family.as_deref(), &output.share_bar());
     // Nobody ends it early here, so there is always an answer.
     let rows = rows.map_err(Failure::usage)?.unwrap_or_default();
     let count = |verdict| rows.iter().filter(|row| row.verdict == verdict).count();
     let wrong = count(Verdict::Wrong);
-    output.result(
-        &Extremes {
-            command: "extremes",
-            extent: name,
-            right: count(Verdict::Right),
-            refused: count(Verdict::Refused),
-            flagged: count(Verdict::Flagged),
-            wrong,
-            rows: &rows,
-        },
-        || text(&rows),
-    );
+    let object = serde_json::json!({
+        "extent": name, "right": count(Verdict::Right), "refused": count(Verdict::Refused),
+        "flagged": count(Verdict::Flagged), "wrong": wrong, "rows": rows,
+    });
+    output.answer("extremes", &object, || text(&rows));
     new_file::write("page", args.page.as_deref(), || page(&rows))?;
     if wrong > 0 {
         return Err(Failure::failed(format!(

@@ -14,7 +14,7 @@ use serde::Serialize;
 use std::num::NonZeroUsize;
 use std::path::PathBuf;
 
-/// Arguments of `palpate find`.
+/// Find sessions of the library
 #[derive(Debug, Args)]
 pub struct FindArgs {
     /// Words, each of which begins some word of the session
@@ -66,9 +66,6 @@ pub struct FindArgs {
     /// Which page, from 1
     #[arg(long, value_name = "N", default_value = "1")]
     page: NonZeroUsize,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -105,7 +102,6 @@ impl From<Sort> for Order {
 
 #[derive(Serialize)]
 struct FindReport<'a> {
-    command: &'static str,
     library: &'a PathBuf,
     count: usize,
     page: usize,
@@ -146,13 +142,12 @@ pub(super) fn run(args: &FindArgs, output: &Output) -> Result<(), Failure> {
     })?;
     doubts.iter().for_each(|doubt| output.note(doubt));
     let object = FindReport {
-        command: "find",
         library: &library,
         count: found.count,
         page,
         pages: found.count.div_ceil(limit),
         sessions: &found.entries,
     };
-    output.result(&object, || report::list(&found, page, object.pages));
+    output.answer("find", &object, || report::list(&found, page, object.pages));
     Ok(())
 }

@@ -8,8 +8,9 @@ use super::scene::{ReplayArgs, told};
 use super::slave::{self, SlaveArgs};
 use clap::{Args, Subcommand, ValueEnum};
 use palpate_analysis::follow_session::keep_followed;
-use palpate_analysis::haptics::{Checked, Followed, Paced, Setting, body_of, check, follow, pace};
+use palpate_analysis::haptics::{Setting, body_of, check, follow, pace};
 use palpate_analysis::haptics_tape::{recorder, replay};
+use palpate_analysis::progress::Progress;
 use palpate_analysis::report::haptics::{
     bench_text, check_text, follow_plot, follow_table, follow_text, run_text,
 };
@@ -17,10 +18,9 @@ use palpate_haptics::check::CheckSettings;
 use palpate_haptics::{DriveKind, Period};
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What to do with a body on a device.
+/// Feel a fitted body through a master-slave device: check it, run it, time its loop
 #[derive(Debug, Subcommand)]
 pub enum HapticsCommand {
     /// Tell before play where a body can return energy, what damping it needs, and what the guard does about it
@@ -35,21 +35,6 @@ pub enum HapticsCommand {
     Slave(SlaveArgs),
     /// Time the loop on this computer at several rates, idle and beside busy threads
     Bench(BenchArgs),
-}
-
-impl HapticsCommand {
-    /// Whether one JSON object is wanted.
-    #[must_use]
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::Check(args) => args.json,
-            Self::Run(args) => args.json,
-            Self::Replay(args) => args.json,
-            Self::Follow(args) => args.json,
-            Self::Slave(args) => args.json,
-            Self::Bench(args) => args.json,
-        }
-    }
 }
 
 /// The motor's drive.
@@ -131,9 +116,6 @@ pub struct CheckArgs {
     source: PathBuf,
     #[command(flatten)]
     device: DeviceArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate haptics run`.
@@ -150,9 +132,6 @@ pub struct RunArgs {
     /// Record every tick in this new folder, which 'palpate haptics replay' computes again
     #[arg(long, value_name = "DIR")]
     record: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate haptics follow`.
@@ -182,9 +161,6 @@ pub struct FollowArgs {
     /// Make a session of the samples in a new folder, as 'palpate import' would of the table
     #[arg(long, value_name = "FOLDER")]
     out: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate haptics bench`.
@@ -199,37 +175,6 @@ pub struct BenchArgs {
     /// Busy threads beside the loop in the second half of the table
     #[arg(long, default_value_t = 2, value_parser = clap::value_parser!(u8).range(0..=64), value_name = "THREADS")]
     busy: u8,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-#[derive(Serialize)]
-struct CheckOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    checked: &'a Checked,
-}
-
-#[derive(Serialize)]
-struct RunOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    paced: &'a Paced,
-}
-
-#[derive(Serialize)]
-struct FollowOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    followed: &'a Followed,
-}
-
-#[derive(Serialize)]
-struct BenchOutput<'a> {
-    command: &'static str,
-    seconds: f64,
-    loops: &'a [Paced],
 }
 
 /// Longest run asked for, in s: a day.
@@ -263,18 +208,11 @@ pub(super) fn body(
 fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     let setting = args.device.setting()?;
     let body = body(&args.source, setting.deepest, output)?;
-    let bar = output.share_bar(1000);
-    let checked = check(body, &setting, &mut |share| {
-        bar.set_position((1000.0 * share) as u64);
-        true
-    });
-    bar.finish_and_clear();
+    let bar = output.share_bar();
+    let checked = check(body, &setting, &mut |share| bar.share(share, ""));
+    drop(bar);
     let checked = checked.map_err(Failure::usage)?;
-    let found = CheckOutput {
-        command: "haptics-check",
-        checked: &checked,
-    };
-    output.result(&found, || check_text(&checked));
+    output.answer("haptics-check", &checked, || check_text(&checked));
     Ok(())
 }
 
@@ -290,17 +228,13 @@ fn run_follow(args: &FollowArgs, output: &Output) -> Result<(), Failure> {
         friction_share: f64::from(args.help_friction) / 100.0,
         ..CheckSettings::source(body)
     };
-    let bar = output.share_bar(1000);
+    let bar = output.share_bar();
     let followed = follow(&settings, &mut |share| {
-        bar.set_position((1000.0 * share) as u64)
+        bar.share(share, "");
     });
-    bar.finish_and_clear();
+    drop(bar);
     let followed = followed.map_err(Failure::usage)?;
-    let found = FollowOutput {
-        command: "haptics-follow",
-        followed: &followed,
-    };
-    output.result(&found, || follow_text(&followed));
+    output.answer("haptics-follow", &followed, || follow_text(&followed));
     let source = args.source.display().to_string();
     new_file::write("picture", args.plot.as_deref(), || {
         follow_plot(&source, &followed)
@@ -322,29 +256,21 @@ fn run_loop(args: &RunArgs, output: &Output) -> Result<(), Failure> {
         .as_deref()
         .map(|to| recorder(to, body, &setting));
     let recorder = recorder.transpose().map_err(Failure::failed)?;
-    let bar = output.share_bar(1000);
+    let bar = output.share_bar();
     let settings = setting.simulation(body, true);
     let paced = pace(&settings, seconds, 0, recorder, &mut |share| {
-        bar.set_position((1000.0 * share) as u64);
-        true
+        bar.share(share, "")
     });
-    bar.finish_and_clear();
+    drop(bar);
     let paced = paced.map_err(Failure::failed)?;
-    let found = RunOutput {
-        command: "haptics-run",
-        paced: &paced,
-    };
-    output.result(&found, || run_text(&paced));
+    output.answer("haptics-run", &paced, || run_text(&paced));
     Ok(())
 }
 
 fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
-    let bar = output.share_bar(1000);
-    let replayed = replay(&args.folder, &mut |share| {
-        bar.set_position((1000.0 * share) as u64);
-        true
-    });
-    bar.finish_and_clear();
+    let bar = output.share_bar();
+    let replayed = replay(&args.folder, &mut |share| bar.share(share, ""));
+    drop(bar);
     told("haptics-replay", replayed, output)
 }
 
@@ -356,7 +282,7 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
         0 => vec![0],
         busy => vec![0, usize::from(busy)],
     };
-    let bar = output.share_bar(1000);
+    let bar = output.share_bar();
     let count = (periods.len() * loads.len()).max(1) as f64;
     let mut loops = Vec::new();
     for &busy in &loads {
@@ -365,19 +291,14 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
             let done = loops.len() as f64;
             let settings = setting.simulation(ModifiedKelvin::THESIS, true);
             let paced = pace(&settings, seconds, busy, None, &mut |share| {
-                bar.set_position((1000.0 * (done + share) / count) as u64);
-                true
+                bar.share((done + share) / count, "")
             });
             loops.push(paced.map_err(Failure::failed)?);
         }
     }
-    bar.finish_and_clear();
-    let found = BenchOutput {
-        command: "haptics-bench",
-        seconds,
-        loops: &loops,
-    };
-    output.result(&found, || bench_text(&loops));
+    drop(bar);
+    let found = serde_json::json!({ "seconds": seconds, "loops": loops });
+    output.answer("haptics-bench", &found, || bench_text(&loops));
     Ok(())
 }
 

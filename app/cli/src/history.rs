@@ -9,7 +9,7 @@ use palpate_sessions::catalog::{Event, Subject};
 use palpate_sessions::library_folder;
 use serde::Serialize;
 
-/// Arguments of `palpate history`.
+/// Tell what is known of a specimen, a rig or a load cell over time
 #[derive(Debug, Args)]
 pub struct HistoryArgs {
     /// Of what
@@ -17,9 +17,6 @@ pub struct HistoryArgs {
     subject: Kind,
     /// Its name; a load cell's serial number
     name: String,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -44,7 +41,6 @@ impl From<Kind> for Subject {
 
 #[derive(Serialize)]
 struct HistoryReport<'a> {
-    command: &'static str,
     subject: Subject,
     name: &'a str,
     events: &'a [Event],
@@ -67,12 +63,11 @@ pub(super) fn run(args: &HistoryArgs, output: &Output) -> Result<(), Failure> {
         )));
     }
     let object = HistoryReport {
-        command: "history",
         subject,
         name: &args.name,
         events: &events,
         remarks: &remarks,
     };
-    output.result(&object, || report::history(&events));
+    output.answer("history", &object, || report::history(&events));
     Ok(())
 }

@@ -10,10 +10,9 @@ use palpate_tables::import::{
     UnitChoice, ZeroChoice,
 };
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::PathBuf;
 
-/// Arguments of `palpate import`.
+/// Make sessions of other programs' files
 #[derive(Debug, Args)]
 pub struct ImportArgs {
     #[arg(required = true, help = format!("Files: {}", Format::sources()))]
@@ -38,9 +37,6 @@ pub struct ImportArgs {
     /// Tell more of the specimen, probe or series, such as specimen.thickness_mm=12; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     about: Vec<String>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// What is told of the files; all else is detected.
@@ -104,7 +100,6 @@ impl ToldArgs {
 
 #[derive(Serialize)]
 struct Report {
-    command: &'static str,
     is_dry_run: bool,
     files: Vec<FileReport>,
 }
@@ -118,20 +113,12 @@ pub(super) fn run(args: &ImportArgs, output: &Output) -> Result<(), Failure> {
         library: None,
         is_dry_run: args.dry_run,
     };
-    let bar = output.count_bar(0);
-    let files = import(&request, &mut |done, of, path| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-        bar.set_message(path.display().to_string());
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
+    let files = import(&request, &output.count_bar(0));
     let report = Report {
-        command: "import",
         is_dry_run: args.dry_run,
         files: files.map_err(import_failure)?,
     };
-    output.result(&report, || {
+    output.answer("import", &report, || {
         let files = report.files.iter().map(text);
         files.collect::<Vec<_>>().join("\n\n")
     });
@@ -154,6 +141,7 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Foreign(ForeignError::Io { .. }) => Failure::failed(err),
         ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
         ImportFailure::Keep(_) => Failure::failed(err),
+        ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
         _ => Failure::usage(err),
     }
 }

@@ -16,19 +16,15 @@ use palpate_sessions::{EDITS_FILE, HealthSummary, Imported};
 use serde::Serialize;
 use std::path::PathBuf;
 
-/// Arguments of `palpate info`.
+/// Tell what a session contains
 #[derive(Debug, Args)]
 pub struct InfoArgs {
     /// Session folder
     session: PathBuf,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
 struct Info<'a> {
-    command: &'static str,
     session_id: &'a str,
     started_at: String,
     software_version: &'a str,
@@ -67,13 +63,12 @@ struct Info<'a> {
 pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
     let opened = analysed::open(&args.session, None).map_err(super::source_failure)?;
     let (session, edits) = (opened.edited.session, opened.edited.edits);
-    let mut now = inputs_of(&args.session).map_err(super::analysis::failure)?;
+    let mut now = inputs_of(&args.session).map_err(super::recalibrate::failure)?;
     // The review itself is among the edits; what came after it is told by their order.
     now.retain(|one| one.what != EDITS_FILE);
     now.extend(opened.analyses.input());
     let manifest = &session.manifest;
     let info = Info {
-        command: "info",
         session_id: &manifest.session_id,
         started_at: manifest.started_at_text(),
         software_version: &manifest.software_version,
@@ -107,7 +102,7 @@ pub(super) fn run(args: &InfoArgs, output: &Output) -> Result<(), Failure> {
         analyses: &opened.analyses.all,
         notes: &session.notes,
     };
-    output.result(&info, || text(&info));
+    output.answer("info", &info, || text(&info));
     Ok(())
 }
 

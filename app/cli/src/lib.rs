@@ -4,11 +4,12 @@
 //! object. This crate knows no window: whoever has one hands it to [`main`].
 
 mod analyse;
-mod analysis;
 mod asking;
 mod calibration;
 mod catalog;
+mod completions;
 mod compliance;
+mod correct_contact;
 mod daily_check;
 mod doctor;
 mod emulate;
@@ -20,13 +21,16 @@ mod haptics;
 mod history;
 mod import;
 mod info;
-mod lake;
-mod last_fit;
+mod man;
+mod mask;
 mod new_file;
+mod note;
 mod output;
 mod plan;
 mod programme;
 mod protocol;
+mod recalibrate;
+mod recover;
 mod replay;
 mod report;
 mod review;
@@ -34,20 +38,23 @@ mod rig;
 mod run;
 mod scene;
 mod select;
-mod shell;
 mod slave;
+mod tag;
 mod trade;
 mod verdict;
+mod window;
 mod wired;
+mod withdraw;
 
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
+use palpate_analysis::fit::KnownFitError;
 use palpate_analysis::opening::Windows;
 use palpate_analysis::source::SourceError;
+use palpate_analysis::sources::SourcesError;
 use palpate_model::about::Labels;
 use palpate_sessions::log::ReadError;
-use protocol::ProtocolCommand;
 use std::process::ExitCode;
 use std::sync::Arc;
 
@@ -57,90 +64,66 @@ use std::sync::Arc;
 struct Cli {
     #[command(subcommand)]
     command: Option<Command>,
+    /// Print one JSON object, or one a line where there are several answers
+    #[arg(long, global = true)]
+    json: bool,
 }
 
-#[derive(Debug, Subcommand)]
-enum Command {
-    /// Open the window
-    Window(rig::RigArgs),
-    /// Run a protocol without a window
-    Run(Box<run::RunArgs>),
-    /// List, check, show or preview protocols
-    #[command(subcommand)]
-    Protocol(protocol::ProtocolCommand),
-    /// Check zero, one known weight and the way home; the result counts for the day
-    DailyCheck(daily_check::DailyCheckArgs),
-    /// Fit the force model to a session or a table
-    Fit(fit::FitArgs),
-    /// Tell what the cycles of a record show: loops, shift, decay, relaxation
-    #[command(alias = "analyze")]
-    Analyse(analyse::AnalyseArgs),
-    /// Compare model families and recommend the cheapest that will do
-    Select(select::SelectArgs),
-    /// Propose the shortest protocol that will tell what is wanted
-    Plan(plan::PlanArgs),
-    /// Measure error against time on this machine and recommend what to use
-    Trade(trade::TradeArgs),
-    /// Feed recorded sessions to the engine again and compare
-    Replay(replay::ReplayArgs),
-    /// Test numerical stability at the extremes, every family, integrator and fit
-    Extremes(extremes::ExtremesArgs),
-    /// Keep, show and check load-cell calibrations
-    #[command(subcommand)]
-    Calibration(calibration::CalibrationCommand),
-    /// Tell in which state sessions are: whole, interrupted, damaged, newer or something else
-    Doctor(doctor::DoctorArgs),
-    /// Keep what is whole of interrupted or damaged sessions, beside the originals
-    Recover(doctor::RecoverArgs),
-    /// Find how far a rig gives way, from a session of stiff-surface
-    Compliance(compliance::ComplianceArgs),
-    /// Make sessions of other programs' files
-    Import(Box<import::ImportArgs>),
-    /// Write a session's samples as a table, or add sessions to a lake
-    Export(export::ExportArgs),
-    /// Find sessions of the library
-    Find(Box<find::FindArgs>),
-    /// Tell what is known of a specimen, a rig or a load cell over time
-    History(history::HistoryArgs),
-    /// Make the catalog of the library anew, or check it
-    #[command(subcommand)]
-    Catalog(catalog::CatalogCommand),
-    /// Tell what a session contains
-    Info(info::InfoArgs),
-    /// Tell what happened in a run: targets and what was done, missing samples, use of time
-    Report(report::ReportArgs),
-    /// Say what a session is worth: valid, suspect or rejected
-    Verdict(verdict::VerdictArgs),
-    /// Correct where a session found contact; its log stays as it is
-    CorrectContact(verdict::CorrectArgs),
-    /// Give sessions tags to find them by, or take them away
-    Tag(review::TagArgs),
-    /// Remark on sessions, beside their logs
-    Note(review::NoteArgs),
-    /// Say that you looked at a session and what you decided, with hashes of what was seen
-    Review(review::ReviewArgs),
-    /// Make the forces of sessions anew from the raw signal with another calibration, as an analysis beside them
-    Recalibrate(analysis::RecalibrateArgs),
-    /// Name stretches of a session whose forces do not count, as an analysis beside it
-    Mask(analysis::MaskArgs),
-    /// Let an analysis count no more; its record stays
-    Withdraw(analysis::WithdrawArgs),
-    /// Look at rigs on wires: which are there, whether one is as its file says, what it reports
-    #[command(subcommand)]
-    Rig(wired::RigCommand),
-    /// Feel a fitted body through a master-slave device: check it, run it, time its loop
-    #[command(subcommand)]
-    Haptics(haptics::HapticsCommand),
-    /// See and feel a piece of tissue: run a scene, record it, compute a recording again
-    #[command(subcommand)]
-    Scene(scene::SceneCommand),
-    /// Answer like a controller on a wire, with the simulated bench behind it
-    #[command(subcommand)]
-    Emulate(emulate::EmulateCommand),
-    /// Print what completes palpate's commands in a shell
-    Completions(shell::CompletionsArgs),
-    /// Print the manual page, or write one for every command
-    Man(shell::ManArgs),
+/// Makes the commands of a table: each its arguments, which hold its help, and what carries it out.
+macro_rules! commands {
+    ($windows:ident; $($(#[$attribute:meta])* $name:ident($args:ty) => $run:path $([$more:ident])?;)*) => {
+        #[derive(Debug, Subcommand)]
+        enum Command {
+            $($(#[$attribute])* $name(Box<$args>),)*
+        }
+
+        impl Command {
+            fn run(&self, $windows: Option<&dyn Windows>, output: &Output) -> Result<(), Failure> {
+                match self {
+                    $(Self::$name(args) => $run(args, $($more,)? output),)*
+                }
+            }
+        }
+    };
+}
+
+commands! { windows;
+    Window(window::WindowArgs) => window::run [windows];
+    Run(run::RunArgs) => run::run;
+    #[command(subcommand)] Protocol(protocol::ProtocolCommand) => protocol::run;
+    DailyCheck(daily_check::DailyCheckArgs) => daily_check::run;
+    Fit(fit::FitArgs) => fit::run;
+    #[command(alias = "analyze")] Analyse(analyse::AnalyseArgs) => analyse::run;
+    Select(select::SelectArgs) => select::run;
+    Plan(plan::PlanArgs) => plan::run;
+    Trade(trade::TradeArgs) => trade::run;
+    Replay(replay::ReplayArgs) => replay::run [windows];
+    Extremes(extremes::ExtremesArgs) => extremes::run;
+    #[command(subcommand)] Calibration(calibration::CalibrationCommand) => calibration::run;
+    Doctor(doctor::DoctorArgs) => doctor::run;
+    Recover(recover::RecoverArgs) => recover::run;
+    Compliance(compliance::ComplianceArgs) => compliance::run;
+    Import(import::ImportArgs) => import::run;
+    Export(export::ExportArgs) => export::run;
+    Find(find::FindArgs) => find::run;
+    History(history::HistoryArgs) => history::run;
+    #[command(subcommand)] Catalog(catalog::CatalogCommand) => catalog::run;
+    Info(info::InfoArgs) => info::run;
+    Report(report::ReportArgs) => report::run;
+    Verdict(verdict::VerdictArgs) => verdict::run;
+    CorrectContact(correct_contact::CorrectArgs) => correct_contact::run;
+    Tag(tag::TagArgs) => tag::run;
+    Note(note::NoteArgs) => note::run;
+    Review(review::ReviewArgs) => review::run;
+    Recalibrate(recalibrate::RecalibrateArgs) => recalibrate::run;
+    Mask(mask::MaskArgs) => mask::run;
+    Withdraw(withdraw::WithdrawArgs) => withdraw::run;
+    #[command(subcommand)] Rig(wired::RigCommand) => wired::run;
+    #[command(subcommand)] Haptics(haptics::HapticsCommand) => haptics::run;
+    #[command(subcommand)] Scene(scene::SceneCommand) => scene::run;
+    #[command(subcommand)] Emulate(emulate::EmulateCommand) => emulate::run;
+    Completions(completions::CompletionsArgs) => completions::run;
+    Man(man::ManArgs) => man::run;
 }
 
 /// Why a command did not do what was asked.
@@ -161,6 +144,14 @@ impl Failure {
         Self::Failed(reason.to_string())
     }
 
+    /// The same, of something that is named before it.
+    fn of(self, name: &str) -> Self {
+        match self {
+            Self::Usage(sentence) => Self::Usage(format!("{name}: {sentence}")),
+            Self::Failed(sentence) => Self::Failed(format!("{name}: {sentence}")),
+        }
+    }
+
     fn code(&self) -> u8 {
         match self {
             Self::Usage(_) => 2,
@@ -175,6 +166,12 @@ impl Failure {
     }
 }
 
+/// Whether the arguments ask for JSON, wherever they do: among tags, and where the rest is wrong.
+fn asks_for_json() -> bool {
+    let mut named = std::env::args_os().take_while(|argument| argument != "--");
+    named.any(|argument| argument == "--json")
+}
+
 /// Parses the arguments; a mistake gets one sentence, and one object with `--json`.
 fn parse() -> Result<Cli, ExitCode> {
     Cli::try_parse().map_err(|err| {
@@ -183,12 +180,7 @@ fn parse() -> Result<Cli, ExitCode> {
             let _ = err.print();
             return ExitCode::from(err.exit_code().clamp(0, 2) as u8);
         }
-        let is_json = std::env::args_os().any(|argument| argument == "--json");
-        let output = if is_json {
-            Output::json()
-        } else {
-            Output::text()
-        };
+        let output = Output::new(asks_for_json());
         let text = err.to_string();
         // What is missing stands in lines of its own under the first.
         let lines = text.lines().take_while(|line| !line.trim().is_empty());
@@ -218,66 +210,10 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let (output, result) = match cli.command {
-        None => (
-            Output::text(),
-            rig::window(&rig::RigArgs::default(), windows),
-        ),
-        Some(Command::Window(args)) => (Output::text(), rig::window(&args, windows)),
-        Some(Command::Run(args)) => with(args.json, |out| run::run(&args, out)),
-        Some(Command::Protocol(command)) => match command {
-            ProtocolCommand::List(args) => with(args.json, protocol::list),
-            ProtocolCommand::Check(args) => with(args.json, |out| protocol::run_check(&args, out)),
-            ProtocolCommand::Show(args) => with(args.json, |out| protocol::show(&args, out)),
-            ProtocolCommand::Preview(args) => with(args.json, |out| protocol::preview(&args, out)),
-            ProtocolCommand::Words => with(false, protocol::words),
-        },
-        Some(Command::DailyCheck(args)) => with(args.json, |out| daily_check::run(&args, out)),
-        Some(Command::Fit(args)) => with(args.json, |out| fit::run(&args, out)),
-        Some(Command::Analyse(args)) => with(args.json, |out| analyse::run(&args, out)),
-        Some(Command::Select(args)) => with(args.json, |out| select::run(&args, out)),
-        Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
-        Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
-        Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, windows, out)),
-        Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
-        Some(Command::Calibration(command)) => {
-            with(command.is_json(), |out| calibration::run(&command, out))
-        }
-        Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
-        Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
-        Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
-        Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
-        Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
-        Some(Command::Find(args)) => with(args.json, |out| find::run(&args, out)),
-        Some(Command::History(args)) => with(args.json, |out| history::run(&args, out)),
-        Some(Command::Catalog(command)) => {
-            with(command.is_json(), |out| catalog::run(&command, out))
-        }
-        Some(Command::Info(args)) => with(args.json, |out| info::run(&args, out)),
-        Some(Command::Report(args)) => with(args.json, |out| report::run(&args, out)),
-        Some(Command::Verdict(args)) => with(args.json, |out| verdict::verdict(&args, out)),
-        Some(Command::CorrectContact(args)) => with(args.json, |out| verdict::correct(&args, out)),
-        Some(Command::Tag(args)) => with(args.is_json(), |out| review::tag(&args, out)),
-        Some(Command::Note(args)) => with(args.json, |out| review::note(&args, out)),
-        Some(Command::Review(args)) => with(args.json, |out| review::review(&args, out)),
-        Some(Command::Recalibrate(args)) => {
-            with(args.json, |out| analysis::recalibrate(&args, out))
-        }
-        Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
-        Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
-        Some(Command::Rig(command)) => with(command.is_json(), |out| wired::run(&command, out)),
-        Some(Command::Haptics(command)) => {
-            with(command.is_json(), |out| haptics::run(&command, out))
-        }
-        Some(Command::Scene(command)) => with(command.is_json(), |out| scene::run(&command, out)),
-        Some(Command::Emulate(command)) => {
-            with(command.is_json(), |out| emulate::run(&command, out))
-        }
-        Some(Command::Completions(args)) => with(args.json, |out| {
-            shell::completions(&args, out);
-            Ok(())
-        }),
-        Some(Command::Man(args)) => with(args.json, |out| shell::man(&args, out)),
+    let output = Output::new(cli.json || asks_for_json());
+    let result = match cli.command {
+        None => window::run(&window::WindowArgs::default(), windows, &output),
+        Some(command) => command.run(windows, &output),
     };
     match result {
         Ok(()) => ExitCode::SUCCESS,
@@ -286,19 +222,6 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
             ExitCode::from(failure.code())
         }
     }
-}
-
-fn with(
-    is_json: bool,
-    run: impl FnOnce(&Output) -> Result<(), Failure>,
-) -> (Output, Result<(), Failure>) {
-    let output = if is_json {
-        Output::json()
-    } else {
-        Output::text()
-    };
-    let result = run(&output);
-    (output, result)
 }
 
 /// Adds what `--about` tells and checks that all of it can stand together.
@@ -319,10 +242,40 @@ fn read_failure(err: ReadError) -> Failure {
     }
 }
 
+/// Recordings that cannot be taken together: paths are the user's, folders and damage are not.
+fn sources_failure(err: SourcesError) -> Failure {
+    match err {
+        SourcesError::Folder { .. } => Failure::failed(err),
+        SourcesError::Source { path, reason } => {
+            source_failure(*reason).of(&path.display().to_string())
+        }
+        SourcesError::Rejected(_) => Failure::usage(format!(
+            "{err}; add --include-rejected to take them all the same"
+        )),
+        SourcesError::Table(_) => {
+            Failure::usage(format!("{err}; 'palpate import' makes one of a table"))
+        }
+        err => Failure::usage(err),
+    }
+}
+
+/// A fit that cannot be used: its file is the user's, what it was remembered as is not.
+fn known_fit_failure(err: KnownFitError) -> Failure {
+    match err {
+        KnownFitError::NotAFit { .. } => {
+            Failure::usage(format!("{err}; 'palpate fit --json' writes one"))
+        }
+        KnownFitError::Changed(_) => Failure::failed(format!("{err}; or name another with --like")),
+        KnownFitError::Source(err) => source_failure(err),
+        KnownFitError::Fit { .. } => Failure::failed(err),
+        err => Failure::usage(err),
+    }
+}
+
 fn source_failure(err: SourceError) -> Failure {
     match err {
         SourceError::Session(err) => read_failure(err),
-        SourceError::Analysis(err) => analysis::failure(err),
+        SourceError::Analysis(err) => recalibrate::failure(err),
         SourceError::Table(_)
         | SourceError::TableAnalysis { .. }
         | SourceError::Rejected { .. }

@@ -1,25 +1,37 @@
 //! What a command prints: text for people or one JSON object for machines.
 
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use palpate_analysis::progress::Progress;
 use palpate_analysis::report::catalog::one_line;
 use serde::Serialize;
 use std::io::Write;
+use std::ops::ControlFlow;
 
 /// Where results go.
 pub(super) struct Output {
     is_json: bool,
 }
 
+/// A result and the command that it answers.
+#[derive(Serialize)]
+struct Answer<'a, T> {
+    command: &'a str,
+    #[serde(flatten)]
+    result: &'a T,
+}
+
 impl Output {
-    pub fn text() -> Self {
-        Self { is_json: false }
+    pub fn new(is_json: bool) -> Self {
+        Self { is_json }
     }
 
-    pub fn json() -> Self {
-        Self { is_json: true }
+    /// Prints the result of a command: `text` for people, the fields of `result` for machines.
+    pub fn answer(&self, command: &str, result: &impl Serialize, text: impl FnOnce() -> String) {
+        self.object(&Answer { command, result });
+        self.text_only(text);
     }
 
-    /// Prints a result: `text` for people, `object` for machines.
+    /// Prints a result that names its command itself.
     pub fn result(&self, object: &impl Serialize, text: impl FnOnce() -> String) {
         self.object(object);
         self.text_only(text);
@@ -56,21 +68,21 @@ impl Output {
     }
 
     /// A progress bar on the terminal; silent in JSON and where nobody watches.
-    pub fn bar(&self, length: u64) -> ProgressBar {
+    pub fn bar(&self, length: u64) -> Bar {
         self.bar_like(length, "{bar:30} {percent:>3} %  {msg}")
     }
 
     /// A progress bar that counts pieces of like size and tells the time left.
-    pub fn count_bar(&self, length: u64) -> ProgressBar {
+    pub fn count_bar(&self, length: u64) -> Bar {
         self.bar_like(length, "{bar:30} {pos} of {len}  {eta} left  {msg}")
     }
 
     /// A progress bar over one long piece of work that tells the time left.
-    pub fn share_bar(&self, length: u64) -> ProgressBar {
-        self.bar_like(length, "{bar:30} {percent:>3} %  {eta} left  {msg}")
+    pub fn share_bar(&self) -> Bar {
+        self.bar_like(0, "{bar:30} {percent:>3} %  {eta} left  {msg}")
     }
 
-    fn bar_like(&self, length: u64, template: &str) -> ProgressBar {
+    fn bar_like(&self, length: u64, template: &str) -> Bar {
         let bar = ProgressBar::new(length);
         if self.is_json {
             bar.set_draw_target(ProgressDrawTarget::hidden());
@@ -78,7 +90,33 @@ impl Output {
         if let Ok(style) = ProgressStyle::with_template(template) {
             bar.set_style(style);
         }
-        bar
+        Bar(bar)
+    }
+}
+
+/// A bar on the terminal that goes when it is dropped. Nobody ends the work that it watches.
+pub(super) struct Bar(ProgressBar);
+
+impl std::ops::Deref for Bar {
+    type Target = ProgressBar;
+
+    fn deref(&self) -> &ProgressBar {
+        &self.0
+    }
+}
+
+impl Progress for Bar {
+    fn tell(&self, done: usize, of: usize, what: &str) -> ControlFlow<()> {
+        self.0.set_length(of as u64);
+        self.0.set_position(done as u64);
+        self.0.set_message(what.to_owned());
+        ControlFlow::Continue(())
+    }
+}
+
+impl Drop for Bar {
+    fn drop(&mut self) {
+        self.0.finish_and_clear();
     }
 }
 

@@ -12,7 +12,7 @@ use palpate_sessions::log::Session;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `palpate replay`.
+/// Feed recorded sessions to the engine again and compare
 #[derive(Debug, Args)]
 pub struct ReplayArgs {
     /// Session folders
@@ -27,9 +27,6 @@ pub struct ReplayArgs {
     /// With --window: session seconds per second to begin with, or max
     #[arg(long, requires = "window", default_value = "1")]
     time_scale: TimeScale,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
@@ -41,7 +38,6 @@ struct Replayed {
 
 #[derive(Serialize)]
 struct Replays {
-    command: &'static str,
     sessions: Vec<Replayed>,
     differing: usize,
 }
@@ -65,17 +61,16 @@ pub(super) fn run(
         });
         bar.inc(1);
     }
-    bar.finish_and_clear();
+    drop(bar);
     let differing = sessions
         .iter()
         .filter(|one| one.report.first_difference.is_some())
         .count();
     let replays = Replays {
-        command: "replay",
         sessions,
         differing,
     };
-    output.result(&replays, || {
+    output.answer("replay", &replays, || {
         replays
             .sessions
             .iter()

@@ -2,9 +2,7 @@
 
 use super::Failure;
 use super::calibration::source::Source;
-use super::output::Output;
 use clap::Args;
-use palpate_analysis::opening::{Windows, WorkbenchRequest};
 use palpate_drivers::Rig;
 use palpate_drivers::sim::{
     SimBath, SimClock, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimProfile, SimRate,
@@ -13,7 +11,6 @@ use palpate_drivers::sim::{
 use palpate_model::calibration::Calibration;
 use palpate_model::rig::Limits;
 use palpate_model::units::{Newtons, Position, Volts};
-use palpate_protocols::plans::RampHold;
 use palpate_runner::{TimeScale, driver_clock};
 use palpate_sessions::folder::{HolderLock, library_folder};
 
@@ -270,30 +267,4 @@ fn rig_lock(name: &str) -> Result<HolderLock, Failure> {
     let library = library_folder().map_err(Failure::usage)?;
     HolderLock::acquire(&library.join("rigs").join(format!("{name}.lock")))
         .map_err(|err| Failure::usage(format!("rig {name}: {err}")))
-}
-
-/// Opens the window.
-pub(super) fn window(args: &RigArgs, windows: Option<&dyn Windows>) -> Result<(), Failure> {
-    let windows = windows.ok_or_else(|| Failure::usage(super::NO_WINDOW))?;
-    let bench = open(args)?;
-    let gate = super::run::gate(&RampHold::default().plan(), &bench)?;
-    let OpenRig {
-        rig,
-        calibration,
-        doubts,
-        limits,
-        _locks,
-    } = bench;
-    let output = Output::text();
-    doubts.iter().for_each(|doubt| output.note(doubt));
-    let scale = args.time_scale;
-    windows
-        .workbench(WorkbenchRequest {
-            rig,
-            calibration,
-            limits,
-            to_acknowledge: gate.to_acknowledge(),
-            scale,
-        })
-        .map_err(Failure::Failed)
 }

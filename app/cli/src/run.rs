@@ -34,7 +34,7 @@ use std::time::Duration;
 /// Probe that is written down where nobody says which.
 pub(super) const USUAL_INDENTER: &str = "blunt 12 mm probe";
 
-/// Arguments of `palpate run`.
+/// Run a protocol without a window
 #[derive(Debug, Args)]
 pub struct RunArgs {
     /// A built-in protocol ('palpate protocol list'), a protocol file, or a programme file
@@ -46,9 +46,6 @@ pub struct RunArgs {
     short: ShortArgs,
     #[command(flatten)]
     how: HowArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Heading of what is short for `--set` in the help.
@@ -140,7 +137,6 @@ pub(super) fn number(text: &str) -> Result<f64, String> {
 
 #[derive(Serialize)]
 struct RunReport {
-    command: &'static str,
     plan: String,
     session: PathBuf,
     ending: &'static str,
@@ -176,7 +172,7 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
         return programme::run(Path::new(name), how, &values, output);
     }
     if let Ok(library) = library_folder() {
-        super::doctor::recover_unfinished(&library, output);
+        super::recover::recover_unfinished(&library, output);
     }
     let bench = super::rig::open(&how.rig)?;
     let (protocol, written, _) = super::protocol::sound(name, &values, &bench, output)?;
@@ -356,7 +352,7 @@ fn watch(
             bar.suspend(|| asking.look(view, output));
         }
         if view.outcome.is_some() {
-            bar.finish_and_clear();
+            drop(bar);
             return Ok(snapshot);
         }
         if !is_alive && !runner.is_alive() {
@@ -393,7 +389,6 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
     let left = view.log_error.as_ref().map(|_| examine(&view.folder));
     let kept = left.as_ref().map_or(view.samples, |left| left.samples);
     let report = RunReport {
-        command: slave.map_or("run", |_| "haptics-slave"),
         plan: view.plan_name.clone(),
         session: view.folder.clone(),
         ending: outcome.ending.name(),
@@ -424,7 +419,9 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
             "the computer did not keep up: the run took {late:.1} s longer than its session time"
         ));
     }
-    output.result(&report, || run_text(&report));
+    output.answer(slave.map_or("run", |_| "haptics-slave"), &report, || {
+        run_text(&report)
+    });
     if let (Some(reason), Some(left)) = (&view.log_error, &left) {
         return Err(Failure::failed(not_kept(reason, left, &report)));
     }

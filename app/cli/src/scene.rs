@@ -6,10 +6,11 @@ use super::output::Output;
 use super::run::number;
 use super::trade::with_bar;
 use clap::{Args, Subcommand};
+use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::Replayed;
 use palpate_analysis::report::scene::{bench_text, plan_text, played_text};
 use palpate_analysis::scene::{Played, play, replay, scene_of};
-use palpate_analysis::scene_bench::{Bench, bench, made_after, planned, planned_again};
+use palpate_analysis::scene_bench::{bench, made_after, planned, planned_again};
 use palpate_analysis::trade::{Extent, measure_scene};
 use palpate_haptics::scene::ScenePath;
 use palpate_haptics::surface::ScenePlan;
@@ -17,7 +18,7 @@ use palpate_runner::haptics::scene_file::SceneFile;
 use serde::Serialize;
 use std::path::{Path, PathBuf};
 
-/// What to do with a scene.
+/// See and feel a piece of tissue: run a scene, record it, compute a recording again
 #[derive(Debug, Subcommand)]
 pub enum SceneCommand {
     /// Run a scene in real time with a hand on a path, and tell how its loop kept its time
@@ -32,20 +33,6 @@ pub enum SceneCommand {
     Show(ShowArgs),
 }
 
-impl SceneCommand {
-    /// Whether one JSON object is wanted.
-    #[must_use]
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::Run(args) => args.json,
-            Self::Record(args) => args.run.json,
-            Self::Bench(args) => args.json,
-            Self::Replay(args) => args.json,
-            Self::Show(args) => args.json,
-        }
-    }
-}
-
 /// Arguments of `palpate scene run`.
 #[derive(Debug, Args)]
 pub struct RunArgs {
@@ -58,9 +45,6 @@ pub struct RunArgs {
     /// For how long, in s, the path gone again and again; without it once
     #[arg(long, value_parser = number, allow_negative_numbers = true, value_name = "S")]
     seconds: Option<f64>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 fn path(name: &str) -> Result<ScenePath, String> {
@@ -86,9 +70,6 @@ pub struct BenchArgs {
     /// Meshes up to 801 nodes a side against 1601, and every family; without it up to 201 against 401
     #[arg(long)]
     full: bool,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate scene replay` and `palpate haptics replay`.
@@ -108,31 +89,14 @@ pub struct ShowArgs {
     /// A scene file
     #[arg(value_name = "SCENE.toml")]
     file: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 #[derive(Serialize)]
 struct PlayedOutput<'a> {
-    command: &'static str,
     #[serde(flatten)]
     played: &'a Played,
     plan: Option<&'a ScenePlan>,
     planned_again: Option<&'a ScenePlan>,
-}
-
-#[derive(Serialize)]
-struct BenchOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    bench: &'a Bench,
-}
-
-#[derive(Serialize)]
-struct ShowOutput {
-    command: &'static str,
-    file: String,
 }
 
 /// Nodes along a side with which a scene is tried whose mesh is to be planned: all else is the same on any mesh.
@@ -152,11 +116,8 @@ pub(super) fn run(command: &SceneCommand, output: &Output) -> Result<(), Failure
         SceneCommand::Replay(args) => run_replay(args, output),
         SceneCommand::Show(args) => {
             let file = read(args.file.as_deref(), output)?.text();
-            let found = ShowOutput {
-                command: "scene-show",
-                file: file.clone(),
-            };
-            output.result(&found, || file.trim_end().to_owned());
+            let found = serde_json::json!({ "file": file });
+            output.answer("scene-show", &found, || file.trim_end().to_owned());
             Ok(())
         }
     }
@@ -195,11 +156,11 @@ fn run_scene(
         file = made_after(&file, &plan);
         after = Some((curves, plan));
     }
-    let bar = output.share_bar(1000);
+    let bar = output.share_bar();
     let played = play(&file, (args.path, laps), record, &mut |share| {
-        bar.set_position((1000.0 * share) as u64);
+        bar.share(share, "");
     });
-    bar.finish_and_clear();
+    drop(bar);
     let played = played.map_err(Failure::failed)?;
     let plan = after.as_ref().map(|(_, plan)| plan);
     let again = after.as_ref().filter(|_| !played.is_within_budget);
@@ -208,12 +169,11 @@ fn run_scene(
         planned_again(&file, curves, plan, took)
     });
     let found = PlayedOutput {
-        command,
         played: &played,
         plan,
         planned_again: again.as_ref().and_then(|one| one.as_ref().ok()),
     };
-    output.result(&found, || {
+    output.answer(command, &found, || {
         let mut lines = Vec::new();
         lines.extend(plan.map(plan_text));
         lines.push(played_text(&played));
@@ -234,43 +194,25 @@ fn run_bench(args: &BenchArgs, output: &Output) -> Result<(), Failure> {
         false => Extent::Quick,
     };
     let bench = with_bar(output, |progress| bench(&file, extent, progress))?;
-    let found = BenchOutput {
-        command: "scene-bench",
-        bench: &bench,
-    };
-    output.result(&found, || bench_text(&bench));
+    output.answer("scene-bench", &bench, || bench_text(&bench));
     Ok(())
 }
 
 fn run_replay(args: &ReplayArgs, output: &Output) -> Result<(), Failure> {
-    let bar = output.share_bar(1000);
-    let replayed = replay(&args.folder, &mut |share| {
-        bar.set_position((1000.0 * share) as u64);
-        true
-    });
-    bar.finish_and_clear();
+    let bar = output.share_bar();
+    let replayed = replay(&args.folder, &mut |share| bar.share(share, ""));
+    drop(bar);
     told("scene-replay", replayed, output)
-}
-
-#[derive(Serialize)]
-struct ReplayOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    replayed: &'a Replayed,
 }
 
 /// Tells what a recording gave; one that is not as recorded is a failure.
 pub(super) fn told(
-    command: &'static str,
+    command: &str,
     replayed: Result<Replayed, String>,
     output: &Output,
 ) -> Result<(), Failure> {
     let replayed = replayed.map_err(Failure::usage)?;
-    let found = ReplayOutput {
-        command,
-        replayed: &replayed,
-    };
-    output.result(&found, || replayed.words());
+    output.answer(command, &replayed, || replayed.words());
     replayed
         .failure()
         .map_or(Ok(()), |why| Err(Failure::failed(why)))

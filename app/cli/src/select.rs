@@ -1,22 +1,18 @@
 //! `palpate select`: model families compared on sessions and tables.
 
-use super::Failure;
-use super::fit::sources::{self, Recording};
 use super::new_file;
 use super::output::Output;
+use super::{Failure, sources_failure};
 use clap::Args;
-use palpate_analysis::compliance::Corrections;
 use palpate_analysis::report::{of_selection, selection};
+use palpate_analysis::select::{SelectFailure, SelectRequest, select_sources};
 use palpate_analysis::source::{Stretch, Wanted};
+use palpate_analysis::sources::Naming;
 use palpate_rheology::families::by_key;
-use palpate_rheology::fit::FitSample;
-use palpate_rheology::select::{SelectError, SelectOptions, Selection, select};
-use palpate_runner::Stopwatch;
-use serde::Serialize;
-use std::ops::ControlFlow;
+use palpate_rheology::select::{SelectError, SelectOptions};
 use std::path::PathBuf;
 
-/// Arguments of `palpate select`.
+/// Compare model families and recommend the cheapest that will do
 #[derive(Debug, Args)]
 pub struct SelectArgs {
     /// Session folders, delimited tables with columns for time, depth and force, or folders of them;
@@ -49,65 +45,44 @@ pub struct SelectArgs {
     /// Draw error over cost as a new SVG file
     #[arg(long, value_name = "FILE")]
     plot: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
-}
-
-#[derive(Serialize)]
-struct SelectOutput<'a> {
-    command: &'static str,
-    #[serde(flatten)]
-    selection: &'a Selection,
-    /// The comparison alone, without reading.
-    seconds: f64,
 }
 
 pub(super) fn run(args: &SelectArgs, output: &Output) -> Result<(), Failure> {
-    let mut options = options(args)?;
     let columns = args.columns.as_deref().map(str::parse).transpose();
-    let columns = columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?;
-    new_file::check("plot", args.plot.as_deref())?;
-    let found = sources::find(&args.sources, output)?;
-    let wanted = Wanted {
-        stretch: match args.unload {
-            true => Stretch::WithUnload,
-            false => Stretch::RampHold,
+    let names = args.specimens.as_ref();
+    let request = SelectRequest {
+        paths: args.sources.clone(),
+        columns: columns.map_err(|reason| Failure::usage(format!("--columns: {reason}")))?,
+        wanted: Wanted {
+            stretch: Stretch::with_unload(args.unload),
+            is_rejected_included: args.include_rejected,
         },
-        is_rejected_included: args.include_rejected,
+        options: options(args)?,
+        specimens: names.map(|names| {
+            names
+                .split(',')
+                .map(|name| name.trim().to_owned())
+                .collect()
+        }),
+        naming: Naming::Path,
     };
-    let records = sources::read(
-        &found,
-        columns.as_ref(),
-        wanted,
-        &Corrections::none(None),
-        output,
-    )?;
-    options.specimens = specimens(args, &records)?;
-    let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
-    let bar = output.count_bar(0);
-    let watch = Stopwatch::start();
-    let selection = select(&borrowed, &options, &|news| {
-        bar.set_length(news.total as u64);
-        bar.set_position(news.done as u64);
-        bar.set_message(news.family.clone());
-        ControlFlow::Continue(())
-    });
-    let seconds = watch.seconds();
-    bar.finish_and_clear();
-    let selection = selection.map_err(|err| match err {
-        SelectError::HoldOut(_) | SelectError::NoFamilies | SelectError::NoRecords => {
-            Failure::usage(err)
-        }
-        SelectError::Fit(_) | SelectError::Ended => Failure::failed(err),
-    })?;
-    let object = SelectOutput {
-        command: "select",
-        selection: &selection,
-        seconds,
-    };
-    output.result(&object, || selection::whole(&selection));
-    new_file::write("plot", args.plot.as_deref(), || of_selection(&selection))
+    new_file::check("plot", args.plot.as_deref())?;
+    let selected = select_sources(request, &output.count_bar(0)).map_err(failure)?;
+    selected.notes.iter().for_each(|note| output.note(note));
+    let selection = &selected.selection;
+    let mut object = serde_json::json!(selection);
+    object["seconds"] = selected.seconds.into();
+    output.answer("select", &object, || selection::whole(selection));
+    new_file::write("plot", args.plot.as_deref(), || of_selection(selection))
+}
+
+fn failure(err: SelectFailure) -> Failure {
+    match err {
+        SelectFailure::Sources(err) => sources_failure(err),
+        SelectFailure::Specimens { .. } => Failure::usage(format!("--specimens: {err}")),
+        SelectFailure::Select(SelectError::Fit(_) | SelectError::Ended) => Failure::failed(err),
+        err => Failure::usage(err),
+    }
 }
 
 fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
@@ -128,23 +103,4 @@ fn options(args: &SelectArgs) -> Result<SelectOptions, Failure> {
         options.families = families.map_err(Failure::usage)?;
     }
     Ok(options)
-}
-
-/// The specimen of each record: as given, or as the sources say.
-fn specimens(args: &SelectArgs, records: &[Recording]) -> Result<Vec<Option<String>>, Failure> {
-    let Some(names) = &args.specimens else {
-        return Ok(records.iter().map(|one| one.specimen.clone()).collect());
-    };
-    let names: Vec<&str> = names.split(',').map(str::trim).collect();
-    if names.len() != records.len() || names.contains(&"") {
-        return Err(Failure::usage(format!(
-            "--specimens names {} and there are {} sources; give one name for each",
-            names.iter().filter(|name| !name.is_empty()).count(),
-            records.len()
-        )));
-    }
-    Ok(names
-        .into_iter()
-        .map(|name| Some(name.to_owned()))
-        .collect())
 }

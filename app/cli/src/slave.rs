@@ -3,7 +3,7 @@
 use super::haptics::body;
 use super::output::Output;
 use super::run::{HowArgs, carry_out, labels, number};
-use super::{Failure, doctor, rig};
+use super::{Failure, recover, rig};
 use clap::Args;
 use palpate_analysis::haptics::Setting;
 use palpate_haptics::Period;
@@ -35,9 +35,6 @@ pub struct SlaveArgs {
     speed: f64,
     #[command(flatten)]
     how: HowArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 impl SlaveArgs {
@@ -71,7 +68,7 @@ impl SlaveArgs {
 
 pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     if let Ok(library) = library_folder() {
-        doctor::recover_unfinished(&library, output);
+        recover::recover_unfinished(&library, output);
     }
     let bench = rig::open(&args.how.rig)?;
     let description = bench.rig.description().clone();

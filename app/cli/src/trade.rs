@@ -4,6 +4,7 @@ use super::Failure;
 use super::new_file;
 use super::output::Output;
 use clap::Args;
+use palpate_analysis::progress::Progress;
 use palpate_analysis::trade::{self, Extent};
 use palpate_rheology::tolerance::Tolerance;
 use palpate_rheology::trade::{Recommendation, TradeCurves};
@@ -12,10 +13,9 @@ use palpate_sessions::trade::{
     TradeFileError, quick_trade_file, read_trade, trade_file, trade_files, write_trade,
 };
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `palpate trade`.
+/// Measure error against time on this machine and recommend what to use
 #[derive(Debug, Args)]
 pub struct TradeArgs {
     /// How large an error of force may be: newtons (0.05N), percent of the peak force (1%) or percent of what a hand notices (10%jnd)
@@ -42,14 +42,10 @@ pub struct TradeArgs {
     /// Also draw error against time
     #[arg(long, value_name = "FILE.svg")]
     plot: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Serialize)]
 struct TradeReport<'a> {
-    command: &'static str,
     file: String,
     doubts: Vec<String>,
     /// Largest difference between even and odd rounds, as a share.
@@ -93,14 +89,15 @@ pub(super) fn run(args: &TradeArgs, output: &Output) -> Result<(), Failure> {
     }
     let recommendation = curves.recommend(tolerance, args.rate, args.share / 100.0);
     let report = TradeReport {
-        command: "trade",
         file: file.display().to_string(),
         doubts,
         halves_worst: curves.worst_halves(),
         recommendation,
         curves: &curves,
     };
-    output.result(&report, || trade::text(&curves, &report.recommendation));
+    output.answer("trade", &report, || {
+        trade::text(&curves, &report.recommendation)
+    });
     new_file::write("plot", args.plot.as_deref(), || trade::svg(&curves))
 }
 
@@ -116,16 +113,9 @@ fn measured(is_quick: bool, output: &Output) -> Result<TradeCurves, Failure> {
 /// Work with a progress bar that nobody ends early.
 pub(super) fn with_bar<T>(
     output: &Output,
-    work: impl FnOnce(&trade::Progress<'_>) -> Result<Option<T>, String>,
+    work: impl FnOnce(&dyn Progress) -> Result<Option<T>, String>,
 ) -> Result<T, Failure> {
-    let bar = output.count_bar(0);
-    let curves = work(&|done, of, what| {
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
-        bar.set_message(what.to_owned());
-        ControlFlow::Continue(())
-    });
-    bar.finish_and_clear();
+    let curves = work(&output.count_bar(0));
     let curves = curves.map_err(Failure::failed)?;
     curves.ok_or_else(|| Failure::failed("the measurement ended before it was done"))
 }

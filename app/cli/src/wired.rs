@@ -21,7 +21,7 @@ const TELL_EVERY: Nanos = Nanos::from_millis(500);
 /// Longest wait for the rig, so that Ctrl-C is heeded.
 const LOOK_EVERY: Nanos = Nanos::from_millis(20);
 
-/// What to do with rigs on wires.
+/// Look at rigs on wires: which are there, whether one is as its file says, what it reports
 #[derive(Debug, Subcommand)]
 pub enum RigCommand {
     /// List serial ports; with --ask, ask each which device is behind it
@@ -44,9 +44,6 @@ pub struct DetectArgs {
     /// Bits a second of serial ports
     #[arg(long, value_name = "BAUD", default_value_t = 115_200, value_parser = clap::value_parser!(u32).range(300..=4_000_000))]
     baud: u32,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate rig check`.
@@ -55,9 +52,6 @@ pub struct CheckArgs {
     /// The rig file
     #[arg(value_name = "FILE.toml")]
     file: String,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate rig monitor`.
@@ -69,9 +63,6 @@ pub struct MonitorArgs {
     /// End after so long
     #[arg(long, value_name = "SECONDS", value_parser = seconds)]
     seconds: Option<f64>,
-    /// Print one JSON object at the end instead of lines
-    #[arg(long)]
-    json: bool,
 }
 
 fn seconds(text: &str) -> Result<f64, String> {
@@ -79,17 +70,6 @@ fn seconds(text: &str) -> Result<f64, String> {
         .ok()
         .filter(|seconds: &f64| (0.1..=1e6).contains(seconds))
         .ok_or_else(|| "give 0.1 to 1000000".to_owned())
-}
-
-impl RigCommand {
-    /// Whether one object is printed.
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::Detect(args) => args.json,
-            Self::Check(args) => args.json,
-            Self::Monitor(args) => args.json,
-        }
-    }
 }
 
 /// Does it.
@@ -140,11 +120,9 @@ fn detect(args: &DetectArgs, output: &Output) -> Result<(), Failure> {
             bar.inc(1);
         }
     }
-    bar.finish_and_clear();
-    output.result(
-        &serde_json::json!({ "command": "rig detect", "ports": ports }),
-        || detected(&ports),
-    );
+    drop(bar);
+    let object = serde_json::json!({ "ports": ports });
+    output.answer("rig detect", &object, || detected(&ports));
     Ok(())
 }
 
@@ -233,8 +211,8 @@ fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     let (rig, _lock) = open_rig_file(&args.file)?;
     let about = rig.description();
     let links = links(rig.as_ref());
-    let object = serde_json::json!({ "command": "rig check", "rig": about, "links": links });
-    output.result(&object, || {
+    let object = serde_json::json!({ "rig": about, "links": links });
+    output.answer("rig check", &object, || {
         let mut lines = vec![
             format!("rig        {}", about.name),
             format!("is         {}", about.identity),
@@ -356,9 +334,7 @@ fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
     whole.add(&recent);
     let links = links(rig.as_ref());
     let tick = rig.description().tick().0;
-    let object = serde_json::json!({
-        "command": "rig monitor",
-        "rig": rig.description().name,
+    let object = serde_json::json!({ "rig": rig.description().name,
         "seconds": end.seconds().0,
         "samples": whole.samples,
         "samples_per_s": whole.samples as f64 / end.seconds().0,
@@ -372,7 +348,7 @@ fn monitor(args: &MonitorArgs, output: &Output) -> Result<(), Failure> {
         "position_mm": newest.map(|reading| place_mm(rig.as_ref(), &reading)),
         "links": links,
     });
-    output.result(&object, || {
+    output.answer("rig monitor", &object, || {
         let mut lines = vec![format!(
             "samples    {} in {:.1} s, {:.1} a second, at most {:.2} ms apart",
             whole.samples,

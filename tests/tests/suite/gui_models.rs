@@ -33,7 +33,7 @@ fn table(path: &Path, speed: f64) {
     std::fs::write(path, text).unwrap();
 }
 
-fn screen(flow: &mut Flow, key: Key) {
+fn show_screen(flow: &mut Flow, key: Key) {
     flow.window.key_press_modifiers(Modifiers::COMMAND, key);
     flow.window.run_steps(3);
 }
@@ -41,7 +41,7 @@ fn screen(flow: &mut Flow, key: Key) {
 #[test]
 fn models_are_compared_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num6);
+    show_screen(&mut flow, Key::Num6);
     assert!(!flow.is_enabled("Compare models  F6"));
     assert!(flow.says("add a recording first"));
     for (name, speed) in [("slow.csv", 0.8), ("fast.csv", 4.0)] {
@@ -94,7 +94,7 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
     let mut flow = Flow::open(TimeScale::Factor(20.0));
     flow.click("Start  F5");
     flow.wait_for_phase(palpate_model::rig::Phase::Contact);
-    screen(&mut flow, Key::Num8);
+    show_screen(&mut flow, Key::Num8);
     assert!(flow.says("nothing tested yet"));
     flow.window.key_press(Key::F12);
     flow.wait("the axis at rest", |window| {
@@ -107,7 +107,7 @@ fn a_run_goes_on_behind_another_screen_and_can_be_stopped_there() {
 #[test]
 fn the_trade_is_measured_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num7);
+    show_screen(&mut flow, Key::Num7);
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
@@ -128,7 +128,7 @@ fn the_trade_is_measured_in_the_window() {
 #[test]
 fn the_extremes_are_tested_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num8);
+    show_screen(&mut flow, Key::Num8);
     flow.click("Test the extremes  F6");
     flow.wait("progress", |window| {
         screen::<ExtremesScreen>(window).rows().is_none()
@@ -162,7 +162,7 @@ fn check_haptics(flow: &mut Flow) {
 #[test]
 fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num9);
+    show_screen(&mut flow, Key::Num9);
     assert!(flow.says("nothing checked yet") && flow.says("check this setting first"));
     assert!(!flow.is_enabled("Start the loop"));
     flow.window.check_accessibility();
@@ -216,7 +216,7 @@ fn felt(window: &Window) -> [f64; 2] {
 #[test]
 fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num9);
+    show_screen(&mut flow, Key::Num9);
     check_haptics(&mut flow);
     flow.click("Start the loop");
     flow.wait("the loop", |window| {
@@ -274,7 +274,7 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
 #[test]
 fn a_scene_is_measured_and_planned_in_the_window() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num7);
+    show_screen(&mut flow, Key::Num7);
     flow.click("Scene: mesh");
     assert!(flow.says("nothing measured on this machine yet") && flow.says("measure first"));
     flow.click("few rows, rough times");
@@ -310,7 +310,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
 #[test]
 fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
     let mut flow = Flow::open(TimeScale::Max);
-    screen(&mut flow, Key::Num9);
+    show_screen(&mut flow, Key::Num9);
     check_haptics(&mut flow);
     let folder = flow.folder.path().join("felt");
     flow.type_into("record to", &folder.display().to_string());

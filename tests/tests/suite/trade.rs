@@ -1,10 +1,10 @@
 //! Recorded curves of the trade: their errors are found again, and a perturbed one is noticed.
 
+use palpate_analysis::progress::Unwatched;
 use palpate_analysis::trade::{Extent, errors};
 use palpate_rheology::trade::{TradeCurves, last_digits};
 use palpate_sessions::trade::read_trade;
 use palpate_tests::workspace;
-use std::ops::ControlFlow;
 
 fn recorded() -> TradeCurves {
     read_trade(&workspace().join("tests/trade/curves.json")).expect("recorded curves")
@@ -13,7 +13,7 @@ fn recorded() -> TradeCurves {
 #[test]
 fn recorded_errors_are_found_again_and_perturbed_ones_are_not() {
     let recorded = recorded();
-    let now = errors(Extent::Quick, &|_, _, _| ControlFlow::Continue(())).unwrap();
+    let now = errors(Extent::Quick, &Unwatched).unwrap();
     let now = now.expect("nobody ended it");
     recorded.agrees_with(&now).unwrap();
     // Every error counts, to a percent at least, whose percent is twice its rounding.

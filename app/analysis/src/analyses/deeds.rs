@@ -1,18 +1,87 @@
 //! Records beside a session: each is added, none is ever written over.
 
-use super::super::edits::Subject;
-use super::{Done, FitWanted, step};
-use crate::analysed::{self, record};
+use super::super::edits::{SayFailure, Subject};
+use super::{Done, FitWanted};
+use crate::analysed::{self, ForceChange, record};
 use crate::edited;
 use crate::progress::Progress;
+use crate::report::dossier::Wanted;
 use crate::report::kept;
+use crate::source::SourceError;
 use palpate_model::calibration::Calibration;
 use palpate_model::units::Position;
-use palpate_sessions::analyses::{Analysed, Analyses, Input, add_analysis, inputs_of};
+use palpate_sessions::analyses::{
+    Analysed, Analyses, Analysis, AnalysisError, Input, add_analysis, inputs_of,
+};
 use palpate_sessions::calibrations::read_calibration;
-use palpate_sessions::edits::{Change, Verdict};
-use palpate_sessions::log::Summary;
+use palpate_sessions::edits::{Change, Edit, Verdict};
+use palpate_sessions::log::{ReadError, Summary};
+use palpate_sessions::shelf::LibraryError;
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use thiserror::Error;
+
+/// Nothing was written beside a session.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum DeedFailure {
+    /// The session, its edits or its analyses cannot be read or added to.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// Nothing can be said of it.
+    #[error(transparent)]
+    Say(#[from] SayFailure),
+    /// The calibration cannot be read.
+    #[error(transparent)]
+    Calibration(#[from] LibraryError),
+    /// A mask that leaves out nothing.
+    #[error("the session has no force in these stretches, so nothing would be left out")]
+    NothingLeftOut,
+    /// No contact was found.
+    #[error(
+        "the session found no contact, so no depth counts from one; there is nothing to correct"
+    )]
+    NoContact,
+    /// Several were found and none is named.
+    #[error("the session found contact {0} times; say which")]
+    WhichContact(usize),
+    /// The one named was not found.
+    #[error("there is no contact {number}; the session found {found}")]
+    NoSuchContact {
+        /// Which, from 1.
+        number: u32,
+        /// How many there are.
+        found: usize,
+    },
+    /// No probe was ever there.
+    #[error(
+        "contact at {position} is outside the rig's travel of {travel}; give the position from home"
+    )]
+    OutsideTravel {
+        /// From home.
+        position: Position,
+        /// How far the rig goes.
+        travel: Position,
+    },
+    /// There is no fit to keep.
+    #[error("{0}")]
+    Fit(String),
+    /// Nobody wants it any more.
+    #[error("cancelled; nothing was kept")]
+    Cancelled,
+}
+
+impl From<AnalysisError> for DeedFailure {
+    fn from(err: AnalysisError) -> Self {
+        Self::Source(err.into())
+    }
+}
+
+impl From<ReadError> for DeedFailure {
+    fn from(err: ReadError) -> Self {
+        Self::Source(err.into())
+    }
+}
 
 /// Who does it, and why.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -72,54 +141,86 @@ pub enum Deed {
 
 impl Deed {
     /// Does it to a session and keeps the record, or says why not.
-    pub fn run(self, session: &Path, who: &Who, progress: &Progress) -> Result<Done, String> {
+    pub fn run(
+        self,
+        session: &Path,
+        who: &Who,
+        progress: &dyn Progress,
+    ) -> Result<Done, DeedFailure> {
         match self {
-            Self::Fit { name, how } => fit(session, name, &how, who, progress),
+            Self::Fit { name, how } => fit(session, &name, &how, who, progress),
             Self::Recalibrate { name, calibration } => {
-                recalibrate(session, name, &calibration, who, progress)
+                recalibrated(session, &name, &calibration, who, progress)
             }
             Self::RecalibrateFrom { name, file } => {
-                let calibration = read_calibration(&file).map_err(|err| err.to_string())?;
-                recalibrate(session, name, &calibration, who, progress)
+                let calibration = read_calibration(&file)?;
+                recalibrated(session, &name, &calibration, who, progress)
             }
-            Self::Mask { name, left_out_s } => mask(session, name, left_out_s, who, progress),
+            Self::Mask { name, left_out_s } => {
+                let masked = mask(session, &name, left_out_s, who, progress)?;
+                let (left_out, before) = (masked.left_out, masked.of);
+                let sentence = format!("{left_out} of {before} forces are left out");
+                Ok(made(session, &name, sentence))
+            }
             Self::Withdraw { name } => {
-                let id = id_of(session)?;
-                let what = Analysed::Withdrawal;
-                keep(session, &id, &name, Vec::new(), what, who)?;
-                Ok(Done {
-                    sentence: format!("analysis '{name}' does not count any more"),
-                    changed: Some(session.to_path_buf()),
-                    is_edit: false,
-                    made: None,
-                })
+                withdraw(session, &name, who)?;
+                let sentence = format!("analysis '{name}' does not count any more");
+                Ok(done(session, sentence, Kind::Analysis))
             }
             Self::Judge(verdict) => {
-                let change = Change::Verdict { verdict };
+                judge(session, verdict, who)?;
                 let sentence = format!("the session is {verdict}");
-                edit(session, change, who, sentence)
+                Ok(done(session, sentence, Kind::Edit))
             }
-            Self::Correct { number, position } => correct(session, number, position, who),
+            Self::Correct { number, position } => {
+                let corrected = correct(session, Some(number), position, who)?;
+                Ok(done(session, corrected.sentence(), Kind::Edit))
+            }
         }
     }
 }
 
-fn id_of(session: &Path) -> Result<String, String> {
-    let summary = Summary::read(session).map_err(|err| err.to_string())?;
-    Ok(summary.manifest.session_id)
+/// What was written beside a session.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Kind {
+    Analysis,
+    Edit,
+}
+
+fn done(session: &Path, sentence: String, kind: Kind) -> Done {
+    Done {
+        sentence,
+        changed: Some(session.to_path_buf()),
+        is_edit: kind == Kind::Edit,
+        made: None,
+    }
+}
+
+fn made(session: &Path, name: &str, sentence: String) -> Done {
+    let name = name.trim();
+    Done {
+        made: Some(name.to_owned()),
+        ..done(
+            session,
+            format!("kept as '{name}': {sentence}"),
+            Kind::Analysis,
+        )
+    }
+}
+
+fn id_of(session: &Path) -> Result<String, ReadError> {
+    Ok(Summary::read(session)?.manifest.session_id)
 }
 
 /// Refuses before hours of work a name that is taken.
-fn check_name(session: &Path, name: &str) -> Result<String, String> {
-    let id = id_of(session)?;
-    let there = Analyses::read(session, &id).map_err(|err| err.to_string())?;
-    match there.all.iter().any(|one| one.name == name.trim()) {
-        true => Err(format!(
-            "the session has an analysis '{}' already, and a name is never used twice; choose another",
-            name.trim()
-        )),
-        false => Ok(id),
+fn check_name(session: &Path, name: &str) -> Result<String, DeedFailure> {
+    let (id, name) = (id_of(session)?, name.trim());
+    let there = Analyses::read(session, &id)?;
+    if there.all.iter().any(|one| one.name == name) {
+        let name = name.to_owned();
+        return Err(AnalysisError::Taken { name }.into());
     }
+    Ok(id)
 }
 
 fn keep(
@@ -129,138 +230,244 @@ fn keep(
     inputs: Vec<Input>,
     what: Analysed,
     who: &Who,
-) -> Result<(), String> {
+) -> Result<Analysis, DeedFailure> {
     let analysis = record(name, &who.by, &who.reason, inputs, what);
-    add_analysis(session, id, &analysis).map_err(|err| err.to_string())
+    add_analysis(session, id, &analysis)?;
+    Ok(analysis)
 }
 
-fn made(session: &Path, name: &str, sentence: String) -> Done {
-    Done {
-        sentence: format!("kept as '{}': {sentence}", name.trim()),
-        changed: Some(session.to_path_buf()),
-        is_edit: false,
-        made: Some(name.trim().to_owned()),
-    }
+fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(), DeedFailure> {
+    super::step(progress, done, of, what).map_err(|_| DeedFailure::Cancelled)
 }
 
 fn fit(
     session: &Path,
-    name: String,
+    name: &str,
     how: &FitWanted,
     who: &Who,
-    progress: &Progress,
-) -> Result<Done, String> {
-    let id = check_name(session, &name)?;
-    let results = how.results(session, progress)?;
-    let based_on = how.based_on.as_deref();
-    let opened = analysed::open(session, based_on).map_err(|err| err.to_string())?;
-    let inputs = opened.inputs(session, based_on);
-    let mut inputs = inputs.map_err(|err| err.to_string())?;
-    for one in &how.together_with {
+    progress: &dyn Progress,
+) -> Result<Done, DeedFailure> {
+    check_name(session, name)?;
+    let results = how.results(session, progress).map_err(DeedFailure::Fit)?;
+    let fit = KeptFit {
+        based_on: how.based_on.as_deref(),
+        together_with: &how.together_with,
+        settings: how.settings(),
+        results,
+    };
+    let analysis = keep_fit(session, name, fit, who)?;
+    Ok(made(session, name, kept::deed(&analysis.what)))
+}
+
+/// A fit that was made and is to be kept.
+#[derive(Clone, Debug)]
+pub struct KeptFit<'a> {
+    /// The analysis that the session was read by.
+    pub based_on: Option<&'a str>,
+    /// Sessions fitted together with it.
+    pub together_with: &'a [Wanted],
+    /// How it was asked for.
+    pub settings: Value,
+    /// What it found.
+    pub results: Value,
+}
+
+/// Keeps a fit of a session as an analysis beside it.
+pub fn keep_fit(
+    session: &Path,
+    name: &str,
+    fit: KeptFit<'_>,
+    who: &Who,
+) -> Result<Analysis, DeedFailure> {
+    let opened = analysed::open(session, fit.based_on)?;
+    let mut inputs = opened.inputs(session, fit.based_on)?;
+    for one in fit.together_with {
         let id = id_of(&one.session)?;
-        let theirs = inputs_of(&one.session).map_err(|err| err.to_string())?;
+        let theirs = inputs_of(&one.session)?;
         inputs.extend(theirs.into_iter().map(|file| Input {
             what: format!("{id}/{}", file.what),
             sha256: file.sha256,
         }));
     }
     let what = Analysed::Fit {
-        based_on: how.based_on.clone(),
-        settings: how.settings(),
-        results,
+        based_on: fit.based_on.map(str::to_owned),
+        settings: fit.settings,
+        results: fit.results,
     };
-    let sentence = kept::deed(&what);
-    keep(session, &id, &name, inputs, what, who)?;
-    Ok(made(session, &name, sentence))
+    let id = &opened.edited.session.manifest.session_id;
+    keep(session, id, name, inputs, what, who)
 }
 
-fn recalibrate(
+/// What another calibration made of a session.
+#[derive(Clone, Debug)]
+pub struct Recalibrated {
+    /// What it did to the forces.
+    pub change: ForceChange,
+    /// The session's rig; empty where there is none.
+    pub rig: String,
+}
+
+/// Makes the forces of a session anew with another calibration, as an analysis beside it.
+pub fn recalibrate(
     session: &Path,
-    name: String,
+    name: &str,
     calibration: &Calibration,
     who: &Who,
-    progress: &Progress,
-) -> Result<Done, String> {
-    let id = check_name(session, &name)?;
-    step(progress, 0, 1, "making the forces anew")?;
-    let found = analysed::recalibration(session, calibration).map_err(|err| err.to_string())?;
-    let (_, inputs, what, change) = found;
-    step(progress, 1, 1, "keeping it")?;
-    keep(session, &id, &name, inputs, what, who)?;
-    Ok(made(session, &name, kept::change(&change)))
+) -> Result<Recalibrated, DeedFailure> {
+    let id = check_name(session, name)?;
+    let (opened, inputs, what, change) = analysed::recalibration(session, calibration)?;
+    keep(session, &id, name, inputs, what, who)?;
+    let rig = opened.edited.session.manifest.rig;
+    Ok(Recalibrated {
+        change,
+        rig: rig.map_or_else(String::new, |rig| rig.name),
+    })
 }
 
-fn mask(
+fn recalibrated(
     session: &Path,
-    name: String,
+    name: &str,
+    calibration: &Calibration,
+    who: &Who,
+    progress: &dyn Progress,
+) -> Result<Done, DeedFailure> {
+    step(progress, 0, 1, "making the forces anew")?;
+    let found = recalibrate(session, name, calibration, who)?;
+    Ok(made(session, name, kept::change(&found.change)))
+}
+
+/// Forces that do not count any more.
+#[derive(Clone, Debug)]
+pub struct Masked {
+    /// The record.
+    pub analysis: Analysis,
+    /// Forces left out.
+    pub left_out: usize,
+    /// Forces there were.
+    pub of: usize,
+}
+
+/// Leaves stretches of a session out, from and to in s since its first sample, as an analysis beside it.
+pub fn mask(
+    session: &Path,
+    name: &str,
     left_out_s: Vec<[f64; 2]>,
     who: &Who,
-    progress: &Progress,
-) -> Result<Done, String> {
-    let id = check_name(session, &name)?;
+    progress: &dyn Progress,
+) -> Result<Masked, DeedFailure> {
+    let id = check_name(session, name)?;
     step(progress, 0, 1, "looking what is left out")?;
-    let mut opened = analysed::open(session, None).map_err(|err| err.to_string())?;
-    let inputs = opened.inputs(session, None);
-    let inputs = inputs.map_err(|err| err.to_string())?;
+    let mut opened = analysed::open(session, None)?;
+    let inputs = opened.inputs(session, None)?;
     let forces = |opened: &analysed::Opened| {
         let rows = opened.edited.session.rows.iter();
         rows.filter(|row| row.force.is_some()).count()
     };
-    let before = forces(&opened);
+    let of = forces(&opened);
     opened.left_out_s.clone_from(&left_out_s);
     opened.blank();
-    let left_out = before - forces(&opened);
+    let left_out = of - forces(&opened);
     if left_out == 0 {
-        return Err(
-            "the session has no force in this stretch, so nothing would be left out; choose another".into(),
-        );
+        return Err(DeedFailure::NothingLeftOut);
     }
     step(progress, 1, 1, "keeping it")?;
     let what = Analysed::Mask { left_out_s };
-    keep(session, &id, &name, inputs, what, who)?;
-    let sentence = format!("{left_out} of {before} forces are left out");
-    Ok(made(session, &name, sentence))
-}
-
-fn edit(session: &Path, change: Change, who: &Who, sentence: String) -> Result<Done, String> {
-    let subject = Subject::read(session).map_err(|err| err.to_string())?;
-    let edit = subject.say(&who.by, &who.reason, change);
-    edit.map_err(|err| err.to_string())?;
-    Ok(Done {
-        sentence,
-        changed: Some(session.to_path_buf()),
-        is_edit: true,
-        made: None,
+    Ok(Masked {
+        analysis: keep(session, &id, name, inputs, what, who)?,
+        left_out,
+        of,
     })
 }
 
-fn correct(session: &Path, number: u32, position: Position, who: &Who) -> Result<Done, String> {
-    let outline = edited::outline(session).map_err(|err| err.to_string())?;
-    let (outline, found) = (&outline.outline, edited::contacts(&outline.outline.entries));
+/// Lets an analysis count no more.
+pub fn withdraw(session: &Path, name: &str, who: &Who) -> Result<Analysis, DeedFailure> {
+    let id = id_of(session)?;
+    keep(session, &id, name, Vec::new(), Analysed::Withdrawal, who)
+}
+
+/// Says what a session is worth; the verdict before, and the edit.
+pub fn judge(
+    session: &Path,
+    verdict: Verdict,
+    who: &Who,
+) -> Result<(Option<Verdict>, Edit), DeedFailure> {
+    let subject = Subject::read(session)?;
+    let was = subject.edits.verdict().map(|(verdict, _)| verdict);
+    let edit = subject.say(&who.by, &who.reason, Change::Verdict { verdict })?;
+    Ok((was, edit))
+}
+
+/// A contact that was found elsewhere.
+#[derive(Clone, Debug)]
+pub struct Corrected {
+    /// Which of the contacts, from 1.
+    pub number: u32,
+    /// Where it really was, from home.
+    pub position: Position,
+    /// Where the session found it.
+    pub was: Position,
+    /// The record.
+    pub edit: Edit,
+}
+
+impl Corrected {
+    /// By how much its depths are more, in mm.
+    #[must_use]
+    pub fn deeper_mm(&self) -> f64 {
+        self.was.depth_from(self.position).0
+    }
+
+    /// In words.
+    #[must_use]
+    pub fn sentence(&self) -> String {
+        format!(
+            "contact {} at {:.3} mm instead of {:.3} mm; its depths change by {:+.3} mm",
+            self.number,
+            self.position.0,
+            self.was.0,
+            self.deeper_mm()
+        )
+    }
+}
+
+/// Says where contact really was; a session that found one only needs no number.
+pub fn correct(
+    session: &Path,
+    number: Option<u32>,
+    position: Position,
+    who: &Who,
+) -> Result<Corrected, DeedFailure> {
+    let passing = edited::outline(session)?;
+    let outline = &passing.outline;
+    let found = edited::contacts(&outline.entries);
+    let number = match (number, found.len()) {
+        (_, 0) => return Err(DeedFailure::NoContact),
+        (Some(number), _) => number,
+        (None, 1) => 1,
+        (None, several) => return Err(DeedFailure::WhichContact(several)),
+    };
     let index = (number as usize).checked_sub(1);
     let Some(was) = index.and_then(|index| found.get(index)) else {
-        return Err(format!(
-            "there is no contact {number}; the session found {}",
-            found.len()
-        ));
+        let found = found.len();
+        return Err(DeedFailure::NoSuchContact { number, found });
     };
     // A session that found a contact has a rig.
     let travel = outline.manifest.rig.as_ref().map(|rig| rig.travel);
     let travel = travel.unwrap_or(Position(0.0));
     if !(0.0..=travel.0).contains(&position.0) {
-        return Err(format!(
-            "contact at {position} is outside the rig's travel of {travel}; give the position from home"
-        ));
+        return Err(DeedFailure::OutsideTravel { position, travel });
     }
+    let was = was.position;
     let change = Change::Contact {
         number,
         position_mm: position,
-        was_mm: was.position,
+        was_mm: was,
     };
-    let deeper = was.position.depth_from(position).0;
-    let sentence = format!(
-        "contact {number} at {:.3} mm instead of {:.3} mm; its depths change by {deeper:+.3} mm",
-        position.0, was.position.0
-    );
-    edit(session, change, who, sentence)
+    let edit = Subject::read(session)?.say(&who.by, &who.reason, change)?;
+    Ok(Corrected {
+        number,
+        position,
+        was,
+        edit,
+    })
 }

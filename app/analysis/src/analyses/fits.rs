@@ -1,16 +1,15 @@
 //! A session fitted once more, and what of it is kept.
 
-use super::super::fit::Intervals;
 use super::step;
-use crate::fit::Fitted;
-use crate::origin::Origin;
+use crate::fit::{Fitted, IntervalsWanted, TogetherRequest, fit_together};
 use crate::progress::Progress;
 use crate::report::dossier::{Wanted, name_of};
 use crate::report::fit_json::{Beside, FitObject, Overlay};
 use crate::report::kept;
 use crate::source::{self, FitSource, Stretch};
-use palpate_rheology::fit::{self, FitOptions, FitReport, FitSample, Parameter, systematic_joint};
-use palpate_runner::Stopwatch;
+use crate::sources::{Recording, Recordings};
+use palpate_rheology::fit::{FitOptions, Parameter};
+use serde::Serialize;
 use serde_json::{Value, json};
 use std::path::Path;
 
@@ -29,6 +28,31 @@ pub struct FitWanted {
     pub together_with: Vec<Wanted>,
 }
 
+/// What is kept of how a fit was asked for, so that it can be asked for again.
+#[derive(Clone, Debug, Default, Serialize)]
+pub struct FitSettings {
+    /// Key of a family; none for the modified Kelvin body.
+    pub family: Option<String>,
+    /// Whether the way back was fitted too.
+    pub unload: bool,
+    /// Parameters held, as name=value.
+    pub fixed: Vec<String>,
+    /// Parameters found that are held by default.
+    pub free: Vec<String>,
+    /// Whether what the calibration's errors do was told.
+    pub systematic: bool,
+    /// Whether intervals from the profile likelihood were found.
+    pub profile: bool,
+    /// Fits of a bootstrap.
+    pub bootstrap: Option<usize>,
+    /// Its seed.
+    pub seed: Option<u64>,
+    /// What was taken from the depths.
+    pub compliance: Option<String>,
+    /// Whether a rejected session was fitted all the same.
+    pub include_rejected: bool,
+}
+
 impl FitWanted {
     /// The family, all its parameters free.
     fn options(&self) -> Result<FitOptions, String> {
@@ -38,16 +62,17 @@ impl FitWanted {
         }
     }
 
-    /// What is kept of the question, in the words of `palpate fit`.
+    /// What is kept of the question.
     pub(super) fn settings(&self) -> Value {
-        let mut settings = json!({
-            "fixed": [], "free": [], "systematic": true, "profile": self.with_profile,
-            "bootstrap": null, "seed": null, "compliance": null, "include_rejected": true,
-        });
-        if let Some(key) = &self.family {
-            settings["family"] = json!(key);
-            settings["unload"] = json!(self.with_unload);
-        }
+        let settings = FitSettings {
+            family: self.family.clone(),
+            unload: self.with_unload,
+            systematic: true,
+            profile: self.with_profile,
+            include_rejected: true,
+            ..FitSettings::default()
+        };
+        let mut settings = json!(settings);
         if let (false, Ok(options)) = (self.together_with.is_empty(), self.options()) {
             let others = self.together_with.iter();
             let others: Vec<Value> = others
@@ -61,10 +86,7 @@ impl FitWanted {
 
     fn read(&self, session: &Path, based_on: Option<&str>) -> Result<FitSource, String> {
         let wanted = source::Wanted {
-            stretch: match self.with_unload {
-                true => Stretch::WithUnload,
-                false => Stretch::RampHold,
-            },
+            stretch: Stretch::with_unload(self.with_unload),
             // Whoever works on a session knows what it is worth.
             is_rejected_included: true,
         };
@@ -73,7 +95,7 @@ impl FitWanted {
     }
 
     /// Fits a session; what `palpate fit --json` prints.
-    pub(super) fn results(&self, session: &Path, progress: &Progress) -> Result<Value, String> {
+    pub(super) fn results(&self, session: &Path, progress: &dyn Progress) -> Result<Value, String> {
         step(progress, 0, 4, "reading the session")?;
         let source = self.read(session, self.based_on.as_deref())?;
         step(progress, 1, 4, "fitting")?;
@@ -81,124 +103,86 @@ impl FitWanted {
         if self.together_with.is_empty() {
             return self.exact(source, &options, progress);
         }
-        let mut sources = vec![(name_of(session), source)];
+        let mut all = vec![Recording::of(name_of(session), source, None)];
         for one in &self.together_with {
             let name = name_of(&one.session);
             step(progress, 1, 4, &format!("reading {name}"))?;
             let source = self.read(&one.session, one.analysis.as_deref())?;
-            sources.push((name, source));
+            all.push(Recording::of(name, source, None));
         }
-        self.joint(&sources, &options, progress)
+        let records = Recordings {
+            all,
+            notes: Vec::new(),
+        };
+        self.joint(&records, &options, progress)
+    }
+
+    fn intervals(&self) -> IntervalsWanted {
+        IntervalsWanted {
+            with_profile: self.with_profile,
+            bootstrap: None,
+        }
     }
 
     fn exact(
         &self,
         source: FitSource,
         options: &FitOptions,
-        progress: &Progress,
+        progress: &dyn Progress,
     ) -> Result<Value, String> {
         let fitted = Fitted::of(source, options);
         step(progress, 2, 4, "moving the calibration by its errors")?;
         let fitted = fitted.with_systematic(options);
         let report = fitted.result.as_ref().map_err(ToString::to_string)?;
-        let mut intervals = Intervals::default();
         if self.with_profile {
             step(progress, 3, 4, "profile likelihood")?;
-            let exact = fit::Fitted::of(&fitted.samples, options);
-            intervals = exact
-                .and_then(|exact| Intervals::of(&exact, 0, true, None, |_| ()))
-                .map_err(|err| err.to_string())?;
         }
+        let intervals = fitted.intervals(options, self.intervals(), |_| ());
+        let intervals = intervals.map_err(|err| err.to_string())?;
         step(progress, 4, 4, "keeping it")?;
-        let systematic = fitted.systematic.as_ref();
-        let told = Told {
-            report,
-            samples: &fitted.samples,
-            intervals: &intervals,
-            seconds: fitted.seconds,
-        };
-        told.object(options, systematic)
+        let overlay = Overlay::of(report, &fitted.samples);
+        let beside = fitted.beside(&overlay, &intervals);
+        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        serde_json::to_value(&object).map_err(|err| err.to_string())
     }
 
-    /// The first of several sources, fitted with the others as one body.
+    /// The first of several recordings, fitted with the others as one body.
     fn joint(
         &self,
-        sources: &[(String, FitSource)],
+        records: &Recordings,
         options: &FitOptions,
-        progress: &Progress,
+        progress: &dyn Progress,
     ) -> Result<Value, String> {
-        let records: Vec<(&str, &[FitSample])> = sources
-            .iter()
-            .map(|(name, source)| (name.as_str(), source.samples.as_slice()))
-            .collect();
         step(progress, 2, 4, "fitting all together")?;
-        let body = options.body_names();
-        let watch = Stopwatch::start();
-        let fitted = fit::Fitted::joint(&records, options, &body).map_err(|err| err.to_string())?;
-        let mut report = fitted.joint_report();
-        let seconds = watch.seconds();
-        let intervals = Intervals::of(&fitted, 0, self.with_profile, None, |_| ());
-        let intervals = intervals.map_err(|err| err.to_string())?;
-        step(progress, 3, 4, "moving the calibrations by their errors")?;
-        let origins: Result<Vec<Origin>, _> = sources
-            .iter()
-            .map(|(_, source)| Origin::of(source.calibration.as_ref(), None))
-            .collect();
-        let origins = origins.map_err(|err| err.to_string())?;
-        let traced: Vec<_> = records
-            .iter()
-            .zip(&origins)
-            .map(|((name, samples), origin)| origin.traced(name, samples))
-            .collect();
-        let is_known = origins.iter().any(Origin::is_known);
-        let found = is_known.then(|| systematic_joint(&traced, options, &body));
-        let found = found.transpose().map_err(|err| err.to_string())?;
-        if let Some(found) = &found {
-            report = report.with_systematic(found);
+        let request = TogetherRequest {
+            options,
+            shared: options.body_names(),
+            is_systematic: true,
+            intervals: self.intervals(),
+        };
+        let fitted = fit_together(records, &request, |_, _| ());
+        let mut fitted = fitted.map_err(|err| err.to_string())?;
+        if let Some(reason) = fitted.notes.pop() {
+            return Err(reason);
         }
         step(progress, 4, 4, "keeping it")?;
-        let first = report.records.first().ok_or("there is no record")?;
-        let told = Told {
-            report: &first.report,
-            samples: records[0].1,
-            intervals: &intervals,
-            seconds,
+        let beside = Beside {
+            systematic: fitted.systematic.as_ref().and_then(|found| found.first()),
+            ..fitted.beside(records).remove(0)
         };
-        let systematic = found.as_ref().and_then(|found| found.first());
-        let mut results = told.object(options, systematic)?;
-        results["shared"] = json!(report.shared);
+        let report = &fitted.report.records[0].report;
+        let object = FitObject::of(options.family(), report, beside, fitted.seconds);
+        let mut results = serde_json::to_value(&object).map_err(|err| err.to_string())?;
+        results["shared"] = json!(fitted.report.shared);
         Ok(results)
     }
 }
 
-/// A fit of one record, to be told.
-struct Told<'a> {
-    report: &'a FitReport,
-    samples: &'a [FitSample],
-    intervals: &'a Intervals,
-    seconds: f64,
-}
-
-impl Told<'_> {
-    fn object(
-        &self,
-        options: &FitOptions,
-        systematic: Option<&fit::Systematic>,
-    ) -> Result<Value, String> {
-        let overlay = Overlay::of(self.report, self.samples);
-        let beside = Beside {
-            overlay: &overlay,
-            intervals: self.intervals,
-            systematic,
-            compliance: None,
-        };
-        let object = FitObject::of(options.family(), self.report, beside, self.seconds);
-        serde_json::to_value(&object).map_err(|err| err.to_string())
-    }
-}
-
 /// The session's own fit, as its edits leave it, to be compared with: parameters and sentences.
-pub fn own(session: &Path, progress: &Progress) -> Result<(Vec<Parameter>, Vec<String>), String> {
+pub fn own(
+    session: &Path,
+    progress: &dyn Progress,
+) -> Result<(Vec<Parameter>, Vec<String>), String> {
     let wanted = FitWanted {
         family: None,
         with_unload: false,

@@ -4,8 +4,11 @@ mod deeds;
 mod fits;
 mod papers;
 
-pub use deeds::{Deed, Who};
-pub use fits::{FitWanted, own};
+pub use deeds::{
+    Corrected, Deed, DeedFailure, KeptFit, Masked, Recalibrated, Who, correct, judge, keep_fit,
+    mask, recalibrate, withdraw,
+};
+pub use fits::{FitSettings, FitWanted, own};
 pub use papers::{Paper, paper};
 
 use crate::edited;
@@ -80,7 +83,7 @@ impl Done {
 }
 
 /// Tells how far the work is; an error if nobody wants the rest.
-fn step(progress: &Progress, done: usize, of: usize, what: &str) -> Result<(), String> {
+fn step(progress: &dyn Progress, done: usize, of: usize, what: &str) -> Result<(), String> {
     match progress.tell(done, of, what).is_break() {
         true => Err("cancelled; nothing was kept".to_owned()),
         false => Ok(()),

@@ -17,7 +17,7 @@ pub enum Paper {
 }
 
 /// Writes it as a new file, or says why not.
-pub fn paper(paper: &Paper, to: &Path, progress: &Progress) -> Result<Done, String> {
+pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, String> {
     if to.exists() {
         return Err(format!(
             "{} exists already; choose another name",
@@ -26,10 +26,8 @@ pub fn paper(paper: &Paper, to: &Path, progress: &Progress) -> Result<Done, Stri
     }
     let bytes = match paper {
         Paper::Page(wanted) => {
-            let count = wanted.len();
-            let mut tell = |done: usize, name: &str| progress.tell(done, count, name);
             let made = dossier::made(wall_now().into());
-            let page = dossier::write(wanted, Align::default(), &made, &mut tell);
+            let page = dossier::write(wanted, Align::default(), &made, progress);
             page.map_err(|err| err.to_string())?.into_bytes()
         }
         Paper::Figure(wanted, figure, window) => {

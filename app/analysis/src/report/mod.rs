@@ -16,6 +16,7 @@ pub(super) mod imported;
 pub mod kept;
 pub mod picture;
 pub mod plan_picture;
+pub mod plan_plot;
 pub mod programme;
 pub mod said;
 pub mod scene;

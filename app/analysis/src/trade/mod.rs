@@ -19,6 +19,7 @@ pub use picture::svg;
 pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 pub use text::text;
 
+use crate::progress::Progress;
 use chrono::{DateTime, SecondsFormat, Utc};
 use palpate_rheology::trade::{Cost, TRADE_FORMAT, TradeCurves};
 use palpate_runner::wall_now;
@@ -34,9 +35,6 @@ pub enum Extent {
     Quick,
 }
 
-/// How much of the work is done, of how much, and what is under way; may end the whole.
-pub type Progress<'a> = dyn Fn(usize, usize, &str) -> ControlFlow<()> + 'a;
-
 /// Tables whose errors [`errors`] computes.
 const TABLES: usize = 4;
 /// Seeds of the noise in the fits: the first, and how many.
@@ -50,28 +48,28 @@ const UNMEASURED: Cost = Cost {
 };
 
 /// All rows, computed, timed and marked; none if `progress` ended it.
-pub fn measure(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
+pub fn measure(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let total = TABLES + timing::rounds(extent);
-    let of_errors = |done: usize, _: usize, what: &str| progress(done, total, what);
+    let of_errors = |done: usize, _: usize, what: &str| progress.tell(done, total, what);
     let Some(curves) = errors(extent, &of_errors)? else {
         return Ok(None);
     };
     let mut done = TABLES;
     times(curves, extent, &mut || {
         done += 1;
-        progress(done, total, "times")
+        progress.tell(done, total, "times")
     })
 }
 
 /// All rows with their errors and without times: what [`TradeCurves::agrees_with`] compares. None if
 /// `progress` ended it.
-pub fn errors(extent: Extent, progress: &Progress<'_>) -> Result<Option<TradeCurves>, String> {
+pub fn errors(extent: Extent, progress: &dyn Progress) -> Result<Option<TradeCurves>, String> {
     let paths = paths::Paths::new()?;
     let seeds = match extent {
         Extent::Full => SEEDS_FULL,
         Extent::Quick => SEEDS_QUICK,
     };
-    let ends = |done: usize, what: &str| progress(done, TABLES, what).is_break();
+    let ends = |done: usize, what: &str| progress.tell(done, TABLES, what).is_break();
     if ends(0, "errors of the integrators") {
         return Ok(None);
     }

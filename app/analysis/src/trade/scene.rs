@@ -1,7 +1,8 @@
 //! What exactness costs in a scene: mesh, influence cut, integrator and step, family. Errors are computed, times measured.
 
 use super::timing::{self, Job};
-use super::{Extent, Progress, families, integrators, paths};
+use super::{Extent, families, integrators, paths};
+use crate::progress::Progress;
 use palpate_haptics::surface::{
     Contact, Cut, CutPoint, FamilyPoint, HandPoke, MeshPoint, Method, PokeScene, REFERENCE_NODES,
     Recovery, SceneCurves, Side, StepPoint, Surface,
@@ -88,7 +89,7 @@ fn job<'a>(scene: &PokeScene, nodes: usize, cut: Cut) -> Result<Job<'a>, String>
 /// The curves of this machine; none if `progress` ended it.
 pub fn measure_scene(
     extent: Extent,
-    progress: &Progress<'_>,
+    progress: &dyn Progress,
 ) -> Result<Option<SceneCurves>, String> {
     let (meshes, reference) = match extent {
         Extent::Full => (&MESHES[..], REFERENCE_NODES),
@@ -98,7 +99,7 @@ pub fn measure_scene(
     let mut done = 0;
     let mut goes_on = |what: &str| {
         done += 1;
-        progress(done - 1, total, what).is_continue()
+        progress.tell(done - 1, total, what).is_continue()
     };
     let scene = pokes();
     let mut curves = SceneCurves::default();
@@ -152,7 +153,7 @@ pub fn measure_scene(
     jobs.extend(families::jobs(&rows)?);
     let costs = timing::measure(&mut jobs, extent, &mut || {
         done += 1;
-        progress(done - 1, total, "times")
+        progress.tell(done - 1, total, "times")
     });
     let Some(costs) = costs else {
         return Ok(None);
@@ -219,7 +220,9 @@ mod tests {
         };
         let chosen = plan(&needs, &curves, 1.0).unwrap();
         assert_eq!(chosen.mesh.nodes, 51);
-        let ended = measure_scene(Extent::Quick, &|_, _, _| ControlFlow::Break(()));
+        let ended = measure_scene(Extent::Quick, &|_: usize, _: usize, _: &str| {
+            ControlFlow::Break(())
+        });
         assert!(ended.unwrap().is_none());
     }
 }

@@ -65,9 +65,6 @@ pub struct ImportArgs {
     /// Draw curve, residuals, sensitivity and uncertainty as a new SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Arguments of `palpate calibration supersede`.

@@ -16,11 +16,11 @@ use serde::Serialize;
 use source::Source;
 use std::path::PathBuf;
 
-/// The commands on calibrations.
+/// Keep, show and check load-cell calibrations
 #[derive(Debug, Subcommand)]
 pub enum CalibrationCommand {
     /// List the calibrations of the library
-    List(ListArgs),
+    List,
     /// Tell what a calibration is like: curve, uncertainty, flat stretches
     Show(ShowArgs),
     /// Check a calibration with one known weight
@@ -29,14 +29,6 @@ pub enum CalibrationCommand {
     Import(import::ImportArgs),
     /// Store a new calibration in the place of an old one, which is kept
     Supersede(import::SupersedeArgs),
-}
-
-/// Arguments of `palpate calibration list`.
-#[derive(Debug, Args)]
-pub struct ListArgs {
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate calibration show`.
@@ -48,9 +40,6 @@ pub struct ShowArgs {
     /// Draw curve, residuals, sensitivity and uncertainty as a new SVG file
     #[arg(long, value_name = "FILE")]
     picture: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
 }
 
 /// Arguments of `palpate calibration check`.
@@ -74,27 +63,11 @@ pub struct CheckArgs {
     /// Largest error in percent of the weight [default: 1, as ASTM E4 asks]
     #[arg(long, value_name = "PERCENT")]
     limit: Option<f64>,
-    /// Print one JSON object
-    #[arg(long)]
-    json: bool,
-}
-
-impl CalibrationCommand {
-    /// Whether it prints JSON.
-    pub fn is_json(&self) -> bool {
-        match self {
-            Self::List(args) => args.json,
-            Self::Show(args) => args.json,
-            Self::Check(args) => args.json,
-            Self::Import(args) => args.json,
-            Self::Supersede(args) => args.new.json,
-        }
-    }
 }
 
 pub(super) fn run(command: &CalibrationCommand, output: &Output) -> Result<(), Failure> {
     match command {
-        CalibrationCommand::List(_) => list(output),
+        CalibrationCommand::List => list(output),
         CalibrationCommand::Show(args) => show(args, output),
         CalibrationCommand::Check(args) => check(args, output),
         CalibrationCommand::Import(args) => import::import(args, output),
@@ -104,7 +77,6 @@ pub(super) fn run(command: &CalibrationCommand, output: &Output) -> Result<(), F
 
 #[derive(Serialize)]
 struct ListReport {
-    command: &'static str,
     folder: PathBuf,
     calibrations: Vec<report::Entry>,
     unreadable: Vec<String>,
@@ -117,19 +89,19 @@ fn list(output: &Output) -> Result<(), Failure> {
     unreadable.iter().for_each(|reason| output.note(reason));
     let entry = |kept| report::Entry::of(&shelf, kept, source::age_days(kept));
     let found = ListReport {
-        command: "calibration list",
         folder: library.join("calibrations"),
         calibrations: shelf.kept.iter().map(entry).collect(),
         unreadable,
     };
-    output.result(&found, || report::list(&found.calibrations, &found.folder));
+    output.answer("calibration list", &found, || {
+        report::list(&found.calibrations, &found.folder)
+    });
     Ok(())
 }
 
 /// A calibration with all that is told of it.
 #[derive(Serialize)]
 struct ShowReport<'a> {
-    command: &'static str,
     /// Its id in the library, null where it is not from there.
     id: Option<&'a str>,
     file: Option<&'a PathBuf>,
@@ -147,7 +119,7 @@ fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
 
 /// Prints and draws a calibration.
 fn tell(
-    command: &'static str,
+    command: &str,
     source: &Source,
     picture: Option<&std::path::Path>,
     output: &Output,
@@ -162,25 +134,16 @@ fn tell(
         report::picture(&source.calibration, &told)
     })?;
     let object = ShowReport {
-        command,
         id: source.id.as_deref(),
         file: source.file.as_ref(),
         told: &told,
         doubts: &doubts,
         document: &source.calibration,
     };
-    output.result(&object, || {
+    output.answer(command, &object, || {
         report::whole(&source.calibration, source.id.as_deref(), &told, &doubts)
     });
     Ok(())
-}
-
-#[derive(Serialize)]
-struct CheckReport<'a> {
-    command: &'static str,
-    calibration: &'a str,
-    #[serde(flatten)]
-    result: &'a palpate_model::calibration::CheckResult,
 }
 
 fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
@@ -193,12 +156,9 @@ fn check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
         limit_percent: args.limit,
     };
     let result = source.calibration.check(&weight).map_err(Failure::usage)?;
-    let object = CheckReport {
-        command: "calibration check",
-        calibration: &source.calibration.name,
-        result: &result,
-    };
-    output.result(&object, || report::check(&result));
+    let mut object = serde_json::json!(result);
+    object["calibration"] = source.calibration.name.as_str().into();
+    output.answer("calibration check", &object, || report::check(&result));
     match result.is_passed {
         true => Ok(()),
         false => Err(Failure::failed(&result.sentence)),

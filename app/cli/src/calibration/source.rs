@@ -67,7 +67,7 @@ pub(super) fn age_days(kept: &Kept) -> Option<i64> {
 }
 
 /// Names and documents are the user's; the disk is not.
-pub(super) fn failure(err: LibraryError) -> Failure {
+pub(crate) fn failure(err: LibraryError) -> Failure {
     match err {
         LibraryError::Io { .. } | LibraryError::Changed { .. } => Failure::failed(err),
         _ => Failure::usage(err),

@@ -1,9 +1,9 @@
 //! Many sources, each read and fitted on one of several threads; the answers in the sources' order.
 
 use super::super::{Failure, output::Output, source_failure};
-use super::Recipe;
 use palpate_analysis::compliance::Correction;
-use palpate_analysis::pool::{News, NoAnswer, in_order};
+use palpate_analysis::fit::{Fitted, NotFitted, Recipe, each};
+use palpate_analysis::pool::News;
 use palpate_analysis::report::text;
 use palpate_analysis::source::SourceError;
 use palpate_rheology::fit::{FitReport, Parameter};
@@ -12,18 +12,24 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 
-/// What came of one source.
-struct Answer {
-    notes: Vec<String>,
-    compliance: Option<Correction>,
-    result: Result<FitReport, NotFitted>,
-}
+/// What is told of one source.
+type Row = Result<FitReport, Untold>;
 
 /// Why a source has no fit.
-enum NotFitted {
+enum Untold {
     /// Its session was rejected, and that is not a failure of the batch.
     Rejected(String),
     Failed(Failure),
+}
+
+impl From<NotFitted> for Untold {
+    fn from(none: NotFitted) -> Self {
+        match none {
+            NotFitted::Source(SourceError::Rejected { reason }) => Self::Rejected(reason),
+            NotFitted::Source(err) => Self::Failed(source_failure(err)),
+            none => Self::Failed(Failure::failed(none)),
+        }
+    }
 }
 
 #[derive(Serialize)]
@@ -60,8 +66,7 @@ pub(super) fn run(
     let bar = output.count_bar(sources.len() as u64);
     let mut rows = Vec::with_capacity(sources.len());
     let (mut failed, mut rejected) = (0, 0);
-    let work = |source: &PathBuf| answer(source, recipe);
-    in_order(jobs, sources, &is_ending, work, |news| match news {
+    each(sources, jobs, recipe, &is_ending, |news| match news {
         News::Done(count) => {
             bar.set_position(count as u64);
             if is_ending.load(Ordering::Relaxed) {
@@ -70,14 +75,11 @@ pub(super) fn run(
         }
         News::Next(answer) => {
             let source = sources[rows.len()].as_path();
-            let Answer {
-                notes,
-                compliance,
-                result,
-            } = answer.unwrap_or_else(missing);
+            let answer = answer.map_err(NotFitted::from);
+            let (notes, compliance, result) = told(answer.and_then(|read| Ok(read?)));
             match &result {
-                Err(NotFitted::Failed(_)) => failed += 1,
-                Err(NotFitted::Rejected(_)) => rejected += 1,
+                Err(Untold::Failed(_)) => failed += 1,
+                Err(Untold::Rejected(_)) => rejected += 1,
                 Ok(_) => {}
             }
             bar.suspend(|| {
@@ -91,11 +93,11 @@ pub(super) fn run(
                         notes: &notes,
                         compliance: compliance.as_ref(),
                     }),
-                    Err(NotFitted::Rejected(reason)) => output.object(&RejectedLine {
+                    Err(Untold::Rejected(reason)) => output.object(&RejectedLine {
                         source,
                         rejected: reason,
                     }),
-                    Err(NotFitted::Failed(failure)) => output.object(&FailedLine {
+                    Err(Untold::Failed(failure)) => output.object(&FailedLine {
                         source,
                         error: failure.sentence(),
                         exit: failure.code(),
@@ -106,7 +108,7 @@ pub(super) fn run(
         }
     })
     .map_err(|err| Failure::failed(format!("no thread can be started ({err}); try again")))?;
-    bar.finish_and_clear();
+    drop(bar);
     output.text_only(|| table(sources, &rows));
     if rejected > 0 {
         output.note(&format!(
@@ -136,23 +138,15 @@ pub(super) fn end_on_signals(is_ending: &Arc<AtomicBool>) -> Result<(), Failure>
     .map_err(|err| Failure::failed(format!("cannot listen for Ctrl-C: {err}")))
 }
 
-fn answer(source: &Path, recipe: &Recipe) -> Answer {
-    match recipe.read(source) {
-        Ok(fitted) => Answer {
-            notes: with_correction(fitted.notes, fitted.compliance.as_ref()),
-            compliance: fitted.compliance,
-            result: fitted
-                .result
-                .map_err(|err| NotFitted::Failed(Failure::failed(err))),
-        },
-        Err(err) => Answer {
-            notes: Vec::new(),
-            compliance: None,
-            result: Err(match err {
-                SourceError::Rejected { reason } => NotFitted::Rejected(reason),
-                err => NotFitted::Failed(source_failure(err)),
-            }),
-        },
+/// Remarks, the correction of depths, and the fit or why there is none.
+fn told(answer: Result<Fitted, NotFitted>) -> (Vec<String>, Option<Correction>, Row) {
+    match answer {
+        Ok(fitted) => (
+            with_correction(fitted.notes, fitted.compliance.as_ref()),
+            fitted.compliance,
+            fitted.result.map_err(|err| NotFitted::Fit(err).into()),
+        ),
+        Err(none) => (Vec::new(), None, Err(none.into())),
     }
 }
 
@@ -163,21 +157,9 @@ fn with_correction(mut notes: Vec<String>, told: Option<&Correction>) -> Vec<Str
     notes
 }
 
-fn missing(none: NoAnswer) -> Answer {
-    let sentence = match none {
-        NoAnswer::NotBegun => "not begun; the batch was asked to end",
-        NoAnswer::Died => "the fit ended unexpectedly; report this with the source",
-    };
-    Answer {
-        notes: Vec::new(),
-        compliance: None,
-        result: Err(NotFitted::Failed(Failure::failed(sentence))),
-    }
-}
-
 /// One row per source: parameters with their intervals, how good, how many sentences; or why not.
 /// Parameters that were held everywhere have no column.
-fn table(sources: &[PathBuf], rows: &[Result<FitReport, NotFitted>]) -> String {
+fn table(sources: &[PathBuf], rows: &[Row]) -> String {
     let reports = || rows.iter().flatten();
     let known = reports().next().map_or(&[][..], |first| &first.parameters);
     let is_shown = |one: &&Parameter| {
@@ -203,8 +185,8 @@ fn table(sources: &[PathBuf], rows: &[Result<FitReport, NotFitted>]) -> String {
                 line.push(format!("{:.3}", report.rmse_n * 1e3));
                 line.push(report.sentences().count().to_string());
             }
-            Err(NotFitted::Rejected(reason)) => line.push(format!("rejected: {reason}")),
-            Err(NotFitted::Failed(failure)) => {
+            Err(Untold::Rejected(reason)) => line.push(format!("rejected: {reason}")),
+            Err(Untold::Failed(failure)) => {
                 line.push(format!("failed: {}", failure.sentence()));
             }
         }

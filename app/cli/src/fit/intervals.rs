@@ -1,10 +1,11 @@
 //! Intervals that take more than one pass: profile likelihood and block bootstrap.
 
-use super::super::{Failure, output::Output};
+use super::super::Failure;
+use super::super::output::{Bar, Output};
 use super::FitArgs;
-use palpate_analysis::fit::Intervals;
+use palpate_analysis::fit::{Intervals, IntervalsWanted};
 use palpate_figures::uncertain::{interval, plain};
-use palpate_rheology::fit::{Bootstrap, FitReport, Fitted};
+use palpate_rheology::fit::{Bootstrap, FitReport};
 
 /// Repeats below this say nothing of the ends of a 95 % interval.
 const REPEATS_MIN: usize = 40;
@@ -22,34 +23,25 @@ pub(super) fn check(args: &FitArgs) -> Result<(), Failure> {
     }
 }
 
-/// Whether any are asked for.
-pub(super) fn wanted(args: &FitArgs) -> bool {
-    args.profile || args.bootstrap.is_some()
+/// Those that are asked for.
+pub(super) fn wanted(args: &FitArgs) -> IntervalsWanted {
+    let seed = args.seed.unwrap_or(1);
+    IntervalsWanted {
+        with_profile: args.profile,
+        bootstrap: args.bootstrap.map(|repeats| Bootstrap { seed, repeats }),
+    }
 }
 
-/// Finds what `args` ask for of one record of a fit.
-pub(super) fn find(
-    args: &FitArgs,
-    fitted: &Fitted<'_>,
-    record: usize,
-    output: &Output,
-) -> Result<Intervals, Failure> {
-    let seed = args.seed.unwrap_or(1);
-    let bootstrap = args.bootstrap.map(|repeats| Bootstrap { seed, repeats });
-    let bar = bootstrap.map(|choice| {
-        let bar = output.count_bar(choice.repeats as u64);
-        bar.set_message("bootstrap");
-        bar
-    });
-    let found = Intervals::of(fitted, record, args.profile, bootstrap, |done| {
-        if let Some(bar) = &bar {
-            bar.set_position(done as u64);
-        }
-    });
-    if let Some(bar) = &bar {
-        bar.finish_and_clear();
-    }
-    found.map_err(Failure::failed)
+/// A bar over the fits of a bootstrap, if one is asked for.
+pub(super) fn bar(args: &FitArgs, output: &Output) -> Option<Bar> {
+    let bar = output.count_bar(args.bootstrap? as u64);
+    bar.set_message("bootstrap");
+    Some(bar)
+}
+
+/// Shows how many of them are done.
+pub(super) fn show(bar: &Option<Bar>, done: usize) {
+    bar.iter().for_each(|bar| bar.set_position(done as u64));
 }
 
 /// Lines for people, in the digits of the report.

@@ -1,18 +1,12 @@
 //! Several sources fitted together, with some parameters the same in all.
 
-use super::super::{Failure, output::Output};
-use super::sources::{self, Recording};
-use super::{FitArgs, Recipe, intervals};
-use palpate_analysis::fit::Intervals;
-use palpate_analysis::report::fit_json::{Beside, JointObject, Overlay};
+use super::super::{Failure, output::Output, sources_failure};
+use super::{FitArgs, intervals};
+use palpate_analysis::fit::{Recipe, TogetherRequest, fit_together};
+use palpate_analysis::report::fit_json::Beside;
 use palpate_analysis::report::{family, text};
-use palpate_rheology::fit::{
-    FitError, FitSample, Fitted, JointReport, NamedReport, Parameter, Traced, systematic_joint,
-};
-use palpate_runner::Stopwatch;
-
-/// Stands for all parameters of the specimen.
-const BODY: &str = "body";
+use palpate_analysis::sources::{self, Naming, Reading};
+use palpate_rheology::fit::{FitError, JointReport, NamedReport, Parameter};
 
 /// Fits all sources together; `shared` is a list of names with commas, the whole body without it.
 pub(super) fn run(
@@ -21,83 +15,49 @@ pub(super) fn run(
     recipe: &Recipe,
     output: &Output,
 ) -> Result<(), Failure> {
-    let found = sources::find(&args.sources, output)?;
-    if shared.is_some() && found.len() < 2 {
+    let found = sources::find(&args.sources).map_err(sources_failure)?;
+    found.note().iter().for_each(|note| output.note(note));
+    if shared.is_some() && found.paths.len() < 2 {
         return Err(Failure::usage(
             "--share needs at least two recordings; name them all, or a folder of them",
         ));
     }
-    let options = &recipe.options;
-    let body = options.body_names();
-    let shared = names(shared, &body);
-    let records = sources::read(
-        &found,
-        recipe.columns.as_ref(),
-        recipe.wanted,
-        &recipe.corrections,
-        output,
-    )?;
-    let borrowed: Vec<(&str, &[FitSample])> = records.iter().map(Recording::borrowed).collect();
-    let watch = Stopwatch::start();
-    let fitted = Fitted::joint(&borrowed, options, &shared).map_err(|err| match err {
+    let how = Reading {
+        columns: recipe.columns.as_ref(),
+        wanted: recipe.wanted,
+        corrections: &recipe.corrections,
+        naming: Naming::Path,
+    };
+    let records = sources::read(&found.paths, how).map_err(sources_failure)?;
+    records.notes.iter().for_each(|note| output.note(note));
+    let request = TogetherRequest {
+        options: &recipe.options,
+        shared: shared.unwrap_or("body").split(',').map(str::trim).collect(),
+        is_systematic: recipe.is_systematic,
+        intervals: intervals::wanted(args),
+    };
+    let bar = intervals::bar(args, output);
+    let fitted = fit_together(&records, &request, |_, done| intervals::show(&bar, done));
+    drop(bar);
+    let fitted = fitted.map_err(|err| match err {
         FitError::NotShareable { .. } | FitError::UnknownParameter { .. } => Failure::usage(err),
         _ => Failure::failed(err),
     })?;
-    let mut report = fitted.joint_report();
-    let seconds = watch.seconds();
-    let find = |records: &[Traced<'_>]| systematic_joint(records, options, &shared);
-    let systematic = match recipe.is_systematic {
-        true => sources::systematic(&records, find, output),
-        false => None,
-    };
-    if let Some(found) = &systematic {
-        report = report.with_systematic(found);
-    }
-    let reports = report.records.iter().map(|one| &one.report);
-    let overlays: Vec<Overlay> = reports
-        .zip(&borrowed)
-        .map(|(report, (_, samples))| Overlay::of(report, samples))
-        .collect();
-    let each = (0..borrowed.len()).map(|record| match intervals::wanted(args) {
-        true => intervals::find(args, &fitted, record, output),
-        false => Ok(Intervals::default()),
-    });
-    let intervals: Vec<Intervals> = each.collect::<Result<_, Failure>>()?;
-    let beside: Vec<Beside<'_>> = overlays
-        .iter()
-        .zip(&intervals)
-        .zip(&records)
-        .map(|((overlay, intervals), record)| Beside {
-            overlay,
-            intervals,
-            systematic: None,
-            compliance: record.compliance.as_ref(),
-        })
-        .collect();
-    let family = options.family();
-    let object = JointObject::of(family, &report, &beside, systematic.as_deref(), seconds);
+    fitted.notes.iter().for_each(|note| output.note(note));
+    let beside = fitted.beside(&records);
+    let (family, is_named) = (recipe.options.family(), args.family.is_some());
+    let object = fitted.object(&recipe.options, &beside);
     output.result(&object, || {
-        let first = systematic.iter().flatten().next();
-        let mut lines = vec![whole(&report, &beside, recipe.is_named)];
-        if recipe.is_named {
+        let mut lines = vec![whole(&fitted.report, &beside, is_named)];
+        if is_named {
             lines[0] = family::with_equation(family, &lines[0]);
             lines.extend(family::limits(family).map(|sentence| format!("- {sentence}")));
         }
+        let first = fitted.systematic.iter().flatten().next();
         lines.extend(first.map(|one| format!("- {}", one.sentence())));
         lines.join("\n")
     });
     Ok(())
-}
-
-/// Names in a list with commas, the whole body without one.
-fn names<'a>(shared: Option<&'a str>, body: &[&'a str]) -> Vec<&'a str> {
-    let names = shared.unwrap_or(BODY).split(',').map(str::trim);
-    names
-        .flat_map(|name| match name {
-            BODY => body.to_vec(),
-            name => vec![name],
-        })
-        .collect()
 }
 
 /// What is shared once, then every record with what is its own.

@@ -5,27 +5,26 @@ mod intervals;
 mod joint;
 mod lake;
 mod saved;
-pub(super) mod sources;
 
 use super::Failure;
-use super::analysis::Who;
 use super::output::Output;
-use super::{compliance, new_file};
+use super::recalibrate::Who;
+use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
 use palpate_analysis::compliance::{Correction, Corrections};
-use palpate_analysis::fit::Fitted;
+use palpate_analysis::fit::{Recipe, remember};
 use palpate_analysis::report::family;
-use palpate_analysis::report::fit_json::{Beside, FitObject, Overlay};
+use palpate_analysis::report::fit_json::{FitObject, Overlay};
 use palpate_analysis::report::{picture, text};
-use palpate_analysis::source::{self, FitSource, SourceError, Stretch, Wanted};
+use palpate_analysis::source::{Stretch, Wanted};
+use palpate_analysis::sources::{self, is_collection};
 use palpate_model::calibration::ForceUncertainty;
-use palpate_rheology::fit::{self, FitOptions};
-use palpate_tables::import::ColumnNames;
+use palpate_rheology::fit::FitOptions;
 use palpate_tables::lake::{Shard, is_lake};
 use std::num::NonZeroUsize;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `palpate fit`.
+/// Fit the force model to a session or a table
 #[derive(Debug, Args)]
 pub struct FitArgs {
     /// Session folders, delimited tables with columns for time, depth and force, or folders in
@@ -91,20 +90,13 @@ pub struct FitArgs {
     /// Sources fitted at a time; as many as the computer has processors without it
     #[arg(long, value_name = "N")]
     jobs: Option<NonZeroUsize>,
-    /// Print one JSON object, or one per line for several sources
-    #[arg(long)]
-    pub json: bool,
 }
 
 impl FitArgs {
     /// What is asked of the sources.
     fn wanted(&self) -> Wanted {
-        let stretch = match self.unload {
-            true => Stretch::WithUnload,
-            false => Stretch::RampHold,
-        };
         Wanted {
-            stretch,
+            stretch: Stretch::with_unload(self.unload),
             is_rejected_included: self.include_rejected,
         }
     }
@@ -115,40 +107,10 @@ impl FitArgs {
     }
 }
 
-/// How every source is fitted.
-struct Recipe {
-    options: FitOptions,
-    /// Whether the family was named, so that what it is and cannot represent is told too.
-    is_named: bool,
-    columns: Option<ColumnNames>,
-    is_systematic: bool,
-    wanted: Wanted,
-    analysis: Option<String>,
-    corrections: Corrections,
-}
-
-impl Recipe {
-    fn fit(&self, path: &Path) -> Result<Fitted, Failure> {
-        self.read(path).map_err(super::source_failure)
-    }
-
-    fn read(&self, path: &Path) -> Result<Fitted, SourceError> {
-        let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
-        self.finish(source::read_analysed(path, columns, self.wanted, name)?)
-    }
-
-    /// Fits what was read.
-    fn finish(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
-        let compliance = self.corrections.apply(&mut source)?;
-        let fitted = Fitted {
-            compliance,
-            ..Fitted::of(source, &self.options)
-        };
-        Ok(match self.is_systematic {
-            true => fitted.with_systematic(&self.options),
-            false => fitted,
-        })
-    }
+/// Sources fitted at a time.
+fn jobs(args: &FitArgs) -> usize {
+    let jobs = args.jobs.or(std::thread::available_parallelism().ok());
+    jobs.map_or(1, NonZeroUsize::get)
 }
 
 pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
@@ -162,7 +124,6 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
     }
     let recipe = Recipe {
         options: options(args)?,
-        is_named: args.family.is_some(),
         columns,
         is_systematic: !args.no_systematic,
         wanted: args.wanted(),
@@ -181,7 +142,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
         return joint::run(args, Some(shared), &recipe, output);
     }
     if let [source] = args.sources.as_slice()
-        && !sources::is_collection(source)
+        && !is_collection(source)
     {
         return one(source, &recipe, args, output);
     }
@@ -190,7 +151,7 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
             "--picture, --save and --analysis are for one record; name a single session or table",
         ));
     }
-    if recipe.is_named && !args.each {
+    if args.family.is_some() && !args.each {
         return joint::run(args, None, &recipe, output);
     }
     if args.profile || args.bootstrap.is_some() {
@@ -198,16 +159,16 @@ pub(super) fn run(args: &FitArgs, output: &Output) -> Result<(), Failure> {
             "--profile and --bootstrap are for one fit; name a single session or table, or share parameters",
         ));
     }
-    let found = sources::find(&args.sources, output)?;
-    let jobs = args.jobs.or(std::thread::available_parallelism().ok());
-    batch::run(&found, jobs.map_or(1, NonZeroUsize::get), &recipe, output)
+    let found = sources::find(&args.sources).map_err(sources_failure)?;
+    found.note().iter().for_each(|note| output.note(note));
+    batch::run(&found.paths, jobs(args), &recipe, output)
 }
 
 fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Result<(), Failure> {
     let to = args.picture.as_deref();
     new_file::check("picture", to)?;
     saved::check(args, source)?;
-    let fitted = recipe.fit(source)?;
+    let fitted = recipe.fit(source).map_err(source_failure)?;
     fitted.notes.iter().for_each(|note| output.note(note));
     let name = source.display().to_string();
     // Its own name only: a picture travels, and folders are nobody else's business.
@@ -229,31 +190,28 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
         let uncertainty = fitted.calibration.as_ref().map(ForceUncertainty::of);
         let band = uncertainty.and_then(Result::ok);
         let (samples, band) = (fitted.samples.as_slice(), band.as_ref());
-        match recipe.is_named {
+        match args.family.is_some() {
             true => family::picture(&short, family, (samples, &overlay), report, band),
             false => picture::of_report(&short, samples, report, band),
         }
     })?;
-    super::last_fit::remember(report, source, output);
-    let intervals = intervals::wanted(args)
-        .then(|| fit::Fitted::of(&fitted.samples, &recipe.options))
-        .transpose();
+    if let Err((file, err)) = remember(report, source) {
+        output.note(&format!(
+            "this fit will not be remembered for 'palpate plan': {err}, {}",
+            file.display()
+        ));
+    }
+    let bar = intervals::bar(args, output);
+    let wanted = intervals::wanted(args);
+    let intervals = fitted.intervals(&recipe.options, wanted, |done| intervals::show(&bar, done));
+    drop(bar);
     let intervals = intervals.map_err(Failure::failed)?;
-    let intervals = intervals
-        .map(|exact| intervals::find(args, &exact, 0, output))
-        .transpose()?
-        .unwrap_or_default();
-    let beside = Beside {
-        overlay: &overlay,
-        intervals: &intervals,
-        systematic: fitted.systematic.as_ref(),
-        compliance: fitted.compliance.as_ref(),
-    };
+    let beside = fitted.beside(&overlay, &intervals);
     let object = FitObject::of(family, report, beside, fitted.seconds);
     saved::keep(args, source, &object)?;
     output.result(&object, || {
         let mut lines = vec![text::whole(report)];
-        if recipe.is_named {
+        if args.family.is_some() {
             lines[0] = family::with_equation(family, &lines[0]);
             lines.push(format!("- {}", family::energy(&overlay)));
             lines.extend(family::limits(family).map(|sentence| format!("- {sentence}")));

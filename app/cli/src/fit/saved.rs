@@ -1,11 +1,10 @@
 //! `palpate fit --save NAME`: the fit as a named record beside its session.
 
-use super::super::{Failure, analysis, verdict::author};
+use super::super::{Failure, recalibrate};
 use super::FitArgs;
-use palpate_analysis::analysed::{self, record};
-use palpate_sessions::analyses::Analysed;
+use palpate_analysis::analyses::{FitSettings, KeptFit, keep_fit};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::to_value;
 use std::path::Path;
 
 /// Refuses before anything is fitted what could not be kept.
@@ -24,26 +23,24 @@ pub(super) fn keep(args: &FitArgs, source: &Path, results: &impl Serialize) -> R
     let Some(name) = &args.save else {
         return Ok(());
     };
-    let based_on = args.analysis.as_deref();
-    let opened = analysed::open(source, based_on).map_err(super::super::source_failure)?;
-    let inputs = opened.inputs(source, based_on).map_err(analysis::failure)?;
-    let what = Analysed::Fit {
-        based_on: args.analysis.clone(),
-        settings: json!({
-            "family": args.family,
-            "unload": args.unload,
-            "fixed": args.fixed,
-            "free": args.free,
-            "systematic": !args.no_systematic,
-            "profile": args.profile,
-            "bootstrap": args.bootstrap,
-            "seed": args.seed,
-            "compliance": args.compliance,
-            "include_rejected": args.include_rejected,
-        }),
-        results: serde_json::to_value(results).map_err(Failure::failed)?,
+    let settings = FitSettings {
+        family: args.family.clone(),
+        unload: args.unload,
+        fixed: args.fixed.clone(),
+        free: args.free.clone(),
+        systematic: !args.no_systematic,
+        profile: args.profile,
+        bootstrap: args.bootstrap,
+        seed: args.seed,
+        compliance: args.compliance.clone(),
+        include_rejected: args.include_rejected,
     };
-    let by = author(args.who.by.as_deref());
-    let one = record(name, &by, &args.who.reason, inputs, what);
-    analysis::keep(source, &opened.edited.session.manifest.session_id, &one)
+    let fit = KeptFit {
+        based_on: args.analysis.as_deref(),
+        together_with: &[],
+        settings: to_value(settings).map_err(Failure::failed)?,
+        results: to_value(results).map_err(Failure::failed)?,
+    };
+    keep_fit(source, name, fit, &args.who.who()).map_err(recalibrate::deed_failure)?;
+    Ok(())
 }

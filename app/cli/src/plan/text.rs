@@ -1,6 +1,8 @@
 //! The plan as people read it.
 
-use super::{Offer, PlanReport};
+use palpate_analysis::plan::{Offer, PlanReport};
+use palpate_figures::uncertain::{shortest as plain, significant as digits};
+use palpate_protocols::plans::RampHold;
 use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES, PARAMETER_UNITS};
 
 /// Of ten points a decade, 1, 2 and 5.
@@ -98,6 +100,16 @@ fn proposals(report: &PlanReport) -> Vec<String> {
         lines.extend(how(offer));
     }
     lines
+}
+
+/// The command of one press.
+pub(super) fn command(press: &RampHold) -> String {
+    format!(
+        "palpate run ramp-hold --speed {} --depth {} --hold {}",
+        plain(press.speed.0),
+        plain(press.depth.0),
+        plain(press.hold.0)
+    )
 }
 
 /// How to run it, if that is possible.
@@ -211,33 +223,12 @@ fn percent(value: Option<f64>) -> String {
     }
 }
 
-/// A number to so many significant digits, without an exponent where people write none.
-pub(super) fn digits(value: f64, count: i32) -> String {
-    let magnitude = value.abs().log10().floor();
-    if !magnitude.is_finite() {
-        return plain(value);
-    }
-    let decimals = (f64::from(count) - 1.0 - magnitude).max(0.0) as usize;
-    format!("{value:.decimals$}")
-}
-
-/// A number as short as it can be written, without the rounding of its arithmetic.
-pub(super) fn plain(value: f64) -> String {
-    let rounded: f64 = format!("{value:.9e}").parse().unwrap_or(value);
-    format!("{rounded}")
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn numbers_are_written_as_people_do() {
-        assert_eq!(plain(49.0 * 0.03), "1.47");
-        assert_eq!(plain(8.1), "8.1");
-        assert_eq!(digits(0.000_434_5, 4), "0.0004345");
-        assert_eq!(digits(1234.5, 3), "1234");
-        assert_eq!(digits(0.0, 3), "0");
+    fn what_is_no_knowledge_is_a_dash() {
         assert_eq!(percent(Some(0.324_98)), "0.325");
         assert_eq!(
             (percent(None), percent(Some(2e4))),

@@ -167,7 +167,6 @@ pub(super) fn with_settings(
 /// What a programme will do, as `--preview` tells it.
 #[derive(Serialize)]
 pub(super) struct Ahead<'a> {
-    command: &'static str,
     programme: &'a str,
     sessions: u32,
     expected_s: f64,
@@ -188,7 +187,6 @@ impl<'a> Ahead<'a> {
     pub(super) fn of(programme: &'a Programme, foreseen: &Foreseen) -> Self {
         let pairs = programme.tasks.iter().zip(&foreseen.tasks);
         Self {
-            command: "run",
             programme: &programme.name,
             sessions: programme.session_count(),
             expected_s: foreseen.expected().0,

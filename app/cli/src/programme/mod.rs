@@ -34,7 +34,6 @@ pub(super) fn is_one(name: &str) -> bool {
 
 #[derive(Serialize)]
 struct Report<'a> {
-    command: &'static str,
     programme: &'a str,
     folder: PathBuf,
     was_continued: bool,
@@ -70,7 +69,7 @@ pub(super) fn run(
     }
     if how.preview {
         let report = Ahead::of(&programme, &planned);
-        output.result(&report, || contents(&programme, &report));
+        output.answer("run", &report, || contents(&programme, &report));
         return Ok(());
     }
     ask(file, &programme)?;
@@ -159,7 +158,7 @@ fn watch(
         }
         Event::Finished(..) | Event::Calibrated(_) => {}
     });
-    bar.finish_and_clear();
+    drop(bar);
     result.map_err(|err| match err {
         RunError::Folder(_) | RunError::Progress(_) | RunError::Refused { .. } => {
             Failure::usage(err)
@@ -191,7 +190,7 @@ fn leave(
         bar.inc(1);
         bar.set_message(task.to_owned());
     });
-    bar.finish_and_clear();
+    drop(bar);
     let path = folder.join(PAGE_FILE);
     palpate_sessions::text::write(&path, &page.html()).map_err(Failure::failed)?;
     let has_calibrated = programme.tasks.iter().any(|task| task.calibrates);
@@ -201,7 +200,6 @@ fn leave(
         palpate_sessions::text::write(path, &text).map_err(Failure::failed)?;
     }
     let report = Report {
-        command: "run",
         programme: &programme.name,
         folder: folder.to_path_buf(),
         was_continued: done.was_continued,
@@ -209,7 +207,7 @@ fn leave(
         calibration: calibration.clone(),
         told: &page,
     };
-    output.result(&report, || {
+    output.answer("run", &report, || {
         let mut lines = vec![page.table(), format!("page: {}", path.display())];
         lines.extend(calibration.map(|path| format!("calibration: {}", path.display())));
         lines.join("\n")

@@ -18,11 +18,11 @@ use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-/// What to do with protocols.
+/// List, check, show or preview protocols
 #[derive(Debug, Subcommand)]
 pub enum ProtocolCommand {
     /// Name the built-in protocols
-    List(ListArgs),
+    List,
     /// Find every mistake in files of protocols and programmes, each with its line
     Check(CheckArgs),
     /// Print a protocol's file, to read or to copy
@@ -33,14 +33,6 @@ pub enum ProtocolCommand {
     Words,
 }
 
-/// Arguments of `palpate protocol list`.
-#[derive(Debug, Args)]
-pub struct ListArgs {
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
-}
-
 /// Arguments of `palpate protocol check`.
 #[derive(Debug, Args)]
 pub struct CheckArgs {
@@ -49,9 +41,6 @@ pub struct CheckArgs {
     files: Vec<String>,
     #[command(flatten)]
     rig: RigArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Arguments of `palpate protocol show`.
@@ -65,9 +54,6 @@ pub struct ShowArgs {
     steps: bool,
     #[command(flatten)]
     values: ValueArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 /// Arguments of `palpate protocol preview`.
@@ -83,9 +69,21 @@ pub struct PreviewArgs {
     plot: Option<PathBuf>,
     #[command(flatten)]
     rig: RigArgs,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
+}
+
+pub(super) fn run(command: &ProtocolCommand, output: &Output) -> Result<(), Failure> {
+    match command {
+        ProtocolCommand::List => list(output),
+        ProtocolCommand::Check(args) => run_check(args, output),
+        ProtocolCommand::Show(args) => show(args, output),
+        ProtocolCommand::Preview(args) => preview(args, output),
+        ProtocolCommand::Words => {
+            let text = reference();
+            let object = serde_json::json!({ "text": text });
+            output.answer("protocol words", &object, || text.trim_end().to_owned());
+            Ok(())
+        }
+    }
 }
 
 /// Values of parameters.
@@ -214,15 +212,15 @@ impl<'a> Head<'a> {
     }
 }
 
-pub(super) fn list(output: &Output) -> Result<(), Failure> {
+fn list(output: &Output) -> Result<(), Failure> {
     let protocols: Result<Vec<Protocol>, Failure> = BUILT_IN
         .iter()
         .map(|(name, text)| read(name, text))
         .collect();
     let protocols = protocols?;
     let heads: Vec<Head<'_>> = protocols.iter().map(Head::of).collect();
-    let object = serde_json::json!({ "command": "protocol list", "protocols": heads });
-    output.result(&object, || text::list(&protocols));
+    let object = serde_json::json!({ "protocols": heads });
+    output.answer("protocol list", &object, || text::list(&protocols));
     Ok(())
 }
 
@@ -240,7 +238,7 @@ pub(super) struct FileReport {
     pub(super) expected_s: Option<f64>,
 }
 
-pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
+fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure> {
     let bench = super::rig::open(&args.rig)?;
     let curve = bench.calibration.curve().map_err(Failure::usage)?;
     let watch = Stopwatch::start();
@@ -274,12 +272,10 @@ pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure
             expected_s,
         });
     }
-    let object = serde_json::json!({
-        "command": "protocol check",
-        "files": files,
+    let object = serde_json::json!({ "files": files,
         "seconds": watch.seconds(),
     });
-    output.result(&object, || text::check(&files));
+    output.answer("protocol check", &object, || text::check(&files));
     match wrong {
         0 => Ok(()),
         1 => Err(Failure::usage(
@@ -291,18 +287,16 @@ pub(super) fn run_check(args: &CheckArgs, output: &Output) -> Result<(), Failure
     }
 }
 
-pub(super) fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
+fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
     let file = text_of(&args.protocol)?;
     let values = args.values.values();
     if !args.steps && values.is_empty() {
         // A file with mistakes is shown too: that is how one finds them.
         let protocol = Protocol::read(&file).ok();
-        let object = serde_json::json!({
-            "command": "protocol show",
-            "protocol": protocol.as_ref().map(Head::of),
+        let object = serde_json::json!({ "protocol": protocol.as_ref().map(Head::of),
             "text": file,
         });
-        output.result(&object, || file.trim_end().to_owned());
+        output.answer("protocol show", &object, || file.trim_end().to_owned());
         return Ok(());
     }
     let protocol = read(&args.protocol, &protocol_text(&args.protocol)?)?;
@@ -310,19 +304,16 @@ pub(super) fn show(args: &ShowArgs, output: &Output) -> Result<(), Failure> {
         .write_out(&values)
         .map_err(|problems| Failure::usage(text::sentences(&args.protocol, &problems)))?;
     let steps: &[PlannedStep] = &written.plan.steps;
-    let object = serde_json::json!({
-        "command": "protocol show",
-        "protocol": Head::of(&protocol),
+    let object = serde_json::json!({ "protocol": Head::of(&protocol),
         "steps": steps,
         "lines": written.lines,
     });
-    output.result(&object, || text::steps(&written));
+    output.answer("protocol show", &object, || text::steps(&written));
     Ok(())
 }
 
 #[derive(Serialize)]
 struct PreviewReport<'a> {
-    command: &'static str,
     protocol: Head<'a>,
     values: &'a BTreeMap<String, String>,
     checkpoints: Vec<Checkpoint<'a>>,
@@ -339,7 +330,7 @@ struct Checkpoint<'a> {
     after_s: f64,
 }
 
-pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure> {
+fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure> {
     new_file::check("plot", args.plot.as_deref())?;
     let bench = super::rig::open(&args.rig)?;
     let (protocol, written, preview) =
@@ -353,7 +344,6 @@ pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure
             .sum()
     };
     let report = PreviewReport {
-        command: "protocol preview",
         protocol: Head::of(&protocol),
         values: plan
             .source
@@ -369,7 +359,9 @@ pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure
             .collect(),
         preview: &preview,
     };
-    output.result(&report, || text::preview(&protocol, &written, &preview));
+    output.answer("protocol preview", &report, || {
+        text::preview(&protocol, &written, &preview)
+    });
     new_file::write("plot", args.plot.as_deref(), || {
         // What presses on nothing has no course of depth and force.
         if preview.force_band[1].0 <= 0.0 {
@@ -381,9 +373,4 @@ pub(super) fn preview(args: &PreviewArgs, output: &Output) -> Result<(), Failure
         });
         plan_picture::of_plan(&protocol.title, &points)
     })
-}
-
-pub(super) fn words(output: &Output) -> Result<(), Failure> {
-    output.text_only(|| reference().trim_end().to_owned());
-    Ok(())
 }

@@ -57,10 +57,9 @@ pub(super) fn run(page: &Path, sessions: &[PathBuf], output: &Output) -> Result<
         });
     }
     let count: usize = checked.iter().map(|one| one.differences.len()).sum();
-    let object = serde_json::json!({
-        "command": "report", "page": page, "is_page_whole": is_whole, "sessions": checked,
+    let object = serde_json::json!({ "page": page, "is_page_whole": is_whole, "sessions": checked,
     });
-    output.result(&object, || {
+    output.answer("report", &object, || {
         let mut lines = vec![match is_whole {
             true => format!("{}: the page is as it was made", page.display()),
             false => format!("{}: the page was changed after it was made", page.display()),

@@ -25,11 +25,10 @@ pub(super) fn run(
     let drawing = drawing.map_err(Failure::failed)?;
     let bytes = ending.bytes(&drawing).map_err(Failure::failed)?;
     new_file::write_bytes("figure", to, &bytes)?;
-    let object = serde_json::json!({
-        "command": "report", "figure": to, "of": dossier::Figure::from(args.of).word(),
+    let object = serde_json::json!({ "figure": to, "of": dossier::Figure::from(args.of).word(),
         "session": session,
     });
-    output.result(&object, || format!("{}: drawn", to.display()));
+    output.answer("report", &object, || format!("{}: drawn", to.display()));
     Ok(())
 }
 

@@ -166,8 +166,7 @@ impl Screen for ExtremesScreen {
     fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
         let extent = self.extent;
         self.task.start("extremes", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            let rows = survey(extent, None, &tell).map_err(|err| err.to_string())?;
+            let rows = survey(extent, None, progress).map_err(|err| err.to_string())?;
             let rows = rows.ok_or("ended before it was done")?;
             Ok(Found {
                 groups: summary(&rows),

@@ -8,6 +8,7 @@ use crate::workers::Job;
 use crate::workers::path_dialog::Dialog;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Ui};
+use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::{Ended, Replayed, ended_words};
 use std::path::{Path, PathBuf};
 
@@ -143,10 +144,7 @@ impl TapePanel {
         if task_ui(ui, "Replay it", &self.task, &may) {
             let from = PathBuf::from(self.from.trim());
             self.task.start("replay", ui.ctx(), move |progress| {
-                replay(&from, &mut |share| {
-                    let done = (1000.0 * share) as usize;
-                    progress.tell(done, 1000, "the recording").is_continue()
-                })
+                replay(&from, &mut |share| progress.share(share, "the recording"))
             });
         }
         match self.task.answer() {

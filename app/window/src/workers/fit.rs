@@ -3,7 +3,7 @@
 use super::Job;
 use eframe::egui::Context;
 use egui_plot::PlotPoint;
-use palpate_analysis::fit::fit_source;
+use palpate_analysis::fit::Recipe;
 use palpate_analysis::source::Wanted;
 use palpate_figures::thin::thin;
 use palpate_model::rig::Phase;
@@ -109,11 +109,9 @@ fn has_ramp(run: &RunView) -> bool {
 }
 
 fn exact(folder: &Path) -> Result<ExactFit, String> {
-    let options = FitOptions::default();
     // Whoever looks at a run sees its fit, whatever the run is worth.
-    let wanted = Wanted::whatever_it_is_worth();
-    let fitted = fit_source(folder, None, wanted, &options).map_err(|err| err.to_string())?;
-    let fitted = fitted.with_systematic(&options);
+    let recipe = Recipe::new(FitOptions::default(), Wanted::whatever_it_is_worth());
+    let fitted = recipe.fit(folder).map_err(|err| err.to_string())?;
     let report = fitted.result.map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
     let start = fitted.start.0;

@@ -2,7 +2,7 @@
 
 use super::Job;
 use eframe::egui::Context;
-use palpate_analysis::progress::Progress;
+use palpate_analysis::progress::TaskProgress;
 use palpate_runner::Stopwatch;
 use std::sync::Arc;
 
@@ -22,7 +22,7 @@ pub struct Standing {
 /// One task at a time and its last answer.
 pub struct Task<T> {
     job: Job<Result<T, String>>,
-    progress: Arc<Progress>,
+    progress: Arc<TaskProgress>,
     since: Option<Stopwatch>,
     answer: Option<Result<T, String>>,
 }
@@ -44,7 +44,7 @@ impl<T: Send + 'static> Task<T> {
         &mut self,
         name: &str,
         ctx: &Context,
-        work: impl FnOnce(&Progress) -> Result<T, String> + Send + 'static,
+        work: impl FnOnce(&TaskProgress) -> Result<T, String> + Send + 'static,
     ) {
         if self.job.is_busy() {
             return;
@@ -119,6 +119,7 @@ impl<T: Send + 'static> Task<T> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_analysis::progress::Progress;
     use palpate_test_support::wait::until;
     use std::sync::mpsc::{Receiver, sync_channel};
     use std::time::Duration;

@@ -17,6 +17,7 @@ use crate::analysed::{self, Opened};
 use crate::cycles::of_session as cycles_of;
 use crate::fidelity;
 use crate::fit::Fitted;
+use crate::progress::Progress;
 use crate::source::{self, SourceError, Stretch};
 use palpate_figures::drawing::Drawing;
 use palpate_model::calibration::{Calibration, ForceUncertainty};
@@ -26,7 +27,6 @@ use palpate_runner::fidelity::Fidelity;
 use palpate_sessions::analyses::{Analyses, Input, inputs_of};
 use palpate_sessions::edits::{EDITS_FILE, Edits, Review};
 use palpate_sessions::{Beside, EndRecord, Entry, Manifest, Session};
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// A session, and which of its analyses it is read by.
@@ -276,17 +276,20 @@ impl std::fmt::Display for ReportError {
     }
 }
 
-/// Reads every session and makes the page. `made` is when and with which version, in words; `tell` hears how many
-/// sessions are read, and what comes next.
+/// Reads every session and makes the page. `made` is when and with which version, in words; `progress` hears
+/// which session is read next.
 pub fn write(
     wanted: &[Wanted],
     align: Align,
     made: &str,
-    tell: &mut dyn FnMut(usize, &str) -> ControlFlow<()>,
+    progress: &dyn Progress,
 ) -> Result<String, ReportError> {
     let mut subjects = Vec::new();
     for (index, one) in wanted.iter().enumerate() {
-        if tell(index, &name_of(&one.session)).is_break() {
+        if progress
+            .tell(index, wanted.len(), &name_of(&one.session))
+            .is_break()
+        {
             return Err(ReportError::Cancelled);
         }
         let subject = Subject::of(one);

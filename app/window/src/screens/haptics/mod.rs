@@ -24,6 +24,7 @@ use form::HapticsForm;
 use middle::View;
 use palpate_analysis::haptics::{Checked, Setting, body_of, check};
 use palpate_analysis::haptics_tape::{led_recorder, recorded, replay};
+use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::Replayed;
 use std::path::{Path, PathBuf};
 
@@ -248,11 +249,7 @@ impl Screen for HapticsScreen {
         };
         self.view = View::Margin;
         self.task.start("haptics-check", ctx, move |progress| {
-            let tell = |share: f64, what: &str| {
-                progress
-                    .tell((1000.0 * share) as usize, 1000, what)
-                    .is_continue()
-            };
+            let tell = |share: f64, what: &str| progress.share(share, what);
             tell(0.0, "the body's fit");
             let body = body_of(&source)?;
             let checked = check(body.body, &setting, &mut |share| {

@@ -8,7 +8,9 @@ use crate::widgets::quantity_input::form_label;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Button, Label, RichText, TextEdit, Ui};
+use palpate_analysis::select::SelectRequest;
 use palpate_analysis::source::Stretch;
+use palpate_analysis::sources::Naming;
 use palpate_rheology::select::{HoldOut, SelectOptions};
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
 use std::path::{Path, PathBuf};
@@ -47,17 +49,6 @@ impl Default for ModelsForm {
     }
 }
 
-/// A comparison that can be made.
-#[derive(Debug)]
-pub struct Request {
-    /// Sessions and tables.
-    pub paths: Vec<PathBuf>,
-    /// What of them is compared.
-    pub stretch: Stretch,
-    /// How they are compared.
-    pub options: SelectOptions,
-}
-
 impl ModelsForm {
     /// Adds a recording, once.
     pub fn add(&mut self, path: &Path) {
@@ -67,22 +58,20 @@ impl ModelsForm {
     }
 
     /// What the form asks for, or why it asks for nothing.
-    pub fn request(&self) -> Result<Request, String> {
+    pub fn request(&self) -> Result<SelectRequest, String> {
         if self.sources.is_empty() {
             return Err("add a recording first".into());
         }
-        Ok(Request {
+        Ok(SelectRequest {
             paths: self.sources.clone(),
-            stretch: if self.with_unload {
-                Stretch::WithUnload
-            } else {
-                Stretch::RampHold
-            },
+            wanted: Stretch::with_unload(self.with_unload).into(),
+            naming: Naming::Stem,
             options: SelectOptions {
                 tolerance: self.tolerance()?,
                 hold_out: self.hold_out,
                 ..SelectOptions::default()
             },
+            ..SelectRequest::default()
         })
     }
 

@@ -92,9 +92,7 @@ impl Screen for ModelsScreen {
             return;
         };
         self.task.start("select", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            select_sources(&request.paths, request.stretch, request.options, &tell)
-                .map_err(|err| err.to_string())
+            select_sources(request, progress).map_err(|err| err.to_string())
         });
     }
 

@@ -250,6 +250,7 @@ impl AnalysesPanel {
         self.is_working = true;
         self.work.start("analysis", ctx, move |progress| {
             deed.run(&session, &who, progress)
+                .map_err(|err| err.to_string())
         });
     }
 

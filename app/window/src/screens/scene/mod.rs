@@ -23,6 +23,7 @@ use crate::workers::touch::{Ahead, Moment, Touch, ahead};
 use eframe::egui::{Button, Context, Key, Ui, vec2};
 use form::SceneForm;
 use middle::Side;
+use palpate_analysis::progress::Progress;
 use palpate_analysis::recorded::Replayed;
 use palpate_analysis::scene::{recorded, replay, scene_of};
 use palpate_haptics::scene::{Hand6, SceneSettings};
@@ -141,8 +142,7 @@ impl SceneScreen {
         self.look_at(&settings);
         self.ahead.start("scene-ahead", ctx, move |progress| {
             ahead(settings, path, &mut |share| {
-                let told = progress.tell((1000.0 * share) as usize, 1000, "the path");
-                told.is_continue()
+                progress.share(share, "the path")
             })
         });
     }

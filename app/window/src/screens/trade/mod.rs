@@ -402,8 +402,7 @@ impl Screen for TradeScreen {
         };
         if self.view.is_scene() {
             self.scene.start("scene-curves", ctx, move |progress| {
-                let tell = |done, of, what: &str| progress.tell(done, of, what);
-                let curves = trade::measure_scene(extent, &tell)?;
+                let curves = trade::measure_scene(extent, progress)?;
                 curves
                     .map(Arc::new)
                     .ok_or_else(|| "ended before it was done".to_owned())
@@ -412,8 +411,7 @@ impl Screen for TradeScreen {
         }
         let library = self.library.clone();
         self.task.start("trade", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            let curves = trade::measure(extent, &tell)?.ok_or("ended before it was done")?;
+            let curves = trade::measure(extent, progress)?.ok_or("ended before it was done")?;
             let stored = library
                 .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
             Ok(Known {

@@ -1,11 +1,11 @@
 //! Fits of the sessions that are looked at, and what the fit of one foretells of another.
 
-use palpate_analysis::fit::Fitted;
+use palpate_analysis::fit::{Fitted, IntervalsWanted, Recipe};
 use palpate_analysis::progress::Progress;
-use palpate_analysis::source::{Wanted, read_analysed};
+use palpate_analysis::source::Wanted;
 use palpate_model::signal::track::{SEGMENT, Segment, Track};
 use palpate_model::units::Newtons;
-use palpate_rheology::fit::{self, FitOptions, FitReport, FitSample, ProfileInterval};
+use palpate_rheology::fit::{FitOptions, FitReport, FitSample, ProfileInterval};
 use std::path::PathBuf;
 use std::sync::Arc;
 
@@ -67,12 +67,12 @@ pub struct Prediction {
 }
 
 fn samples_of(subject: &Subject) -> Result<Fitted, String> {
-    let options = subject.options()?;
     // Whoever looks at a session sees its fit, whatever the session is worth.
-    let wanted = Wanted::whatever_it_is_worth();
-    let source = read_analysed(&subject.path, None, wanted, subject.analysis.as_deref())
-        .map_err(|err| err.to_string())?;
-    Ok(Fitted::of(source, &options).with_systematic(&options))
+    let recipe = Recipe {
+        analysis: subject.analysis.clone(),
+        ..Recipe::new(subject.options()?, Wanted::whatever_it_is_worth())
+    };
+    recipe.fit(&subject.path).map_err(|err| err.to_string())
 }
 
 /// Modelled forces and what is left, from the time at which the ramp begins.
@@ -99,11 +99,16 @@ fn track_of(samples: &[FitSample], modelled: &[Newtons], ramp_t: f64) -> Track {
 /// Fits one session.
 pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
     let fitted = samples_of(subject)?;
-    let report = fitted.result.map_err(|err| err.to_string())?;
+    let report = fitted.result.clone().map_err(|err| err.to_string())?;
     let modelled = report.predict(&fitted.samples);
     let options = subject.options()?;
-    let profile = fit::Fitted::of(&fitted.samples, &options)
-        .and_then(|own| own.profile(0))
+    let wanted = IntervalsWanted {
+        with_profile: true,
+        bootstrap: None,
+    };
+    let found = fitted.intervals(&options, wanted, |_| ());
+    let profile = found
+        .map(|found| found.profile)
         .map_err(|err| err.to_string());
     Ok(SessionFit {
         track: track_of(&fitted.samples, &modelled, subject.ramp_t),
@@ -117,7 +122,10 @@ pub fn fit_session(subject: &Subject) -> Result<SessionFit, String> {
 pub type FitAnswer = (Subject, Result<Arc<SessionFit>, String>);
 
 /// Fits several, one after the other.
-pub fn fit_sessions(subjects: &[Subject], progress: &Progress) -> Result<Vec<FitAnswer>, String> {
+pub fn fit_sessions(
+    subjects: &[Subject],
+    progress: &dyn Progress,
+) -> Result<Vec<FitAnswer>, String> {
     let mut answers = Vec::with_capacity(subjects.len());
     for (number, subject) in subjects.iter().enumerate() {
         let name = subject.path.file_name().unwrap_or_default();
@@ -131,7 +139,7 @@ pub fn fit_sessions(subjects: &[Subject], progress: &Progress) -> Result<Vec<Fit
 }
 
 /// Fits the first session and lays what its body would answer to the second's depths over the second.
-pub fn predict(pair: &[Subject; 2], progress: &Progress) -> Result<Prediction, String> {
+pub fn predict(pair: &[Subject; 2], progress: &dyn Progress) -> Result<Prediction, String> {
     let [known, other] = pair;
     if progress.tell(0, 2, "fitting the first").is_break() {
         return Err("cancelled".into());
@@ -169,6 +177,7 @@ pub fn predict(pair: &[Subject; 2], progress: &Progress) -> Result<Prediction, S
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_analysis::progress::Unwatched;
     use std::path::Path;
 
     fn recorded() -> Subject {
@@ -200,16 +209,16 @@ mod tests {
     #[test]
     fn a_session_foretells_itself_as_well_as_it_is_fitted() {
         let pair = [recorded(), recorded()];
-        let found = predict(&pair, &Progress::default()).unwrap();
+        let found = predict(&pair, &Unwatched).unwrap();
         assert!((found.rms_n - found.fit.rmse_n).abs() < 1e-9);
         assert!((found.peak_n - found.predicted_peak_n).abs() < 0.05 * found.peak_n);
         let gone = Subject {
             path: "/nowhere/at-all".into(),
             ..recorded()
         };
-        let refused = predict(&[gone.clone(), recorded()], &Progress::default());
+        let refused = predict(&[gone.clone(), recorded()], &Unwatched);
         assert!(refused.unwrap_err().contains("/nowhere/at-all"));
-        let answers = fit_sessions(&[gone, recorded()], &Progress::default()).unwrap();
+        let answers = fit_sessions(&[gone, recorded()], &Unwatched).unwrap();
         assert!(answers[0].1.is_err() && answers[1].1.is_ok());
     }
 }

@@ -1,19 +1,20 @@
-//! The last fit, remembered between commands: `palpate plan` assumes its body.
+//! The last fit, remembered from one run of the program to the next: a plan assumes its body.
 //!
 //! The file is `{"last_fit_version": 2, "checksum": CRC-32 of the compact JSON of the fit with its keys in alphabetical
 //! order, "fit": ...}`. Before version 2 it was the fit alone; the next fit puts the new form in its place.
 
-use super::Failure;
-use super::output::Output;
+use crate::source::{self, SourceError};
 use palpate_model::viscoelastic::ModifiedKelvin;
-use palpate_rheology::fit::{FitReport, Parameter};
+use palpate_rheology::fit::{FitError, FitOptions, FitReport, Parameter, fit};
 use palpate_sessions::atomic;
 use palpate_sessions::text::checksum;
+use palpate_tables::import::ColumnNames;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 use std::{fs, io};
+use thiserror::Error;
 
 const FILE: &str = "last-fit.json";
 /// Version of the file.
@@ -29,29 +30,108 @@ struct Remembered<'a> {
     report: &'a FitReport,
 }
 
-/// What is needed of a fit that was written as JSON, by [`remember`] or by `palpate fit --json`.
+/// A fit in a file cannot be used.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum KnownFitError {
+    /// It is none.
+    #[error("this is not a fit: {reason}, {}", path.display())]
+    NotAFit {
+        /// The file.
+        path: PathBuf,
+        /// What is wrong with it.
+        reason: String,
+    },
+    /// Its checksum says that it was changed or damaged.
+    #[error("the remembered fit is not as it was written; fit again, {}", .0.display())]
+    Changed(PathBuf),
+    /// It is a fit of another body.
+    #[error("the fit has no parameter {0}")]
+    Parameter(&'static str),
+    /// What is to be fitted cannot be read.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// It cannot be fitted.
+    #[error("{} cannot be fitted: {reason}", path.display())]
+    Fit {
+        /// The recording.
+        path: PathBuf,
+        /// Why not.
+        reason: FitError,
+    },
+}
+
+/// What is needed of a fit that was written as JSON, remembered or as the answer of a command.
 #[derive(Debug, Deserialize)]
-pub(super) struct KnownFit {
+pub struct KnownFit {
     /// What was fitted, if that was written.
     pub source: Option<String>,
     /// Root mean square of the residuals in N.
     pub rmse_n: f64,
-    parameters: Vec<Parameter>,
+    /// What was found.
+    pub parameters: Vec<Parameter>,
 }
 
 impl KnownFit {
-    /// Why it is a poor ground for a plan, if it is.
-    pub fn doubt(&self) -> Option<&'static str> {
-        doubt(&self.parameters)
+    /// The last fit; `None` if there was none.
+    pub fn last() -> Result<Option<Self>, KnownFitError> {
+        match state_file() {
+            Some(file) if file.exists() => Self::read(&file).map(Some),
+            _ => Ok(None),
+        }
+    }
+
+    /// A fit in a file, remembered or as the answer of a command.
+    pub fn read(file: &Path) -> Result<Self, KnownFitError> {
+        let bad = |err: &dyn std::fmt::Display| KnownFitError::NotAFit {
+            path: file.to_owned(),
+            reason: err.to_string(),
+        };
+        let text = fs::read_to_string(file).map_err(|err| bad(&err))?;
+        let mut found: Value = serde_json::from_str(&text).map_err(|err| bad(&err))?;
+        match found["last_fit_version"].as_u64() {
+            None => {}
+            Some(VERSION) => {
+                let fit = found["fit"].take();
+                if found["checksum"] != checksum(&fit.to_string()) {
+                    return Err(KnownFitError::Changed(file.to_owned()));
+                }
+                found = fit;
+            }
+            Some(_) => return Err(bad(&"a newer palpate wrote it; update palpate")),
+        }
+        serde_json::from_value(found).map_err(|err| bad(&err))
+    }
+
+    /// Of a file of a fit, or of a recording, fitted now; with what its reader remarked.
+    pub fn of(
+        path: &Path,
+        columns: Option<&ColumnNames>,
+    ) -> Result<(Self, Vec<String>), KnownFitError> {
+        if path.extension().is_some_and(|ending| ending == "json") {
+            return Ok((Self::read(path)?, Vec::new()));
+        }
+        let source = source::read_named(path, columns)?;
+        let report = fit(&source.samples, &FitOptions::default());
+        let report = report.map_err(|reason| KnownFitError::Fit {
+            path: path.to_owned(),
+            reason,
+        })?;
+        let known = Self {
+            source: Some(path.display().to_string()),
+            rmse_n: report.rmse_n,
+            parameters: report.parameters,
+        };
+        Ok((known, source.notes))
     }
 
     /// The body found; a name that is missing is named.
-    pub fn body(&self) -> Result<ModifiedKelvin, String> {
-        let value = |name: &str| {
+    pub fn body(&self) -> Result<ModifiedKelvin, KnownFitError> {
+        let value = |name: &'static str| {
             let mut all = self.parameters.iter();
             all.find(|parameter| parameter.name == name)
                 .map(|parameter| parameter.value)
-                .ok_or_else(|| format!("the fit has no parameter {name}"))
+                .ok_or(KnownFitError::Parameter(name))
         };
         Ok(ModifiedKelvin {
             tau_eps: value("tau_eps")?,
@@ -61,72 +141,29 @@ impl KnownFit {
     }
 }
 
-/// Why a fit is a poor ground for a plan, if it is.
-pub(super) fn doubt(parameters: &[Parameter]) -> Option<&'static str> {
-    let tau = parameters
-        .iter()
-        .find(|parameter| parameter.name == "tau_eps")?;
-    let is_known = match tau.std_error {
-        Some(error) => error < 0.5 * tau.value,
-        None => tau.is_fixed,
-    };
-    (!is_known).then_some(
-        "tau_eps of that fit is hardly known, so a plan from it is a guess; name a better record with --like",
-    )
+/// Whether a fit is a poor ground for a plan, because it hardly knows how fast the tissue relaxes.
+#[must_use]
+pub fn is_hardly_known(parameters: &[Parameter]) -> bool {
+    let mut all = parameters.iter();
+    let tau = all.find(|parameter| parameter.name == "tau_eps");
+    tau.is_some_and(|tau| match tau.std_error {
+        Some(error) => error >= 0.5 * tau.value,
+        None => !tau.is_fixed,
+    })
 }
 
-/// Keeps a fit for later commands. That it cannot be kept is worth a note and nothing more.
-pub(super) fn remember(report: &FitReport, source: &Path, output: &Output) {
+/// Keeps a fit for later; or the file that cannot be written, and why.
+pub fn remember(report: &FitReport, source: &Path) -> Result<(), (PathBuf, io::Error)> {
     // A plan assumes the modified Kelvin body of third order.
     let (Some(file), DEFAULT_FAMILY) = (state_file(), report.body.family.as_str()) else {
-        return;
+        return Ok(());
     };
     let source = source.canonicalize().unwrap_or_else(|_| source.to_owned());
     let remembered = Remembered {
         source: source.display().to_string(),
         report,
     };
-    if let Err(err) = write(&file, &remembered) {
-        output.note(&format!(
-            "this fit will not be remembered for 'palpate plan': {err}, {}",
-            file.display()
-        ));
-    }
-}
-
-/// The last fit; `None` if there was none.
-pub(super) fn recall() -> Result<Option<KnownFit>, Failure> {
-    match state_file() {
-        Some(file) if file.exists() => read(&file).map(Some),
-        _ => Ok(None),
-    }
-}
-
-/// A fit in a file, as `palpate fit --json` prints it.
-pub(super) fn read(file: &Path) -> Result<KnownFit, Failure> {
-    let bad = |err: &dyn std::fmt::Display| {
-        Failure::usage(format!(
-            "this is not a fit that 'palpate fit --json' wrote: {err}, {}",
-            file.display()
-        ))
-    };
-    let text = fs::read_to_string(file).map_err(|err| bad(&err))?;
-    let mut found: Value = serde_json::from_str(&text).map_err(|err| bad(&err))?;
-    match found["last_fit_version"].as_u64() {
-        None => {}
-        Some(VERSION) => {
-            let fit = found["fit"].take();
-            if found["checksum"] != checksum(&fit.to_string()) {
-                return Err(Failure::failed(format!(
-                    "the remembered fit is not as it was written; fit again, or name another with --like, {}",
-                    file.display()
-                )));
-            }
-            found = fit;
-        }
-        Some(_) => return Err(bad(&"a newer palpate wrote it; update palpate")),
-    }
-    serde_json::from_value(found).map_err(|err| bad(&err))
+    write(&file, &remembered).map_err(|err| (file, err))
 }
 
 fn write(file: &Path, remembered: &Remembered<'_>) -> io::Result<()> {
@@ -183,10 +220,10 @@ mod tests {
             is_fixed,
             systematic_error: None,
         };
-        assert_eq!(doubt(&[tau(Some(0.01), false)]), None);
-        assert_eq!(doubt(&[tau(None, true)]), None);
+        assert!(!is_hardly_known(&[tau(Some(0.01), false)]));
+        assert!(!is_hardly_known(&[tau(None, true)]));
         for poor in [tau(Some(2.0), false), tau(None, false)] {
-            assert!(doubt(&[poor]).is_some());
+            assert!(is_hardly_known(&[poor]));
         }
     }
 

@@ -1,7 +1,9 @@
 //! `palpate export`: a session's samples as a table.
 
+mod lake;
+
 use super::output::Output;
-use super::{Failure, compliance, lake, read_failure, source_failure};
+use super::{Failure, compliance, read_failure, source_failure};
 use clap::{Args, ValueEnum};
 use palpate_analysis::analysed;
 use palpate_analysis::compliance::columns;
@@ -11,7 +13,7 @@ use palpate_sessions::log::Session;
 use palpate_tables::export::{Beside, ExportError, Format, Selection, Table, dictionary_path};
 use std::path::PathBuf;
 
-/// Arguments of `palpate export`.
+/// Write a session's samples as a table, or add sessions to a lake
 #[derive(Debug, Args)]
 pub struct ExportArgs {
     /// Session folder; several for a lake
@@ -60,9 +62,6 @@ pub struct ExportArgs {
     /// for the session's rig, a file, or an id of the library
     #[arg(long, value_name = "FILE|last")]
     compliance: Option<String>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -166,12 +165,12 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         written.map_err(failure)?
     } else {
         // What needs no more than a look at each sample does not keep them.
-        let bar = output.share_bar(0);
+        let bar = output.share_bar();
         let written = exports::export(session, &selection, &target, &mut |done, of| {
             bar.set_length(of);
             bar.set_position(done);
         });
-        bar.finish_and_clear();
+        drop(bar);
         written.map_err(export_failure)?
     };
     written.notes.iter().for_each(|note| output.note(note));
@@ -179,12 +178,11 @@ pub(super) fn run(args: &ExportArgs, output: &Output) -> Result<(), Failure> {
         Some(_) => ("mcap", None),
         None => (args.format().ending(), Some(dictionary_path(&written.path))),
     };
-    let object = serde_json::json!({
-        "command": "export", "file": written.path, "rows": written.rows, "format": format,
+    let object = serde_json::json!({ "file": written.path, "rows": written.rows, "format": format,
         "dictionary": dictionary, "is_part": selection.is_part(),
         "every": selection.every.unwrap_or(1), "compliance": compliance,
     });
-    output.result(&object, || {
+    output.answer("export", &object, || {
         let corrected = compliance.as_ref().map_or(String::new(), |id| {
             format!(", depths corrected with {id} beside the raw ones")
         });

@@ -1,14 +1,15 @@
 //! `palpate export --lake`: sessions into a lake.
 
-use super::Failure;
-use super::export::export_failure;
-use super::fit::sources;
-use super::output::Output;
+use super::super::{Failure, output::Output, sources_failure};
+use super::export_failure;
 use palpate_analysis::exports::{into_lake, sweep_lake};
+use palpate_analysis::sources;
 use std::path::{Path, PathBuf};
 
 pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(), Failure> {
-    let found = sources::find_sessions(named, output)?;
+    let found = sources::find_sessions(named).map_err(sources_failure)?;
+    found.note().iter().for_each(|note| output.note(note));
+    let found = found.paths;
     sweep_lake(lake);
     let bar = output.count_bar(found.len() as u64);
     let (mut was_there, mut failed) = (0, Vec::new());
@@ -23,13 +24,12 @@ pub(super) fn run(lake: &Path, named: &[PathBuf], output: &Output) -> Result<(),
         }
         bar.inc(1);
     }
-    bar.finish_and_clear();
+    drop(bar);
     let added = found.len() - was_there - failed.len();
-    let object = serde_json::json!({
-        "command": "export", "lake": lake, "sessions": found.len(), "added": added, "were_there": was_there,
+    let object = serde_json::json!({ "lake": lake, "sessions": found.len(), "added": added, "were_there": was_there,
         "failed": failed,
     });
-    output.result(&object, || {
+    output.answer("export", &object, || {
         format!(
             "{added} sessions added to {}, {was_there} were there",
             lake.display()

@@ -1,9 +1,9 @@
 //! The plan as a picture: three panels side by side, in SVG written by hand.
 
-use super::PlanReport;
-use super::text::{digits, plain};
+use crate::plan::PlanReport;
 use ecolor::Color32;
 use palpate_figures::tokens::LIGHT;
+use palpate_figures::uncertain::{shortest as plain, significant as digits};
 use palpate_rheology::expected::{Curve, Family, PARAMETER_NAMES};
 use std::fmt::Write;
 
@@ -34,8 +34,9 @@ struct Panel {
     mark: Option<(f64, f64)>,
 }
 
-/// The picture as text.
-pub(super) fn svg(report: &PlanReport) -> String {
+/// The picture as SVG.
+#[must_use]
+pub fn picture(report: &PlanReport) -> String {
     let target = &report.targets[0];
     let k = PARAMETER_NAMES
         .iter()

@@ -17,10 +17,9 @@ use palpate_runner::fidelity::Fidelity;
 use palpate_runner::wall_now;
 use palpate_sessions::Verdict;
 use serde::Serialize;
-use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
-/// Arguments of `palpate report`.
+/// Tell what happened in a run: targets and what was done, missing samples, use of time
 #[derive(Debug, Args)]
 pub struct ReportArgs {
     /// Session folder; several with --html
@@ -50,9 +49,6 @@ pub struct ReportArgs {
     /// Compare the files that a page describes with those of the sessions named, or of those beside the page
     #[arg(long, value_name = "FILE.html")]
     check: Option<PathBuf>,
-    /// Print one JSON object
-    #[arg(long)]
-    pub json: bool,
 }
 
 #[derive(Clone, Copy, Debug, ValueEnum)]
@@ -97,7 +93,6 @@ impl From<FigureArg> for Figure {
 
 #[derive(Serialize)]
 struct Report<'a> {
-    command: &'static str,
     session_id: &'a str,
     ending: Option<&'a str>,
     reason: Option<&'a str>,
@@ -142,7 +137,6 @@ fn fidelity(session: &Path, output: &Output) -> Result<(), Failure> {
     let verdict = verdict.map(|(verdict, edit)| (verdict, edit.reason.as_str()));
     let end = session.end.as_ref();
     let report = Report {
-        command: "report",
         session_id: &session.manifest.session_id,
         ending: end.map(|end| end.outcome.as_str()),
         reason: end.map(|end| end.reason.as_str()),
@@ -151,7 +145,7 @@ fn fidelity(session: &Path, output: &Output) -> Result<(), Failure> {
         base: FoundBase::of_session(session),
         fidelity: &fidelity,
     };
-    output.result(&report, || {
+    output.answer("report", &report, || {
         let told = fidelity_text(&fidelity, end, verdict);
         let facts = report.base.facts();
         let base = facts.map(|(name, mm, error)| format!("\n{name:<10} {mm:.3} ± {error:.3} mm"));
@@ -173,15 +167,8 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
             analysis: args.analysis.clone(),
         })
         .collect();
-    let bar = output.count_bar(wanted.len() as u64);
-    let mut tell = |done: usize, name: &str| {
-        bar.set_position(done as u64);
-        bar.set_message(name.to_owned());
-        ControlFlow::Continue(())
-    };
     let made = dossier::made(wall_now().into());
-    let page = dossier::write(&wanted, args.align.into(), &made, &mut tell);
-    bar.finish_and_clear();
+    let page = dossier::write(&wanted, args.align.into(), &made, &output.count_bar(0));
     let page = page.map_err(|err| match err {
         ReportError::Source(path, err) => match super::source_failure(*err) {
             Failure::Usage(text) => Failure::Usage(format!("{}: {text}", path.display())),
@@ -196,11 +183,10 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
             "session_id": one.session_id, "folder": one.folder, "file": one.file, "sha256": one.sha256,
         })
     });
-    let object = serde_json::json!({
-        "command": "report", "page": to, "sessions": args.sessions,
+    let object = serde_json::json!({ "page": to, "sessions": args.sessions,
         "files": files.collect::<Vec<_>>(),
     });
-    output.result(&object, || {
+    output.answer("report", &object, || {
         format!(
             "{}: {} of {} described by their hashes; 'palpate report --check {}' compares them",
             to.display(),

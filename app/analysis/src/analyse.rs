@@ -1,0 +1,48 @@
+//! From recordings on disk to what their cycles show.
+
+use crate::cycles;
+use crate::progress::Progress;
+use crate::report::cycles::{CycleReport, Question};
+use crate::source::SourceError;
+use palpate_tables::import::ColumnNames;
+use std::path::PathBuf;
+use thiserror::Error;
+
+/// A recording shows no cycles.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum AnalyseFailure {
+    /// It cannot be read.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// Nothing in it is a cycle.
+    #[error(
+        "no way in with at least 20 samples was found in {}; record one, or name the frequency of a sine", .0.display()
+    )]
+    NoCycles(PathBuf),
+    /// Nobody wants the rest.
+    #[error("cancelled")]
+    Cancelled,
+}
+
+/// Analyses every recording by itself, in order.
+pub fn analyse(
+    paths: &[PathBuf],
+    columns: Option<&ColumnNames>,
+    question: &Question,
+    progress: &dyn Progress,
+) -> Result<Vec<CycleReport>, AnalyseFailure> {
+    let mut reports = Vec::with_capacity(paths.len());
+    for path in paths {
+        let name = path.display().to_string();
+        if progress.tell(reports.len(), paths.len(), &name).is_break() {
+            return Err(AnalyseFailure::Cancelled);
+        }
+        let report = CycleReport::of(name, cycles::read(path, columns)?, question);
+        if report.cycles.is_empty() && report.sines.is_empty() {
+            return Err(AnalyseFailure::NoCycles(path.clone()));
+        }
+        reports.push(report);
+    }
+    Ok(reports)
+}

@@ -1,0 +1,48 @@
+//! Many sources, each read and fitted by itself on one of several threads; the answers in the sources' order.
+
+use super::{Fitted, Recipe};
+use crate::pool::{News, NoAnswer, in_order};
+use crate::source::SourceError;
+use palpate_rheology::fit::FitError;
+use std::io;
+use std::path::PathBuf;
+use std::sync::atomic::AtomicBool;
+use thiserror::Error;
+
+/// A source among many has no fit.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum NotFitted {
+    /// It cannot be read, or was rejected.
+    #[error(transparent)]
+    Source(#[from] SourceError),
+    /// It cannot be fitted.
+    #[error(transparent)]
+    Fit(#[from] FitError),
+    /// The whole was asked to end before.
+    #[error("not begun; the batch was asked to end")]
+    NotBegun,
+    /// Its thread ended without an answer.
+    #[error("the fit ended unexpectedly; report this with the source")]
+    Died,
+}
+
+impl From<NoAnswer> for NotFitted {
+    fn from(none: NoAnswer) -> Self {
+        match none {
+            NoAnswer::NotBegun => Self::NotBegun,
+            NoAnswer::Died => Self::Died,
+        }
+    }
+}
+
+/// Fits every source with `jobs` threads and tells `hear` every answer, in order. Once `is_ending` is set no fit is begun.
+pub fn each(
+    sources: &[PathBuf],
+    jobs: usize,
+    recipe: &Recipe,
+    is_ending: &AtomicBool,
+    hear: impl FnMut(News<Result<Fitted, SourceError>>),
+) -> io::Result<()> {
+    in_order(jobs, sources, is_ending, |source| recipe.fit(source), hear)
+}

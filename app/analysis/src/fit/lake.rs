@@ -1,0 +1,212 @@
+//! The sessions of a lake, or one part of them, each fitted and kept in the lake.
+
+use super::{Fitted, NotFitted, Recipe};
+use crate::compliance::Correction;
+use crate::exports::sweep_lake;
+use crate::pool::{News, NoAnswer, in_order};
+use crate::source;
+use crate::sources::copied_sentence;
+use palpate_rheology::fit::{FitReport, Systematic};
+use palpate_sessions::recover::recovered_id;
+use palpate_tables::export::ExportError;
+use palpate_tables::lake::{
+    FitFile, FitState, InLake, LakeError, Shard, keep_fit, read_session, sessions, state_of_fit,
+};
+use serde::Serialize;
+use serde_json::{Value, json};
+use std::collections::BTreeSet;
+use std::io;
+use std::path::Path;
+use std::sync::atomic::AtomicBool;
+use thiserror::Error;
+
+/// The folder of fits of the body that is fitted where no family is named.
+const MODEL: &str = "modified-kelvin";
+
+/// Which sessions of which lake are fitted how.
+#[derive(Debug)]
+pub struct LakeRequest<'a> {
+    /// The lake.
+    pub lake: &'a Path,
+    /// The part of its sessions.
+    pub shard: Shard,
+    /// How each is fitted.
+    pub recipe: &'a Recipe,
+    /// Parameters held, as name=value.
+    pub fixed: &'a [String],
+    /// Parameters found that are held by default.
+    pub free: &'a [String],
+    /// SHA-256 of the compliance's file, if depths are corrected.
+    pub compliance_sha256: Option<String>,
+    /// Fits at a time.
+    pub jobs: usize,
+}
+
+/// What came of one session of a lake.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outcome {
+    /// Its fit was made.
+    Made,
+    /// Its fit was there already.
+    There,
+    /// It was rejected.
+    Rejected,
+}
+
+/// A session of a lake has no fit.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum LakeFailure {
+    /// The lake cannot be read.
+    #[error(transparent)]
+    Lake(#[from] LakeError),
+    /// The fit cannot be written.
+    #[error(transparent)]
+    Keep(#[from] ExportError),
+    /// The session cannot be read or fitted.
+    #[error(transparent)]
+    NotFitted(#[from] NotFitted),
+    /// No thread can be started.
+    #[error("no thread can be started ({0}); try again")]
+    Threads(io::Error),
+}
+
+impl From<source::SourceError> for LakeFailure {
+    fn from(err: source::SourceError) -> Self {
+        Self::NotFitted(err.into())
+    }
+}
+
+/// What `hear` is told of the fits of a lake.
+#[derive(Debug)]
+pub enum LakeFit<'a> {
+    /// What a user must know.
+    Note(String),
+    /// So many of so many sessions are done.
+    Done(usize, usize),
+    /// What came of a session, in the sessions' order.
+    Next(&'a str, Result<Outcome, LakeFailure>),
+}
+
+/// How many sessions came to what.
+#[derive(Clone, Debug, Default, PartialEq, Eq, Serialize)]
+pub struct LakeTally {
+    /// The folder of their fits.
+    pub model: String,
+    /// In the part of the lake that was looked at.
+    pub sessions: usize,
+    /// Fitted now.
+    pub made: usize,
+    /// Fitted before.
+    pub were_there: usize,
+    /// Not fitted because they were rejected.
+    pub rejected: usize,
+}
+
+/// What is kept of a fit: nothing that depends on when or where it was made.
+#[derive(Serialize)]
+struct Kept<'a> {
+    #[serde(flatten)]
+    report: &'a FitReport,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    systematic: Option<&'a Systematic>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    compliance: Option<&'a Correction>,
+    notes: &'a [String],
+}
+
+/// Fits the sessions. Once `is_ending` is set no fit is begun; asked again it goes on.
+pub fn fit_lake(
+    request: &LakeRequest<'_>,
+    is_ending: &AtomicBool,
+    mut hear: impl FnMut(LakeFit<'_>),
+) -> Result<LakeTally, LakeFailure> {
+    // Named or not, it is one body, whose fits are kept in one folder.
+    let key = request.recipe.options.family().key();
+    let model = match key.as_str() {
+        "series-3" => MODEL,
+        key => key,
+    };
+    let settings = request.settings(model);
+    let mut found = sessions(request.lake)?;
+    sweep_lake(request.lake);
+    // Before the shards are made, so that all leave out the same.
+    let ids: BTreeSet<String> = found.iter().map(|one| one.id.clone()).collect();
+    let is_copied = |one: &InLake| ids.contains(&recovered_id(&one.id));
+    let copied = found.iter().filter(|one| is_copied(one));
+    if let Some(note) = copied_sentence(copied.map(|one| one.id.clone())) {
+        hear(LakeFit::Note(note));
+    }
+    found.retain(|one| !is_copied(one) && request.shard.has(&one.id));
+    let mut tally = LakeTally {
+        model: model.to_owned(),
+        sessions: found.len(),
+        ..LakeTally::default()
+    };
+    let mut ids = found.iter().map(|one| one.id.as_str());
+    let work = |one: &InLake| request.fit_one(one, model, &settings);
+    in_order(request.jobs, &found, is_ending, work, |news| match news {
+        News::Done(count) => hear(LakeFit::Done(count, found.len())),
+        News::Next(answer) => {
+            let came = answer.unwrap_or_else(|none: NoAnswer| Err(NotFitted::from(none).into()));
+            match &came {
+                Ok(Outcome::Made) => tally.made += 1,
+                Ok(Outcome::There) => tally.were_there += 1,
+                Ok(Outcome::Rejected) => tally.rejected += 1,
+                Err(_) => {}
+            }
+            hear(LakeFit::Next(ids.next().unwrap_or_default(), came));
+        }
+    })
+    .map_err(LakeFailure::Threads)?;
+    Ok(tally)
+}
+
+impl LakeRequest<'_> {
+    fn fit_one(&self, one: &InLake, model: &str, settings: &Value) -> Result<Outcome, LakeFailure> {
+        let file = FitFile {
+            lake: self.lake,
+            model,
+            session_id: &one.id,
+            settings,
+        };
+        if state_of_fit(&file)? == FitState::There {
+            return Ok(Outcome::There);
+        }
+        let (session, rejection) = read_session(self.lake, one)?;
+        let wanted = self.recipe.wanted;
+        if rejection.is_some() && !wanted.is_rejected_included {
+            return Ok(Outcome::Rejected);
+        }
+        let source = source::of_session(session, wanted.stretch, &[])?;
+        let fitted: Fitted = self.recipe.fit_read(source)?;
+        let report = fitted.result.map_err(NotFitted::Fit)?;
+        let kept = Kept {
+            report: &report,
+            systematic: fitted.systematic.as_ref(),
+            compliance: fitted.compliance.as_ref(),
+            notes: &fitted.notes,
+        };
+        keep_fit(&file, &kept)?;
+        Ok(Outcome::Made)
+    }
+
+    /// All that decides about a fit beside its session.
+    fn settings(&self, model: &str) -> Value {
+        let sorted = |words: &[String]| {
+            let mut words: Vec<&str> = words.iter().map(|word| word.trim()).collect();
+            words.sort_unstable();
+            json!(words)
+        };
+        let mut settings = json!({
+            "software_version": env!("CARGO_PKG_VERSION"), "model": model,
+            "fixed": sorted(self.fixed), "free": sorted(self.free),
+            "systematic": self.recipe.is_systematic,
+            "compliance_sha256": self.compliance_sha256,
+        });
+        if self.recipe.wanted.stretch == source::Stretch::WithUnload {
+            settings["unload"] = json!(true);
+        }
+        settings
+    }
+}

@@ -1,0 +1,228 @@
+//! From recordings on disk to fits: one, many each by itself, several together, or those of a lake.
+
+mod each;
+mod lake;
+mod last;
+mod together;
+
+pub use each::{NotFitted, each};
+pub use lake::{LakeFailure, LakeFit, LakeRequest, LakeTally, Outcome, fit_lake};
+pub use last::{KnownFit, KnownFitError, is_hardly_known, remember};
+pub use together::{Together, TogetherRequest, fit_together};
+
+use crate::compliance::{Correction, Corrections};
+use crate::origin::Origin;
+use crate::report::fit_json::{Beside, Overlay};
+use crate::source::{self, FitSource, SourceError, Wanted};
+use palpate_model::calibration::Calibration;
+use palpate_model::units::Seconds;
+use palpate_rheology::fit::{
+    self, Bootstrap, BootstrapInterval, FitError, FitOptions, FitReport, FitSample,
+    ProfileInterval, Systematic, systematic,
+};
+use palpate_runner::Stopwatch;
+use palpate_tables::import::ColumnNames;
+use serde::Serialize;
+use std::path::Path;
+
+/// How every source is read and fitted.
+#[derive(Debug)]
+pub struct Recipe {
+    /// The family, and which of its parameters are found.
+    pub options: FitOptions,
+    /// Names of the columns of tables without a header.
+    pub columns: Option<ColumnNames>,
+    /// Whether what the errors of calibration and compliance do is told.
+    pub is_systematic: bool,
+    /// Which part of a source, and whether rejected ones are taken.
+    pub wanted: Wanted,
+    /// The analysis that a session is read by.
+    pub analysis: Option<String>,
+    /// What is taken from depths.
+    pub corrections: Corrections,
+}
+
+impl Recipe {
+    /// All that is known of sources of this kind, their depths raw.
+    #[must_use]
+    pub fn new(options: FitOptions, wanted: Wanted) -> Self {
+        Self {
+            options,
+            columns: None,
+            is_systematic: true,
+            wanted,
+            analysis: None,
+            corrections: Corrections::none(None),
+        }
+    }
+
+    /// Reads a source and fits it.
+    pub fn fit(&self, path: &Path) -> Result<Fitted, SourceError> {
+        let (columns, name) = (self.columns.as_ref(), self.analysis.as_deref());
+        self.fit_read(source::read_analysed(path, columns, self.wanted, name)?)
+    }
+
+    /// Fits what was read.
+    pub fn fit_read(&self, mut source: FitSource) -> Result<Fitted, SourceError> {
+        let compliance = self.corrections.apply(&mut source)?;
+        let fitted = Fitted {
+            compliance,
+            ..Fitted::of(source, &self.options)
+        };
+        Ok(match self.is_systematic {
+            true => fitted.with_systematic(&self.options),
+            false => fitted,
+        })
+    }
+}
+
+/// What came of a source that could be read.
+#[derive(Clone, Debug)]
+pub struct Fitted {
+    /// The samples fitted.
+    pub samples: Vec<FitSample>,
+    /// Session time of the first sample.
+    pub start: Seconds,
+    /// What the reader of the source remarked.
+    pub notes: Vec<String>,
+    /// The fit, or why there is none.
+    pub result: Result<FitReport, FitError>,
+    /// Wall seconds of the fit alone.
+    pub seconds: f64,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
+    /// What the calibration adds to the uncertainty, once asked for.
+    pub systematic: Option<Systematic>,
+    /// What the rig's compliance does to the depths, or would, once asked for.
+    pub compliance: Option<Correction>,
+}
+
+impl Fitted {
+    /// Fits what was read.
+    #[must_use]
+    pub fn of(source: FitSource, options: &FitOptions) -> Self {
+        let watch = Stopwatch::start();
+        let result = fit::fit(&source.samples, options);
+        Self {
+            seconds: watch.seconds(),
+            samples: source.samples,
+            start: source.start,
+            notes: source.notes,
+            calibration: source.calibration,
+            systematic: None,
+            compliance: None,
+            result,
+        }
+    }
+
+    /// Adds what the errors of calibration and compliance do to the parameters; a table has none, and a refusal is
+    /// a note. `options` are those of the fit.
+    #[must_use]
+    pub fn with_systematic(mut self, options: &FitOptions) -> Self {
+        let Ok(report) = &self.result else {
+            return self;
+        };
+        let origin = Origin::of(self.calibration.as_ref(), self.compliance.as_ref());
+        let found = origin.map_err(|err| err.to_string()).and_then(|origin| {
+            let record = origin.traced("", &self.samples);
+            let found = origin.is_known().then(|| systematic(record, options));
+            found.transpose().map_err(|err| err.to_string())
+        });
+        match found {
+            Ok(Some(found)) => {
+                self.result = Ok(report.clone().with_systematic(&found));
+                self.systematic = Some(found);
+            }
+            Ok(None) => {}
+            Err(reason) => self.notes.push(no_systematic(&reason)),
+        }
+        self
+    }
+
+    /// What is told of the fit beside its report.
+    #[must_use]
+    pub fn beside<'a>(&'a self, overlay: &'a Overlay, intervals: &'a Intervals) -> Beside<'a> {
+        Beside {
+            overlay,
+            intervals,
+            systematic: self.systematic.as_ref(),
+            compliance: self.compliance.as_ref(),
+        }
+    }
+
+    /// Finds intervals that take more than one pass.
+    pub fn intervals(
+        &self,
+        options: &FitOptions,
+        wanted: IntervalsWanted,
+        progress: impl FnMut(usize),
+    ) -> Result<Intervals, FitError> {
+        if wanted == IntervalsWanted::default() {
+            return Ok(Intervals::default());
+        }
+        let exact = fit::Fitted::of(&self.samples, options)?;
+        wanted.find(&exact, 0, progress)
+    }
+}
+
+/// That systematic errors are not told, and why.
+#[must_use]
+pub fn no_systematic(reason: &str) -> String {
+    format!("what calibration and compliance add to the uncertainty cannot be told: {reason}")
+}
+
+/// Which intervals that take more than one pass are asked for.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct IntervalsWanted {
+    /// From the profile likelihood.
+    pub with_profile: bool,
+    /// From fits to residuals shuffled in blocks.
+    pub bootstrap: Option<Bootstrap>,
+}
+
+impl IntervalsWanted {
+    /// Finds those of one record of a fit; `progress` hears how many fits of the bootstrap are done.
+    pub fn find(
+        self,
+        fitted: &fit::Fitted<'_>,
+        record: usize,
+        progress: impl FnMut(usize),
+    ) -> Result<Intervals, FitError> {
+        Ok(Intervals {
+            profile: match self.with_profile {
+                true => fitted.profile(record)?,
+                false => Vec::new(),
+            },
+            bootstrap_seed: self.bootstrap.map(|choice| choice.seed),
+            bootstrap: match self.bootstrap {
+                Some(choice) => fitted.bootstrap(record, choice, progress)?,
+                None => Vec::new(),
+            },
+        })
+    }
+}
+
+/// Intervals that take more than one pass, as far as they were asked for.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Intervals {
+    /// From the profile likelihood; ends are null where they are open.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub profile: Vec<ProfileInterval>,
+    /// Seed of the bootstrap.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub bootstrap_seed: Option<u64>,
+    /// From fits to residuals shuffled in blocks.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub bootstrap: Vec<BootstrapInterval>,
+}
+
+/// Reads what is wanted of a session or a table and fits it. `columns` names the columns of a table without header.
+pub fn fit_source(
+    path: &Path,
+    columns: Option<&ColumnNames>,
+    wanted: Wanted,
+    options: &FitOptions,
+) -> Result<Fitted, SourceError> {
+    let source = source::read_stretch(path, columns, wanted)?;
+    Ok(Fitted::of(source, options))
+}

@@ -1,0 +1,387 @@
+//! Which recordings are meant by the paths that a user names, and those recordings read to be looked at together.
+//!
+//! Decided here, once for every front end: a folder with a segment of a log is a session and any other folder a
+//! collection of recordings; what was recovered stands for the session it was recovered from; a recording given twice is
+//! refused; a rejected session is left out and told of.
+
+use crate::compliance::{Correction, Corrections};
+use crate::exports::without_copied;
+use crate::origin::Origin;
+use crate::source::{self, FitSource, SourceError, Wanted};
+use palpate_model::calibration::{Calibration, CalibrationError};
+use palpate_rheology::fit::{FitError, FitSample, Traced};
+use palpate_sessions::folder::is_session_folder;
+use palpate_sessions::log::ReadError;
+use palpate_tables::import::ColumnNames;
+use std::path::{Path, PathBuf};
+use thiserror::Error;
+use walkdir::WalkDir;
+
+/// Endings of file names that are taken for tables.
+const TABLES: [&str; 2] = ["csv", "tsv"];
+/// Ending of a session's log.
+const LOG: &str = "mcap";
+
+/// Recordings cannot be looked at together.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum SourcesError {
+    /// There is nothing of this name.
+    #[error(transparent)]
+    Missing(ReadError),
+    /// A folder cannot be looked into.
+    #[error("cannot look into {} ({reason}); check its permissions", path.display())]
+    Folder {
+        /// The folder.
+        path: PathBuf,
+        /// The operating system's words.
+        reason: String,
+    },
+    /// A folder has no recording in it.
+    #[error("{} holds no session and no table (.csv or .tsv); name the folder that does", .0.display())]
+    Nothing(PathBuf),
+    /// A table stands where a session is needed.
+    #[error("{} is a table and no session", .0.display())]
+    Table(PathBuf),
+    /// A recording is named twice.
+    #[error("{} is given twice; taken together it would count as two recordings", .0.display())]
+    Twice(PathBuf),
+    /// A recording cannot be read.
+    #[error("{}: {reason}", path.display())]
+    Source {
+        /// The recording.
+        path: PathBuf,
+        /// Why not.
+        reason: Box<SourceError>,
+    },
+    /// Every session was rejected.
+    #[error("{0} sources, all of them rejected: nothing is left")]
+    Rejected(usize),
+}
+
+/// Recordings that were found.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Found {
+    /// Those that count, in order.
+    pub paths: Vec<PathBuf>,
+    /// Sessions that are left out, because what was recovered from them is there too.
+    pub copied: Vec<PathBuf>,
+}
+
+/// That sessions are left out for their recovered copies; nothing without any.
+#[must_use]
+pub fn copied_sentence(names: impl IntoIterator<Item = String>) -> Option<String> {
+    let names: Vec<String> = names.into_iter().collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "left out, because the copy that was recovered from it is there too: {}",
+            names.join(", ")
+        )
+    })
+}
+
+impl Found {
+    /// What a user must know of what was left out.
+    #[must_use]
+    pub fn note(&self) -> Option<String> {
+        copied_sentence(self.copied.iter().map(|path| path.display().to_string()))
+    }
+}
+
+/// Whether a path is a session: its folder, or the file of its log. What is not there is taken for one, so that its
+/// reader says what is missing.
+#[must_use]
+pub fn is_session(path: &Path) -> bool {
+    path.is_dir() || has_ending(path, &[LOG]) || !path.exists()
+}
+
+/// Whether a path is a folder of recordings rather than one recording.
+#[must_use]
+pub fn is_collection(path: &Path) -> bool {
+    path.is_dir() && !is_session_folder(path)
+}
+
+fn has_ending(path: &Path, endings: &[&str]) -> bool {
+    let is_ending = |ending: &std::ffi::OsStr| {
+        let mut known = endings.iter();
+        known.any(|known| ending.eq_ignore_ascii_case(known))
+    };
+    path.extension().is_some_and(is_ending)
+}
+
+/// Every recording named, and every one in the folders named: folder by folder, by name.
+pub fn find(paths: &[PathBuf]) -> Result<Found, SourcesError> {
+    let (paths, copied) = without_copied(all(paths)?, is_session);
+    Ok(Found { paths, copied })
+}
+
+/// The same of sessions alone.
+pub fn find_sessions(paths: &[PathBuf]) -> Result<Found, SourcesError> {
+    if let Some(table) = paths.iter().find(|path| !is_session(path)) {
+        return Err(SourcesError::Table(table.clone()));
+    }
+    let mut found = find(paths)?;
+    found.paths.retain(|path| is_session(path));
+    Ok(found)
+}
+
+fn all(paths: &[PathBuf]) -> Result<Vec<PathBuf>, SourcesError> {
+    let mut found = Vec::new();
+    for path in paths {
+        if !path.exists() {
+            let path = path.clone();
+            return Err(SourcesError::Missing(ReadError::Missing { path }));
+        }
+        if !is_collection(path) {
+            found.push(path.clone());
+            continue;
+        }
+        let before = found.len();
+        below(path, &mut found).map_err(|err| SourcesError::Folder {
+            path: err.path().unwrap_or(path).to_owned(),
+            reason: err.io_error().map_or(err.to_string(), ToString::to_string),
+        })?;
+        if found.len() == before {
+            return Err(SourcesError::Nothing(path.clone()));
+        }
+    }
+    Ok(found)
+}
+
+/// Recordings below a folder. Links to folders are not followed, so no walk is endless and nothing
+/// counts twice; hidden names are left alone.
+fn below(folder: &Path, found: &mut Vec<PathBuf>) -> Result<(), walkdir::Error> {
+    let mut entries = WalkDir::new(folder).sort_by_file_name().into_iter();
+    while let Some(entry) = entries.next() {
+        let entry = entry?;
+        let (path, is_folder) = (entry.path(), entry.file_type().is_dir());
+        let is_hidden = entry.depth() > 0 && entry.file_name().to_string_lossy().starts_with('.');
+        let is_session = is_folder && entry.depth() > 0 && is_session_folder(path);
+        if is_folder && (is_hidden || is_session) {
+            entries.skip_current_dir();
+        }
+        let is_file = || path.is_file() && has_ending(path, &[TABLES[0], TABLES[1], LOG]);
+        if !is_hidden && (is_session || (!is_folder && is_file())) {
+            found.push(entry.into_path());
+        }
+    }
+    Ok(())
+}
+
+/// How recordings are called that are looked at together.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Naming {
+    /// By their paths as given.
+    #[default]
+    Path,
+    /// By the name of the folder or file alone.
+    Stem,
+}
+
+impl Naming {
+    fn name(self, path: &Path) -> String {
+        let stem = path.file_stem().filter(|_| self == Self::Stem);
+        stem.map_or_else(
+            || path.display().to_string(),
+            |stem| stem.to_string_lossy().into_owned(),
+        )
+    }
+}
+
+/// How recordings are read.
+#[derive(Clone, Copy, Debug)]
+pub struct Reading<'a> {
+    /// Names of the columns of tables without a header.
+    pub columns: Option<&'a ColumnNames>,
+    /// Which part of each, and whether rejected ones are taken.
+    pub wanted: Wanted,
+    /// What is taken from their depths.
+    pub corrections: &'a Corrections,
+    /// What they are called.
+    pub naming: Naming,
+}
+
+/// A recording that is looked at together with others.
+#[derive(Clone, Debug)]
+pub struct Recording {
+    /// What it is called.
+    pub name: String,
+    /// What is fitted.
+    pub samples: Vec<FitSample>,
+    /// The specimen pressed, where the source says so.
+    pub specimen: Option<String>,
+    /// What the rig's compliance does to its depths, or would.
+    pub compliance: Option<Correction>,
+    /// The calibration its forces were read with; `None` for a table.
+    pub calibration: Option<Calibration>,
+}
+
+impl Recording {
+    /// What was read of a source.
+    #[must_use]
+    pub fn of(name: String, source: FitSource, compliance: Option<Correction>) -> Self {
+        Self {
+            name,
+            samples: source.samples,
+            specimen: source.specimen,
+            calibration: source.calibration,
+            compliance,
+        }
+    }
+
+    /// As fits take it.
+    #[must_use]
+    pub fn borrowed(&self) -> (&str, &[FitSample]) {
+        (&self.name, &self.samples)
+    }
+}
+
+/// Recordings that were read, and what a user must know of them.
+#[derive(Clone, Debug, Default)]
+pub struct Recordings {
+    /// Those that count, in order.
+    pub all: Vec<Recording>,
+    /// Remarks, each with the name of its recording.
+    pub notes: Vec<String>,
+}
+
+/// Reads recordings that are looked at together, each once.
+pub fn read(paths: &[PathBuf], how: Reading<'_>) -> Result<Recordings, SourcesError> {
+    let real = |path: &PathBuf| path.canonicalize().unwrap_or_else(|_| path.clone());
+    let mut reals: Vec<PathBuf> = paths.iter().map(real).collect();
+    reals.sort();
+    if let Some(pair) = reals.windows(2).find(|pair| pair[0] == pair[1]) {
+        return Err(SourcesError::Twice(pair[0].clone()));
+    }
+    let mut read = Recordings::default();
+    for path in paths {
+        let name = how.naming.name(path);
+        let failed = |reason: SourceError| SourcesError::Source {
+            path: path.clone(),
+            reason: Box::new(reason),
+        };
+        let mut source = match source::read_stretch(path, how.columns, how.wanted) {
+            Err(SourceError::Rejected { reason }) => {
+                let note = format!("{name}: rejected, left out: {reason}");
+                read.notes.push(note);
+                continue;
+            }
+            source => source.map_err(failed)?,
+        };
+        let compliance = how.corrections.apply(&mut source);
+        let compliance = compliance.map_err(|err| failed(err.into()))?;
+        let applied = compliance.as_ref().filter(|one| one.is_applied);
+        source.notes.extend(applied.map(Correction::sentence));
+        let notes = source.notes.iter().map(|note| format!("{name}: {note}"));
+        read.notes.extend(notes);
+        read.all.push(Recording::of(name, source, compliance));
+    }
+    match paths.len() - read.all.len() {
+        0 => {}
+        all if all == paths.len() => return Err(SourcesError::Rejected(all)),
+        rejected => read.notes.push(format!(
+            "{} sources, {rejected} of them rejected",
+            paths.len()
+        )),
+    }
+    Ok(read)
+}
+
+impl Recordings {
+    /// As fits take them.
+    #[must_use]
+    pub fn borrowed(&self) -> Vec<(&str, &[FitSample])> {
+        self.all.iter().map(Recording::borrowed).collect()
+    }
+
+    /// What calibrations and compliances add, as `find` tells it; `None` where neither is known of any record.
+    pub fn systematic<T>(
+        &self,
+        find: impl FnOnce(&[Traced<'_>]) -> Result<T, FitError>,
+    ) -> Result<Option<T>, String> {
+        let origins: Result<Vec<Origin>, CalibrationError> = self
+            .all
+            .iter()
+            .map(|one| Origin::of(one.calibration.as_ref(), one.compliance.as_ref()))
+            .collect();
+        let origins = origins.map_err(|err| err.to_string())?;
+        if !origins.iter().any(Origin::is_known) {
+            return Ok(None);
+        }
+        let traced: Vec<Traced<'_>> = self
+            .all
+            .iter()
+            .zip(&origins)
+            .map(|(one, origin)| origin.traced(&one.name, &one.samples))
+            .collect();
+        find(&traced).map(Some).map_err(|err| err.to_string())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::fs;
+
+    #[test]
+    fn sessions_and_tables_are_found_in_order_and_links_are_not_followed() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = folder.path();
+        for name in ["b/s10", "b/s9", "a/deep", "empty", ".hidden"] {
+            fs::create_dir_all(at.join(name)).unwrap();
+        }
+        for name in [
+            "b/s10/000.mcap",
+            "b/s9/001.mcap",
+            "b/s9/lock",
+            "b/table.CSV",
+            "a/deep/t.tsv",
+            "a/alone.mcap",
+            ".hidden/t.csv",
+            "notes.txt",
+        ] {
+            fs::write(at.join(name), "").unwrap();
+        }
+        // A loop, and a second way to the same sessions.
+        std::os::unix::fs::symlink(at, at.join("a/loop")).unwrap();
+        std::os::unix::fs::symlink(at.join("b"), at.join("again")).unwrap();
+        let found = all(&[at.to_path_buf()]).unwrap();
+        let names: Vec<_> = found
+            .iter()
+            .map(|path| path.strip_prefix(at).unwrap())
+            .collect();
+        let expected = [
+            "a/alone.mcap",
+            "a/deep/t.tsv",
+            "b/s10",
+            "b/s9",
+            "b/table.CSV",
+        ];
+        assert_eq!(names, expected.map(Path::new));
+        // Named itself, a link is what it leads to; a session is a source and not a folder of some.
+        assert_eq!(all(&[at.join("again")]).unwrap().len(), 3);
+        assert_eq!(all(&[at.join("b/s9")]).unwrap(), [at.join("b/s9")]);
+        let refusal = all(&[at.join("empty")]).unwrap_err();
+        assert!(matches!(refusal, SourcesError::Nothing(_)), "{refusal}");
+        let table = find_sessions(&[at.join("b/table.CSV")]).unwrap_err();
+        assert!(matches!(table, SourcesError::Table(_)), "{table}");
+    }
+
+    #[test]
+    fn a_recording_given_twice_is_refused_however_it_is_written() {
+        let folder = tempfile::tempdir().unwrap();
+        let table = folder.path().join("one.csv");
+        fs::write(&table, "t_s,depth_mm,force_N\n0,0,0\n1,1,0.5\n2,1,0.4\n").unwrap();
+        let how = Reading {
+            columns: None,
+            wanted: Wanted::default(),
+            corrections: &Corrections::none(None),
+            naming: Naming::Stem,
+        };
+        let once = read(std::slice::from_ref(&table), how).unwrap();
+        assert_eq!((once.all[0].name.as_str(), once.all.len()), ("one", 1));
+        let again = folder.path().join(".").join("one.csv");
+        let twice = read(&[table, again], how).unwrap_err();
+        assert!(matches!(twice, SourcesError::Twice(_)), "{twice}");
+    }
+}

@@ -1,0 +1,62 @@
+//! `palpate mask`: stretches of a session whose forces do not count, as an analysis beside it.
+
+use super::Failure;
+use super::output::Output;
+use super::recalibrate::{Who, deed_failure};
+use clap::Args;
+use palpate_analysis::analyses;
+use palpate_analysis::progress::Unwatched;
+use std::path::PathBuf;
+use std::str::FromStr;
+
+/// Name stretches of a session whose forces do not count, as an analysis beside it
+#[derive(Debug, Args)]
+pub struct MaskArgs {
+    /// Session folder
+    session: PathBuf,
+    /// Name of the analysis
+    #[arg(long, value_name = "NAME")]
+    name: String,
+    /// A stretch whose forces do not count, in s as in the column t_s of an export; may be repeated
+    #[arg(long, required = true, value_name = "FROM..TO")]
+    leave_out: Vec<Span>,
+    #[command(flatten)]
+    who: Who,
+}
+
+/// A stretch of time in s.
+#[derive(Clone, Copy, Debug)]
+struct Span([f64; 2]);
+
+impl FromStr for Span {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |text: &str| text.trim().parse::<f64>().ok();
+        let ends = text.split_once("..");
+        match ends.map(|(from, to)| (number(from), number(to))) {
+            Some((Some(from), Some(to))) if from.is_finite() && to.is_finite() && from <= to => {
+                Ok(Self([from, to]))
+            }
+            _ => Err("write two times in s, the earlier first, as in 12.5..14".to_owned()),
+        }
+    }
+}
+
+pub(super) fn run(args: &MaskArgs, output: &Output) -> Result<(), Failure> {
+    let spans = args.leave_out.iter().map(|span| span.0).collect();
+    let (session, who) = (&args.session, args.who.who());
+    let masked = analyses::mask(session, &args.name, spans, &who, &Unwatched);
+    let masked = masked.map_err(deed_failure)?;
+    let (left_out, of, name) = (masked.left_out, masked.of, &masked.analysis.name);
+    let object = serde_json::json!({
+        "session": session, "analysis": name, "by": who.by, "left_out": left_out, "of": of,
+    });
+    output.answer("mask", &object, || {
+        format!(
+            "{}: {left_out} of {of} forces are left out by analysis '{name}'",
+            session.display()
+        )
+    });
+    Ok(())
+}

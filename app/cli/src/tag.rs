@@ -1,0 +1,86 @@
+//! `palpate tag`: words by which sessions are found.
+
+use super::Failure;
+use super::output::Output;
+use super::review::{edit_failure, say_failure, subjects};
+use clap::Args;
+use palpate_analysis::edits::author;
+use palpate_sessions::edits::{Change, Edits};
+use serde::Serialize;
+use std::path::PathBuf;
+
+/// Give sessions tags to find them by, or take them away
+#[derive(Debug, Args)]
+pub struct TagArgs {
+    /// Session folders, then tags: +TAG to give one, -TAG to take one away; options come before
+    #[arg(
+        required = true,
+        value_name = "SESSION|+TAG|-TAG",
+        allow_hyphen_values = true
+    )]
+    words: Vec<String>,
+    /// Who says so; without it the login name
+    #[arg(long, value_name = "NAME")]
+    by: Option<String>,
+}
+
+/// What is taken for an option though it stands among the tags.
+const JSON: &str = "--json";
+
+#[derive(Serialize)]
+struct Tagged {
+    session: PathBuf,
+    tags: Vec<String>,
+}
+
+pub(super) fn run(args: &TagArgs, output: &Output) -> Result<(), Failure> {
+    let (mut sessions, mut add, mut remove) = (Vec::new(), Vec::new(), Vec::new());
+    for word in args.words.iter().filter(|word| *word != JSON) {
+        match word.as_bytes() {
+            [b'-', b'-', ..] => {
+                return Err(Failure::usage(format!(
+                    "{word} stands among the tags; options come before the sessions, as in 'palpate tag --by Ada demo +good'"
+                )));
+            }
+            [b'+', ..] => add.push(word[1..].to_owned()),
+            [b'-', ..] => remove.push(word[1..].to_owned()),
+            _ => sessions.push(PathBuf::from(word)),
+        }
+    }
+    if sessions.is_empty() || (add.is_empty() && remove.is_empty()) {
+        return Err(Failure::usage(
+            "name sessions and tags, as in 'palpate tag demo +good -doubtful'",
+        ));
+    }
+    let by = author(args.by.as_deref());
+    let mut tagged = Vec::new();
+    for subject in subjects(&sessions)? {
+        let tags = subject.edits.tags();
+        let (remove, absent): (Vec<_>, Vec<_>) = remove
+            .iter()
+            .cloned()
+            .partition(|tag| add.contains(tag) || tags.contains(tag.as_str()));
+        let session = subject.folder.clone();
+        for tag in absent {
+            let name = session.display();
+            output.note(&format!("{name} has no tag '{tag}' to take away"));
+        }
+        if !add.is_empty() || !remove.is_empty() {
+            let add = add.clone();
+            let said = subject.say(&by, "", Change::Tags { add, remove });
+            said.map_err(say_failure)?;
+        }
+        let edits = Edits::read(&session, &subject.id).map_err(edit_failure)?;
+        let tags = edits.tags().into_iter().map(str::to_owned).collect();
+        tagged.push(Tagged { session, tags });
+    }
+    let object = serde_json::json!({ "by": by, "sessions": tagged });
+    output.answer("tag", &object, || {
+        let line = |one: &Tagged| match one.tags.as_slice() {
+            [] => format!("{}: no tags", one.session.display()),
+            tags => format!("{}: {}", one.session.display(), tags.join(", ")),
+        };
+        tagged.iter().map(line).collect::<Vec<_>>().join("\n")
+    });
+    Ok(())
+}
