@@ -7,6 +7,7 @@
 
 pub mod cell;
 pub mod detect;
+pub mod device;
 pub mod doubles;
 pub mod galil;
 pub mod grbl;

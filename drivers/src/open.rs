@@ -5,7 +5,7 @@ use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
 use crate::wire::{HostClock, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
+use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
 use std::io::Read;
 
 /// Opens the rig called `name`: `sim`, or `sim:NAME` for a simulated rig that people share by name.
@@ -100,6 +100,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
         (**self).take_raw()
     }
 
+    fn take_sensors(&mut self) -> Vec<SensorReading> {
+        (**self).take_sensors()
+    }
+
     fn links(&self) -> Vec<(String, LinkStats)> {
         (**self).links()
     }
@@ -116,6 +120,14 @@ mod tests {
             assert_eq!(rig.description().name, name);
             assert!(rig.is_virtual());
         }
+    }
+
+    /// A box that answers for its rig hides whatever it does not hand on.
+    #[test]
+    fn boxed_rig_tells_what_its_sensors_say() {
+        let mut rig = open("sim", &SimSettings::default()).unwrap();
+        while rig.next_event(Nanos::from_millis(100)).is_some() {}
+        assert!(!Rig::take_sensors(&mut rig).is_empty());
     }
 
     #[test]

@@ -1,6 +1,7 @@
 //! The trait every rig implements, simulated or real: commands in, events out.
 
-use crate::rig_file::{DeviceError, RigFileError};
+use crate::device::OpenError;
+use crate::rig_file::RigFileError;
 use crate::wire::LinkStats;
 use palpate_model::Nanos;
 use palpate_model::rig::{
@@ -68,7 +69,7 @@ pub enum RigError {
         /// The rig file.
         file: String,
         /// Why.
-        error: DeviceError,
+        error: OpenError,
     },
 }
 

@@ -23,6 +23,6 @@ mod watchdog;
 pub use connect::{Connected, connect};
 pub use error::GalilError;
 pub use model::{GalilBoard, GalilOpenError};
-pub use rig::GalilRig;
+pub use rig::{GalilDevice, GalilRig};
 pub use session::Session;
 pub use settings::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};

@@ -1,7 +1,6 @@
 //! Which controllers can be driven, and why one cannot be opened.
 
 use super::error::GalilError;
-use crate::wire::WireError;
 use std::fmt;
 use thiserror::Error;
 
@@ -76,9 +75,6 @@ impl fmt::Display for GalilBoard {
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GalilOpenError {
-    /// The link cannot be had.
-    #[error(transparent)]
-    Wire(#[from] WireError),
     /// The link was lost while the controller was set up.
     #[error("the link was lost while the controller was set up ({detail}); check cable and power")]
     Lost {
@@ -147,9 +143,6 @@ pub enum GalilOpenError {
         "samples cannot be recorded by this controller ({0}); leave sampling out of the rig file, or set it to \"auto\""
     )]
     NoRecording(String),
-    /// The thread cannot be had.
-    #[error("the driver's thread cannot be started ({0}); close other programs")]
-    Thread(String),
 }
 
 #[cfg(test)]

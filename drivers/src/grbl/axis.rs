@@ -1,9 +1,10 @@
 //! A Grbl board as the axis of a rig.
 
-use super::connect::{Connected, GrblOpenError, connect};
+use super::connect::{Connected, connect};
 use super::protocol::JOG_CANCEL;
 use super::session::Session;
 use super::settings::GrblSettings;
+use crate::device::OpenError;
 use crate::parts::{Axis, Track};
 use crate::wire::{HostClock, Line, LineSettings, Link};
 use palpate_model::rig::RigDescription;
@@ -21,7 +22,7 @@ pub fn open(
     mut link: Box<dyn Link>,
     settings: &GrblSettings,
     clock: &HostClock,
-) -> Result<(RigDescription, Axis), GrblOpenError> {
+) -> Result<(RigDescription, Axis), OpenError> {
     let device: Arc<str> = "grbl".into();
     let Connected {
         identity,
@@ -36,8 +37,7 @@ pub fn open(
         device,
         farewell: vec![JOG_CANCEL],
     };
-    let line = Line::start(link, session, Arc::clone(clock), line_settings)
-        .map_err(|err| GrblOpenError::Thread(err.to_string()))?;
+    let line = Line::start(link, session, clock, line_settings)?;
     let description = RigDescription {
         name: settings.name.clone(),
         identity,

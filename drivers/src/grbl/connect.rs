@@ -4,7 +4,7 @@
 use super::motion::worst_case_mm;
 use super::protocol::{self, CYCLE_START, Incoming, JOG_CANCEL, Parser, State, Status};
 use super::settings::{Facts, GrblSettings, HomeSwitch};
-use crate::wire::{HostClock, Link, LinkStats, WireError};
+use crate::wire::{HostClock, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::RawBytes;
 use std::collections::BTreeMap;
@@ -36,9 +36,6 @@ const READ_MAX: Duration = Duration::from_millis(5);
 #[derive(Clone, Debug, PartialEq, Error)]
 #[non_exhaustive]
 pub enum GrblOpenError {
-    /// The port cannot be opened.
-    #[error(transparent)]
-    Wire(#[from] WireError),
     /// It was unplugged.
     #[error("the link was lost while the board was set up ({detail}); check the cable")]
     Lost {
@@ -129,9 +126,6 @@ pub enum GrblOpenError {
         /// Why.
         detail: String,
     },
-    /// No thread for it.
-    #[error("the operating system gives no thread for the link ({0})")]
-    Thread(String),
 }
 
 /// A board that was set up.

@@ -8,4 +8,4 @@ pub mod protocol;
 pub mod stand;
 
 pub use gauge::GaugeSettings;
-pub use stand::{StandRig, StandSettings};
+pub use stand::{StandDevice, StandRig, StandSettings};

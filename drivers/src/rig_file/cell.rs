@@ -22,7 +22,7 @@ pub enum CellFile {
 
 impl CellFile {
     /// Makes sure who answers on a link.
-    pub(super) fn open(
+    pub(crate) fn open(
         &self,
         link: &mut dyn Link,
         clock: &HostClock,

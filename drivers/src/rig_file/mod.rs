@@ -13,12 +13,13 @@ mod stand;
 pub use cell::CellFile;
 pub use fields::Mistake;
 
-use crate::galil::{GalilOpenError, GalilRig, GalilSettings};
-use crate::grbl::{GrblOpenError, GrblSettings};
-use crate::mark10::{StandRig, StandSettings};
-use crate::parts::PartsRig;
-use crate::rig::{Rig, RigError};
-use crate::wire::{HostClock, Place, WireError};
+use crate::device::{DeviceRig, OpenError};
+use crate::galil::{GalilDevice, GalilSettings};
+use crate::grbl::GrblSettings;
+use crate::mark10::{StandDevice, StandSettings};
+use crate::parts::Parts;
+use crate::rig::Rig;
+use crate::wire::{HostClock, Place};
 use fields::Fields;
 use std::fmt;
 use thiserror::Error;
@@ -103,10 +104,11 @@ impl RigFile {
     }
 
     /// Opens the devices and checks them against the file. Nothing moves.
-    pub fn open(&self, clock: &HostClock) -> Result<Box<dyn Rig>, DeviceError> {
-        match self {
+    pub fn open(&self, clock: &HostClock) -> Result<Box<dyn Rig>, OpenError> {
+        let clock = clock.clone();
+        Ok(match self.clone() {
             Self::Galil { place, settings } => {
-                Ok(Box::new(GalilRig::open(place, settings, clock.clone())?))
+                Box::new(DeviceRig::open(GalilDevice::new(place, settings), clock)?)
             }
             Self::Grbl {
                 place,
@@ -114,64 +116,14 @@ impl RigFile {
                 cell_place,
                 cell,
             } => {
-                let (file, clock) = (settings.name.clone(), clock.clone());
-                let parts = (
-                    place.clone(),
-                    settings.clone(),
-                    cell_place.clone(),
-                    cell.clone(),
-                );
-                let open = move || open_parts(&parts.0, &parts.1, &parts.2, &parts.3, &clock);
-                let rig = open()?;
-                Ok(Box::new(rig.with_again(Box::new(move || {
-                    open().map_err(|error| RigError::Device {
-                        file: file.clone(),
-                        error,
-                    })
-                }))))
+                let parts = Parts::new((place, settings), (cell_place, cell));
+                Box::new(DeviceRig::open(parts, clock)?)
             }
             Self::Stand { place, settings } => {
-                Ok(Box::new(StandRig::open(place, settings, clock.clone())?))
+                Box::new(DeviceRig::open(StandDevice { place, settings }, clock)?)
             }
-        }
+        })
     }
-}
-
-/// A Grbl board and the load cell beside it.
-fn open_parts(
-    place: &Place,
-    settings: &GrblSettings,
-    cell_place: &Place,
-    cell: &CellFile,
-    clock: &HostClock,
-) -> Result<PartsRig, DeviceError> {
-    let axis_link = place.open()?;
-    let mut cell_link = cell_place.open()?;
-    let (description, axis) = crate::grbl::open(axis_link, settings, clock)?;
-    let opened = cell.open(cell_link.as_mut(), clock)?;
-    PartsRig::new(description, axis, cell_link, opened, clock.clone())
-        .map_err(|err| DeviceError::Thread(err.to_string()))
-}
-
-/// A device that a rig file describes cannot be used.
-#[derive(Clone, Debug, PartialEq, Error)]
-#[non_exhaustive]
-pub enum DeviceError {
-    /// A Galil controller.
-    #[error(transparent)]
-    Galil(#[from] GalilOpenError),
-    /// A Grbl board.
-    #[error(transparent)]
-    Grbl(#[from] GrblOpenError),
-    /// A load cell or a stand.
-    #[error(transparent)]
-    Text(#[from] crate::text::DeviceError),
-    /// A port cannot be opened.
-    #[error(transparent)]
-    Wire(#[from] WireError),
-    /// No thread for it.
-    #[error("the operating system gives no thread for a link ({0})")]
-    Thread(String),
 }
 
 #[derive(Clone, Copy)]

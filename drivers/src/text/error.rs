@@ -1,6 +1,5 @@
 //! Why a device that speaks in lines cannot be used, in words.
 
-use crate::wire::WireError;
 use std::io;
 use thiserror::Error;
 
@@ -8,9 +7,6 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Eq, Error)]
 #[non_exhaustive]
 pub enum DeviceError {
-    /// It cannot be reached.
-    #[error(transparent)]
-    Wire(#[from] WireError),
     /// Nothing comes.
     #[error("the {device} does not answer; {hint}")]
     Silent {

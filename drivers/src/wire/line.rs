@@ -3,6 +3,7 @@
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
 use super::link::Link;
+use crate::device::OpenError;
 use crate::priority::{self, Granted};
 use crate::rig::{RigEvent, RigEventBody};
 use palpate_model::Nanos;
@@ -70,6 +71,7 @@ type Shared = Arc<(Mutex<Reports>, Condvar)>;
 
 /// A dialogue on a link, in a thread of its own. Dropped it says farewell and closes the link.
 pub struct Line {
+    device: Arc<str>,
     /// Stops: looked at before anything that waits.
     stops: SyncSender<Numbered>,
     commands: SyncSender<Numbered>,
@@ -84,18 +86,25 @@ impl Line {
     pub fn start(
         link: Box<dyn Link>,
         dialogue: impl Dialogue + 'static,
-        clock: HostClock,
+        clock: &HostClock,
         settings: LineSettings,
-    ) -> io::Result<Self> {
+    ) -> Result<Self, OpenError> {
         let (stops, urgent) = sync_channel(COMMANDS_MAX);
         let (commands, queued) = sync_channel(COMMANDS_MAX);
-        let reports = Shared::default();
+        let reports = Shared::new((
+            Mutex::new(Reports {
+                // As it was measured when the device was set up.
+                stats: dialogue.stats(),
+                ..Reports::default()
+            }),
+            Condvar::new(),
+        ));
         let is_closing = Arc::new(AtomicBool::new(false));
-        let name = settings.device.to_string();
+        let device = Arc::clone(&settings.device);
         let mut owner = Owner {
             link,
             dialogue,
-            clock,
+            clock: Arc::clone(clock),
             settings,
             urgent,
             queued,
@@ -106,11 +115,15 @@ impl Line {
             reports: Arc::clone(&reports),
         };
         let closing = Arc::clone(&is_closing);
-        let thread = std::thread::Builder::new().name(name).spawn(move || {
-            owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
-            owner.run(&closing);
-        })?;
+        let thread = std::thread::Builder::new()
+            .name(device.to_string())
+            .spawn(move || {
+                owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
+                owner.run(&closing);
+            })
+            .map_err(|err| OpenError::thread(&err))?;
         Ok(Self {
+            device,
             stops,
             commands,
             stop_count: 0,
@@ -118,6 +131,12 @@ impl Line {
             is_closing,
             thread: Some(thread),
         })
+    }
+
+    /// What the device is called in the log of raw bytes.
+    #[must_use]
+    pub fn device(&self) -> &str {
+        &self.device
     }
 
     /// Hands over a command without waiting. One that finds no room is given back.

@@ -118,7 +118,7 @@ fn stops_overtake_what_waits() {
         waits,
         go_on,
     };
-    let mut line = Line::start(Box::new(gate), notes, clock(), settings()).unwrap();
+    let mut line = Line::start(Box::new(gate), notes, &clock(), settings()).unwrap();
     waiting.recv().unwrap();
     let define = RigCommand::DefinePosition { pulses: 3 };
     line.send(define).unwrap();
@@ -151,7 +151,7 @@ fn stops_overtake_what_waits() {
 #[test]
 fn a_stop_waits_for_nobody_who_reads_reports() {
     let (here, mut there) = super::super::pair();
-    let mut line = Line::start(Box::new(here), Notes::default(), clock(), settings()).unwrap();
+    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     let reports = Arc::clone(&line.reports);
     let reading = reports.0.lock().unwrap();
     // Something to report comes first, so that the thread has wanted to hand it over.
@@ -168,7 +168,7 @@ fn a_stop_waits_for_nobody_who_reads_reports() {
 #[test]
 fn what_arrives_is_reported_in_order_and_a_lost_link_last() {
     let (here, mut there) = super::super::pair();
-    let line = Line::start(Box::new(here), Notes::default(), clock(), settings()).unwrap();
+    let line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
     there.write(b"ab").unwrap();
     let late = Nanos(u64::MAX);
     for _ in 0..2 {
@@ -192,7 +192,7 @@ fn a_driver_that_fails_is_a_lost_link() {
         fails_at: Some(b'!'),
         ..Notes::default()
     };
-    let line = Line::start(Box::new(here), notes, clock(), settings()).unwrap();
+    let line = Line::start(Box::new(here), notes, &clock(), settings()).unwrap();
     there.write(b"!").unwrap();
     let last = line.next_event(Nanos(u64::MAX), WAIT).unwrap();
     assert!(last.body == lost("the driver has failed; open the rig again"));

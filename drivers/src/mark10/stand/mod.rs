@@ -22,7 +22,7 @@ mod rig;
 mod session;
 
 pub use open::{ConnectedStand, connect};
-pub use rig::StandRig;
+pub use rig::{StandDevice, StandRig, open};
 pub use session::{Pace, StandSession};
 
 use super::gauge::GaugeSettings;

@@ -8,7 +8,7 @@
 
 use super::bench::{thesis, to};
 use super::wires::clock;
-use palpate_drivers::galil::{GalilRig, GalilSettings, Sampling};
+use palpate_drivers::galil::{GalilDevice, GalilRig, GalilSettings, Sampling};
 use palpate_drivers::wire::Place;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::Device;
@@ -160,7 +160,7 @@ fn run(seed: u64) -> Result<(), String> {
         ..thesis()
     };
     // A computer that stands still for a second may well hear no answer: who opens a rig tries again.
-    let open = || GalilRig::open(&place, &settings, clock());
+    let open = || GalilRig::open(GalilDevice::new(place.clone(), settings.clone()), clock());
     let opened = open().or_else(|_| open()).or_else(|_| open());
     let verdict = opened.map_err(|err| err.to_string()).and_then(|rig| {
         drive(rig, &mut random, &mut story, &|order| {
@@ -198,7 +198,7 @@ fn drive(
     story: &mut Story,
     order: &dyn Fn(String),
 ) -> Result<f64, String> {
-    let worst = rig.worst_case_mm();
+    let worst = rig.device().worst_case_mm();
     let start = Instant::now();
     let at = |start: Instant| start.elapsed().as_secs_f64();
     let mut faults: Vec<(f64, String)> = (0..1 + random.below(2))

@@ -98,7 +98,7 @@ fn count(settings: &GalilSettings, (latency, baud): (Nanos, Option<u32>), what: 
         // Nobody else takes them, and they are many.
         drop(runner.rig.take_raw());
     }
-    let stats = runner.rig.stats();
+    let stats = runner.rig.links()[0].1;
     let (begin, end) = (line[0], line[line.len() - 1]);
     let slope = end.1.since(begin.1).0 as f64 / (end.0 - begin.0) as f64;
     println!(

@@ -6,7 +6,7 @@
 )]
 
 use super::bench::{thesis, to};
-use palpate_drivers::galil::{GalilRig, GalilSettings};
+use palpate_drivers::galil::{GalilDevice, GalilRig, GalilSettings};
 use palpate_drivers::wire::{HostClock, Place, WireError};
 use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_emulators::galil::{GalilEmulator, GalilSettings as Emulated};
@@ -88,7 +88,8 @@ pub struct Runner {
 
 impl Runner {
     pub fn open(place: &Place, settings: &GalilSettings) -> Self {
-        let rig = GalilRig::open(place, settings, clock()).expect("it is a Galil controller");
+        let device = GalilDevice::new(place.clone(), settings.clone());
+        let rig = GalilRig::open(device, clock()).expect("it is a Galil controller");
         assert!(!rig.is_virtual());
         Self {
             rig,
@@ -182,7 +183,7 @@ impl Runner {
             .collect::<Vec<u8>>();
         let sent = String::from_utf8(sent).expect("ASCII lines");
         assert!(sent.starts_with("\rEO 0\r") && sent.contains("\rSTA;MG @AN[1]"));
-        assert!(self.rig.stats().answers > 10);
+        assert!(self.rig.links()[0].1.answers > 10);
         self.tell(to(6000, 0.75));
         self.events.clear();
         let order = served.orders.send("disconnect:2".into());
@@ -257,7 +258,7 @@ fn a_converter_that_waits_is_measured() {
     };
     let mut runner = Runner::open(&place, &thesis());
     runner.until("samples", |runner| runner.events.len() > 50);
-    let stats = runner.rig.stats();
+    let stats = runner.rig.links()[0].1;
     assert!(stats.round_trip_max > Nanos::from_millis(8), "{stats:?}");
     assert!(stats.in_flight > 2, "{stats:?}");
 }

@@ -5,13 +5,14 @@
 )]
 
 use super::bench::{Shared, to, usual};
-use palpate_drivers::mark10::StandRig;
-use palpate_drivers::wire::{Link, pair};
+use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
+use palpate_drivers::mark10::stand;
+use palpate_drivers::wire::{HostClock, Link, pair};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::Device;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
 use palpate_model::Nanos;
-use palpate_model::rig::{AxisStatus, RigCommand};
+use palpate_model::rig::{AxisStatus, Fault, RigCommand};
 use palpate_test_support::wait::PATIENCE;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -126,13 +127,22 @@ fn who_does_not_fit_is_told_in_words() {
     }
 }
 
+/// A stand on a link that is there once.
+struct OnLink(Option<Box<dyn Link>>);
+
+impl RigDevice for OnLink {
+    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+        let gone = || OpenError::Thread("the link was used".into());
+        stand::open(self.0.take().ok_or_else(gone)?, &usual(), clock)
+    }
+}
+
 /// The whole of it: a thread, a wire, the host's clock.
 #[test]
 fn a_rig_moves_stops_and_says_farewell() {
     let (ours, mut theirs) = pair();
     let start = Instant::now();
-    let clock: palpate_drivers::wire::HostClock =
-        Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
+    let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
     let is_over = Arc::new(AtomicBool::new(false));
     let stopping = Arc::clone(&is_over);
     let device_clock = Arc::clone(&clock);
@@ -158,7 +168,8 @@ fn a_rig_moves_stops_and_says_farewell() {
         .name("stand".into())
         .spawn(work)
         .expect("a thread");
-    let mut rig = StandRig::on(Box::new(ours), &usual(), Arc::clone(&clock)).expect("a stand");
+    let mut rig =
+        DeviceRig::open(OnLink(Some(Box::new(ours))), Arc::clone(&clock)).expect("a stand");
     let begin = Instant::now();
     rig.send(to(50, 1.0));
     let (mut readings, mut is_acknowledged) = (0, false);
@@ -181,11 +192,24 @@ fn a_rig_moves_stops_and_says_farewell() {
         );
     }
     assert!(is_acknowledged, "{readings}");
-    assert!(rig.stats().answers > 0);
+    assert!(rig.links()[0].1.answers > 0);
     let raw = rig.take_raw();
     assert!(raw.iter().any(|piece| piece.is_sent && piece.bytes == b"d"));
     rig.send(RigCommand::Stop);
-    drop(rig);
+    // What is connected anew says farewell first; nothing it has told is forgotten when there is nobody any more.
+    let Err(err) = rig.reconnect() else {
+        panic!("there is no second link");
+    };
+    assert!(err.to_string().contains("the link was used"), "{err}");
+    assert!(!rig.take_raw().is_empty() && rig.links().is_empty());
+    rig.send(to(50, 1.0));
+    let until = Nanos(begin.elapsed().as_nanos() as u64);
+    let event = rig.next_event(until).map(|event| event.body);
+    let Some(RigEventBody::Fault(Fault::CommandRefused { detail })) = event else {
+        panic!("{event:?}");
+    };
+    assert!(detail.contains("not connected"), "{detail}");
+    assert_eq!(rig.next_event(until), None);
     is_over.store(true, Ordering::SeqCst);
     let heard = device.join().expect("the stand");
     assert_eq!(heard.last(), Some(&b's'));

@@ -5,7 +5,7 @@
 )]
 
 use super::bench::{to, usual};
-use palpate_drivers::mark10::StandRig;
+use palpate_drivers::mark10::{StandDevice, StandRig};
 use palpate_drivers::wire::{HostClock, Place};
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
@@ -80,14 +80,18 @@ fn a_stand_on_a_pseudo_terminal_moves_and_is_connected_anew() {
     };
     let start = Instant::now();
     let clock: HostClock = Arc::new(move || Nanos(start.elapsed().as_nanos() as u64));
-    let mut rig = StandRig::open(&place, &usual(), Arc::clone(&clock)).expect("a stand");
-    let second = StandRig::open(&place, &usual(), clock).err();
+    let open = || {
+        let (place, settings) = (place.clone(), usual());
+        StandRig::open(StandDevice { place, settings }, Arc::clone(&clock))
+    };
+    let mut rig = open().expect("a stand");
+    let second = open().err();
     let second = second.expect("two on one port").to_string();
     assert!(second.contains("another program"), "{second}");
 
     rig.send(to(100, 1.0));
     let readings = until(&mut rig, start, rests_at(100));
-    println!("{readings} samples in a move; {:?}", rig.stats());
+    println!("{readings} samples in a move; {:?}", rig.links());
     rig.reconnect().expect("the same stand");
     // It is where it was, by its own travel.
     until(&mut rig, start, rests_at(100));
