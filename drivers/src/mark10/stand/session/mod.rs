@@ -1,18 +1,19 @@
 //! The dialogue with a stand that has been set up: one question at a time, stops before everything.
 
+mod answers;
+mod following;
+
 use super::open::ConnectedStand;
-use super::protocol::{
-    Crosshead, Force, Pair, STOP, Status, ask_limit, number, set_limit, set_speed,
-};
-use super::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, SPEED_TOLERANCE, StandSettings};
+use super::protocol::{Pair, STOP, Status, ask_limit, set_limit, set_speed};
+use super::{MM_PER_PULSE, StandSettings};
 use crate::mark10::gauge::GaugeScale;
 use crate::rig::RigEventBody;
-use crate::text::{Lines, Taken};
+use crate::text::Lines;
 use crate::wire::{Dialogue, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::command::{position_from_pulses, pulses_from_position};
-use palpate_model::rig::{Ack, Age, AxisStatus, Fault, MoveTo, Profile, Reading, RigCommand};
-use palpate_model::units::{Position, Seconds, Volts};
+use palpate_model::rig::command::pulses_from_position;
+use palpate_model::rig::{Ack, Fault, MoveTo, Profile, RigCommand};
+use palpate_model::units::Position;
 use std::collections::VecDeque;
 
 /// A tick of the rig's clock, which is the host's.
@@ -254,253 +255,6 @@ impl StandSession {
         self.motion = Motion::Setting(going, steps);
     }
 
-    fn answered(&mut self, now: Nanos) {
-        if let Some((_, sent)) = self.asked.take() {
-            self.stats.push(now.since(sent));
-        }
-        self.lost = 0;
-        if !self.stop_due {
-            for command in std::mem::take(&mut self.unconfirmed) {
-                self.acknowledge(now, command);
-            }
-        }
-    }
-
-    fn on_line(&mut self, now: Nanos, line: &str) {
-        let Some((asked, sent)) = self.asked else {
-            return;
-        };
-        match asked {
-            Asked::Sample => {
-                if let Some((force, travel)) = self.pair.take(line) {
-                    self.answered(now);
-                    // It was taken somewhere between question and answer.
-                    let at = Nanos(sent.0 + now.since(sent).0 / 2);
-                    self.on_sample(now, at, force, travel);
-                }
-            }
-            Asked::Status => {
-                if let Some(status) = Status::parse(line) {
-                    self.answered(now);
-                    self.status = Some(status);
-                }
-            }
-            Asked::Speed(tenths) => {
-                if let Some(found) = number(line) {
-                    self.answered(now);
-                    self.check(now, (found * 10.0).round() as i64 == tenths, line, "speed");
-                }
-            }
-            Asked::Limit(hundredths) => {
-                if let Some(found) = number(line) {
-                    self.answered(now);
-                    let is_right = (found * 100.0).round() as i64 == hundredths;
-                    self.check(now, is_right, line, "travel limit");
-                }
-            }
-        }
-    }
-
-    /// What was set and read back while a move is set up.
-    fn check(&mut self, now: Nanos, is_right: bool, line: &str, what: &str) {
-        if !is_right && let Motion::Setting(..) = self.motion {
-            self.motion = Motion::Rest;
-            let line = line.trim();
-            self.refuse(
-                now,
-                format!("the stand reads back {line} for its {what}; check its range and that PC control is on"),
-            );
-        }
-    }
-
-    fn on_sample(&mut self, now: Nanos, at: Nanos, force: Force, travel: i64) {
-        if travel != self.travel {
-            self.travel_changed = now;
-        }
-        self.travel = travel;
-        let counts = match force {
-            Force::Reading(reading)
-                if reading.unit == self.scale.unit
-                    && reading.number.decimals == self.scale.decimals =>
-            {
-                reading.number.digits
-            }
-            Force::Overload if self.counts < 0 => -self.scale.counts_max,
-            Force::Overload => self.scale.counts_max,
-            // Another unit or another resolution: somebody has pressed a key of the gauge.
-            Force::Reading(_) => {
-                let tick = self.tick.unwrap_or(0);
-                return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
-            }
-        };
-        self.counts = counts;
-        self.look_for_overload(now);
-        let tick = at.since(self.opened).0 / TICK.0;
-        if self.tick.is_some_and(|before| tick <= before) {
-            return;
-        }
-        self.tick = Some(tick);
-        let (pulses, moving) = self.follow(now, tick);
-        let mut status = AxisStatus::MOTOR_ON | moving;
-        if self.settings.pulses(travel) <= 0 {
-            status = status | AxisStatus::HOME;
-        }
-        let (upper, lower) = self.status.map_or((false, false), |status| {
-            (status.is_at_upper, status.is_at_lower)
-        });
-        let (forward, reverse) = if self.settings.is_upwards {
-            (upper, lower)
-        } else {
-            (lower, upper)
-        };
-        if forward {
-            status = status | AxisStatus::FORWARD_LIMIT;
-        }
-        if reverse {
-            status = status | AxisStatus::REVERSE_LIMIT;
-        }
-        let reading = Reading {
-            tick,
-            counts: Some(counts),
-            volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
-            pulses,
-            status,
-            age: Some(Age {
-                by: now.since(at),
-                within: now.since(at),
-            }),
-        };
-        self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
-        self.report(now, RigEventBody::Reading(reading));
-    }
-
-    /// A reading at the end of the range stands for all that is beyond it, and no limit of force may see it.
-    fn look_for_overload(&mut self, now: Nanos) {
-        let is_beyond = self.counts.saturating_abs() >= self.scale.counts_max;
-        if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
-            self.stop_due |= self.is_going();
-            self.refuse(
-                now,
-                "the force is beyond the gauge's range; take the load off before it is damaged",
-            );
-        }
-        self.is_beyond = is_beyond;
-    }
-
-    /// Where the axis is told to be at a sample, and whether it moves.
-    fn follow(&mut self, now: Nanos, tick: u64) -> (i64, AxisStatus) {
-        let none = AxisStatus(0);
-        let true_pulses = self.told(self.travel);
-        match self.motion.clone() {
-            Motion::Rest | Motion::Setting(..) => (self.at_rest(true_pulses), none),
-            Motion::LetGo(going, since) => {
-                // A move that a stop has ended at once is told too, or nobody would know that it is over.
-                let is_over = going.target == going.from || self.stopped_at.is_some();
-                if !is_over && self.travel == going.from && !self.has_status_moved() {
-                    if now.since(since) > self.still(going.command) {
-                        self.motion = Motion::Rest;
-                        self.stop_due = true;
-                        self.refuse(
-                            now,
-                            "the crosshead has not begun to move; check PC control, its emergency stop and its limit switches",
-                        );
-                    }
-                    return (self.at_rest(true_pulses), none);
-                }
-                let command = going.command;
-                let from = self.at_rest(self.told(going.from));
-                let course = Profile::to_rest(
-                    position_from_pulses(from, MM_PER_PULSE),
-                    position_from_pulses(command.target_pulses, MM_PER_PULSE),
-                    command.speed,
-                    command.acceleration,
-                );
-                self.rests_at = None;
-                // A state that was told before it began is old.
-                self.status = None;
-                let stopped_tick = self.stopped_at.map(|_| tick);
-                self.motion = Motion::Moving {
-                    going,
-                    course: stopped_tick.map_or(course, |_| course.stopped_at(Seconds(0.0))),
-                    start_tick: tick,
-                    stopped_tick,
-                };
-                let stopping = stopped_tick.map_or(none, |_| AxisStatus::STOPPING);
-                (from, AxisStatus::MOVING | stopping)
-            }
-            Motion::Moving {
-                going,
-                course,
-                start_tick,
-                stopped_tick,
-            } => self.follow_course(now, tick, going, course, (start_tick, stopped_tick)),
-        }
-    }
-
-    fn follow_course(
-        &mut self,
-        now: Nanos,
-        tick: u64,
-        going: Going,
-        course: Profile,
-        (start_tick, stopped_tick): (u64, Option<u64>),
-    ) -> (i64, AxisStatus) {
-        let true_pulses = self.told(self.travel);
-        let secs = |from: u64| Seconds((tick - from) as f64 * TICK.0 as f64 * 1e-9);
-        let is_off = |pulses: i64, tolerance_mm: f64| {
-            (true_pulses - pulses).abs() as f64 * MM_PER_PULSE > tolerance_mm
-        };
-        let is_still = self.is_still(now, going.command);
-        let target = going.command.target_pulses;
-        if stopped_tick.is_none() {
-            let since = secs(start_tick);
-            let is_over = since.0 >= course.duration().0;
-            let is_there = !is_off(target, REST_TOLERANCE_MM);
-            if is_still && is_over && is_there {
-                self.motion = Motion::Rest;
-                self.rests_at = Some(target);
-                return (target, AxisStatus(0));
-            }
-            let is_cut_short = self.stopped_at.is_some() || is_still && !is_there;
-            if !is_cut_short {
-                let here = pulses_of(course.position(since));
-                let way = (here - self.told(going.from)).abs() as f64 * MM_PER_PULSE;
-                let tolerance =
-                    REST_TOLERANCE_MM + going.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
-                // The truth, where it is not the course: who checks the path sees it.
-                let told = if is_off(here, tolerance) {
-                    true_pulses
-                } else {
-                    here
-                };
-                return (told, AxisStatus::MOVING);
-            }
-            let course = course.stopped_at(since);
-            let here = pulses_of(course.position(Seconds(0.0)));
-            self.motion = Motion::Moving {
-                going,
-                course,
-                start_tick,
-                stopped_tick: Some(tick),
-            };
-            return (here, AxisStatus::MOVING | AxisStatus::STOPPING);
-        }
-        if is_still {
-            self.motion = Motion::Rest;
-            self.rests_at = None;
-            return (true_pulses, AxisStatus(0));
-        }
-        let here = pulses_of(course.position(secs(stopped_tick.unwrap_or(tick))));
-        (here, AxisStatus::MOVING | AxisStatus::STOPPING)
-    }
-
-    /// Where it was commanded to be as long as it is about there, else where it is.
-    fn at_rest(&self, true_pulses: i64) -> i64 {
-        let near =
-            |told: &i64| (told - true_pulses).abs() as f64 * MM_PER_PULSE <= REST_TOLERANCE_MM;
-        self.rests_at.filter(near).unwrap_or(true_pulses)
-    }
-
     /// A crosshead whose travel grows moves; asking would only cost samples.
     fn is_status_due(&self, now: Nanos) -> bool {
         let (every, since) = if self.is_going() && self.stopped_at.is_none() {
@@ -513,22 +267,6 @@ impl StandSession {
         self.pace.has_status && now.since(since) >= every
     }
 
-    fn has_status_moved(&self) -> bool {
-        self.status
-            .is_some_and(|status| status.crosshead != Crosshead::Stopped)
-    }
-
-    /// Longest time without a new travel of a crosshead that moves.
-    fn still(&self, command: MoveTo) -> Nanos {
-        let pulses = STILL_PULSES * MM_PER_PULSE / command.speed.0.max(1e-6);
-        Nanos(STILL.0 + (pulses * 1e9) as u64)
-    }
-
-    fn is_still(&self, now: Nanos, command: MoveTo) -> bool {
-        let is_old = now.since(self.travel_changed) > self.still(command);
-        is_old || self.pace.has_status && self.status.is_some() && !self.has_status_moved()
-    }
-
     fn is_going(&self) -> bool {
         matches!(self.motion, Motion::LetGo(..) | Motion::Moving { .. })
     }
@@ -539,42 +277,6 @@ impl StandSession {
         self.lines_since = 0;
         self.pair = Pair::default();
         Some(text.into())
-    }
-
-    /// The answer did not come, or came and made no sense.
-    fn lose_answer(&mut self, now: Nanos, quiet: Nanos) {
-        self.asked = None;
-        self.lost += if quiet == QUIET_LOST { 2 } else { 1 };
-        self.stats.resynchronised += 1;
-        self.lines.clear();
-        self.quiet_until = Some(now + quiet);
-        self.quiet = quiet;
-        if let Motion::Setting(..) = self.motion {
-            self.motion = Motion::Rest;
-            self.refuse(
-                now,
-                "its answer was lost or garbled, so it was not begun; check the cable",
-            );
-        }
-        // It stops at its limit by itself; no reason to wait for that.
-        self.stop_due |= self.is_going() && self.lost >= GARBLED_MAX;
-    }
-
-    fn on_taken(&mut self, now: Nanos, taken: Taken) {
-        if self.asked.is_none() {
-            return;
-        }
-        self.lines_since += 1;
-        if let Taken::Line(line) = taken {
-            self.on_line(now, &line);
-        }
-        let lines = match self.asked {
-            Some((Asked::Sample, _)) => 2,
-            _ => 1,
-        };
-        if self.asked.is_some() && self.lines_since >= lines {
-            self.lose_answer(now, QUIET);
-        }
     }
 
     fn write_stop(&mut self, now: Nanos) -> Vec<u8> {

@@ -1,0 +1,242 @@
+//! What the board says, and what follows from it.
+
+use super::Session;
+use crate::grbl::error::{Alarm, Refusal};
+use crate::grbl::protocol::{CYCLE_START, State, Status};
+use crate::grbl::times::STOP_MAX;
+use crate::rig::RigEventBody;
+use palpate_model::Nanos;
+use palpate_model::rig::{AxisStatus, Fault, RigCommand};
+
+impl Session {
+    pub(super) fn on_ok(&mut self, now: Nanos) {
+        let Some(written) = self.open.take() else {
+            // An answer that came late, after its line was given up.
+            self.stats.resynchronised += 1;
+            return;
+        };
+        self.stats.push(now.since(written));
+        let sign = self.settings.sign() as f64;
+        let Some(motion) = self.motion.as_mut() else {
+            return;
+        };
+        if motion.started.is_none() && motion.cancelled.is_none() {
+            // Grbl begins as soon as it has planned the first jog, and says `ok` then.
+            let started = Nanos(now.0.saturating_sub(self.facts.round_trip.0 / 2)).max(written);
+            motion.started = Some(started);
+            let from = sign * motion.from as f64;
+            let pulses_per_mm = sign * motion.side() / self.settings.mm_per_pulse;
+            let (profile, owed, wanted) = (motion.profile, motion.owed.take(), motion.wanted);
+            self.track().moves(started, from, profile, pulses_per_mm);
+            if let Some(number) = owed {
+                self.acknowledge(now, number, RigCommand::MoveTo(wanted));
+            }
+        }
+    }
+
+    pub(super) fn on_refusal(&mut self, now: Nanos, refusal: &Refusal) {
+        if self.open.take().is_none() {
+            self.stats.resynchronised += 1;
+            return;
+        }
+        let Some(motion) = self.motion.as_mut() else {
+            return;
+        };
+        if let Some(number) = motion.owed.take() {
+            self.motion = None;
+            self.refuse(now, number, refusal.to_string());
+        } else if motion.cancelled.is_none() {
+            self.fault(
+                now,
+                format!("a part of a motion was refused and the axis is stopped: {refusal}"),
+            );
+            self.cancel(now);
+        }
+    }
+
+    pub(super) fn on_alarm(&mut self, now: Nanos, alarm: &Alarm) {
+        if self.halt.is_some() {
+            return;
+        }
+        self.state = State::Alarm;
+        self.lock(now, &alarm.to_string());
+        self.fault(now, alarm.to_string());
+    }
+
+    pub(super) fn on_hello(&mut self, now: Nanos) {
+        self.heard = now;
+        self.asked = None;
+        // Nothing is in motion after a reset.
+        self.state = State::Idle;
+        if let Some(halt) = self.halt.take() {
+            let here = self.track().at(now).pulses.round() as i64;
+            self.track().rest(now, here);
+            for (number, command) in halt.owed {
+                self.acknowledge(now, number, command);
+            }
+        } else {
+            self.lock(now, "the board was reset; open the rig again");
+        }
+        self.is_motor_on = false;
+        self.report(now, RigEventBody::Fault(Fault::ControllerReset));
+    }
+
+    /// Machine position of the axis in steps of the board.
+    fn steps_of(&self, status: &Status) -> Option<i64> {
+        let mm = status.machine.as_ref()?.get(self.settings.index())?;
+        Some((mm * self.facts.steps_per_mm).round() as i64)
+    }
+
+    pub(super) fn on_status(&mut self, now: Nanos, status: &Status) {
+        self.heard = now;
+        let asked = self.asked.take();
+        if let Some(asked) = asked {
+            self.stats.push(now.since(asked));
+        }
+        self.state = status.state;
+        if self.halt.is_some() {
+            return;
+        }
+        let asked = asked.unwrap_or(now);
+        // A stop is done when nothing moves, and no jog is on its way that would.
+        let is_at_rest = !status.state.is_moving() && self.open.is_none();
+        let braking = self.motion.as_ref().map_or(Nanos::ZERO, |motion| {
+            Nanos((motion.wanted.speed.0 / motion.wanted.acceleration.0 * 1e9) as u64)
+        });
+        let is_jog = status.state == State::Jog;
+        // An axis that brakes slowly is braking still.
+        let is_slow = |at| is_jog && now.since(at) > STOP_MAX && now.since(at) < braking;
+        let (confirmed, waiting): (Vec<_>, Vec<_>) = std::mem::take(&mut self.stops)
+            .into_iter()
+            .partition(|(_, _, at)| *at <= asked && (is_at_rest || is_slow(*at)));
+        self.stops = waiting;
+        for (number, command, _) in confirmed {
+            self.acknowledge(now, number, command);
+        }
+        let Some(steps) = self.steps_of(status) else {
+            return self.lock_with(now, "it reports no machine position; set $10=1");
+        };
+        self.on_pins(now, status, steps);
+        match status.state {
+            State::Idle => self.on_idle(now, asked, steps),
+            State::Jog => self.on_jog(now, asked, steps),
+            State::Alarm if self.locked.is_some() => {}
+            State::Alarm => self.lock_with(
+                now,
+                "it is locked; look at the axis, then open the rig again",
+            ),
+            other => {
+                let why = format!(
+                    "it is in state {other:?}, which palpate never asks for; press reset and open the rig again"
+                );
+                self.lock_with(now, &why);
+            }
+        }
+    }
+
+    /// What the pins mean, and a stop at those at which Grbl does not stop.
+    fn on_pins(&mut self, now: Nanos, status: &Status, steps: i64) {
+        let is_known = self.track().at(now).status;
+        let pulses = self.pulses(steps);
+        let mut inputs = self.ends.inputs(&self.settings, status, is_known, pulses);
+        let going = self.motion.as_ref().filter(|it| it.cancelled.is_none());
+        let is_far = inputs.has(AxisStatus::FORWARD_LIMIT);
+        let is_closing = is_far && !is_known.has(AxisStatus::FORWARD_LIMIT);
+        match going.map(|motion| self.is_outwards(motion)) {
+            // Grbl ends the jogs that it has and begins the next (doc/markdown/jogging.md).
+            Some(_) if status.has_pin('H') => self.end(
+                now,
+                "the hold button of the board is pressed, so the axis is stopped",
+            ),
+            Some(true) if is_far => {
+                // Of one under way the samples tell it.
+                if let Some(number) = self.motion.as_mut().and_then(|motion| motion.owed.take()) {
+                    self.refuse(now, number, "the far limit switch is closed");
+                }
+                self.cancel(now);
+            }
+            // Whichever end it is.
+            Some(false) if is_closing => self.end(
+                now,
+                "a limit switch has closed on the way to home where none is expected, so the axis is stopped; look at it",
+            ),
+            _ => {}
+        }
+        if self.is_motor_on {
+            inputs = inputs | AxisStatus::MOTOR_ON;
+        }
+        self.track().inputs(now, inputs);
+    }
+
+    fn on_idle(&mut self, now: Nanos, asked: Nanos, steps: i64) {
+        let Some(motion) = &self.motion else {
+            if steps != self.steps {
+                let by = self.pulses(steps - self.steps);
+                self.steps = steps;
+                let here = self.pulses(steps);
+                self.track().rest(now, here);
+                self.fault(
+                    now,
+                    format!("the axis has moved by {by} pulses by itself; home it again"),
+                );
+            }
+            return;
+        };
+        if self.open.is_some() {
+            return;
+        }
+        match (motion.cancelled, motion.started) {
+            (Some(cancelled), _) if asked >= cancelled => {
+                self.urgent.push_back(vec![CYCLE_START]);
+                if motion.is_doubtful
+                    && let Some(motion) = &mut self.motion
+                {
+                    // A jog that was not read yet begins now; it is cancelled until a report after this shows rest.
+                    motion.is_doubtful = false;
+                    motion.cancelled = Some(now);
+                    return;
+                }
+            }
+            (None, Some(started)) if asked > started + Nanos::from_millis(20) => {
+                if !motion.is_all_sent() {
+                    self.fault(now, "the link is too slow to keep the axis moving, so it has stopped; lower the speed or mend the link");
+                } else if steps != motion.to {
+                    let (there, wanted) = (self.pulses(steps), self.pulses(motion.to));
+                    self.fault(now, format!("the axis ended at {there} where {wanted} was commanded, in its own pulses; home it again"));
+                }
+            }
+            _ => return,
+        }
+        self.steps = steps;
+        self.motion = None;
+        let here = self.pulses(steps);
+        self.track().rest(now, here);
+    }
+
+    fn on_jog(&mut self, now: Nanos, asked: Nanos, steps: i64) {
+        let Some(motion) = &self.motion else {
+            if self.open.is_none() {
+                self.cancel(now);
+            }
+            return;
+        };
+        if motion.cancelled.is_some() || motion.started.is_none() {
+            return;
+        }
+        // The report is of a time between its question and now.
+        let early = self.track().at(asked).pulses;
+        let late = self.track().at(now).pulses;
+        let here = self.pulses(steps) as f64;
+        // Start and segments are known to some hundredths of a second; a garbled target is further off.
+        let slack = (0.15 * motion.wanted.speed.0 + 0.1) / self.settings.mm_per_pulse;
+        if here < early.min(late) - slack || here > early.max(late) + slack {
+            self.fault(now, format!("the axis is at {here:.0} where {late:.0} was expected, in its own pulses, and is stopped; check the cable and home it"));
+            return self.cancel(now);
+        }
+        let sampled = asked + Nanos(self.facts.round_trip.0 / 2);
+        if let Some(ahead) = motion.ahead(sampled, steps, self.settings.mm_per_pulse) {
+            let step = self.settings.mm_per_pulse / motion.wanted.speed.0;
+            self.pace.told(asked, now, ahead.0, step);
+        }
+    }
+}

@@ -1,0 +1,363 @@
+//! The dialogue with a board that has been set up: ways cut into short jogs, status asked for now and then, stops
+//! before everything.
+//!
+//! A jog that Grbl has is done whether anybody is there or not. So it gets no more way than it needs to keep its speed:
+//! when the link dies, the axis comes to rest by itself. The newest jog in the planner ends at rest (gnea/grbl,
+//! planner.c), so what is sent ahead is the way of braking and a little more.
+
+mod answers;
+mod stopping;
+
+use super::motion::Motion;
+use super::pace::Pace;
+use super::pins::Ends;
+use super::protocol::{self, Incoming, Parser, QUERY, State};
+use super::settings::{Facts, GrblSettings};
+use super::times::{POLL, POLL_CLOSELY, REPORT_MAX, RESET_MAX, SILENCE_MAX};
+use crate::parts::Track;
+use crate::rig::RigEventBody;
+use crate::wire::{Answers, Dialogue, LinkStats};
+use palpate_model::Nanos;
+use palpate_model::rig::{Fault, MoveTo, RigCommand};
+use std::collections::VecDeque;
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+
+/// Slowest feed that Grbl makes: 1 mm/min (`MINIMUM_FEED_RATE`, config.h).
+const FEED_MIN: f64 = 1.0;
+/// Commands that wait; as many as may wait on the way here.
+const ORDERS_MAX: usize = 64;
+
+/// Why a motion is not begun.
+const OVERTAKEN: &str = "a stop came first, so it was not begun";
+
+/// What happens with an axis, shared with whoever needs its past.
+pub type SharedTrack = Arc<Mutex<Track>>;
+
+/// A reset whose welcome is to come.
+struct Halt {
+    /// The stops that it does.
+    owed: Vec<(u64, RigCommand)>,
+    begun: Nanos,
+    written: Nanos,
+}
+
+/// The dialogue.
+pub struct Session {
+    settings: GrblSettings,
+    facts: Facts,
+    track: SharedTrack,
+    parser: Parser,
+    /// The jog whose `ok` is to come.
+    open: Option<Nanos>,
+    urgent: VecDeque<Vec<u8>>,
+    orders: VecDeque<(u64, RigCommand)>,
+    answers: Answers,
+    motion: Option<Motion>,
+    pace: Pace,
+    ends: Ends,
+    /// Where it rests, in steps of the board.
+    steps: i64,
+    /// What the board's steps, in the direction of the rig, are more than the host's pulses.
+    zero: i64,
+    is_motor_on: bool,
+    asked: Option<Nanos>,
+    polled: Option<Nanos>,
+    heard: Nanos,
+    looked: Nanos,
+    /// Stops that a status after them will confirm.
+    stops: Vec<(u64, RigCommand, Nanos)>,
+    halt: Option<Halt>,
+    /// The newest state that is known.
+    state: State,
+    /// Why nothing but stops is done any more.
+    locked: Option<String>,
+    attended: Nanos,
+    events: VecDeque<(Nanos, RigEventBody)>,
+    stats: LinkStats,
+}
+
+impl Session {
+    /// With a board that was set up just now.
+    #[must_use]
+    pub fn new(
+        settings: GrblSettings,
+        facts: Facts,
+        track: SharedTrack,
+        stats: LinkStats,
+        now: Nanos,
+    ) -> Self {
+        Self {
+            steps: facts.steps,
+            settings,
+            facts,
+            track,
+            parser: Parser::default(),
+            open: None,
+            urgent: VecDeque::new(),
+            orders: VecDeque::new(),
+            answers: Answers::default(),
+            motion: None,
+            pace: Pace::default(),
+            ends: Ends::default(),
+            zero: 0,
+            is_motor_on: false,
+            asked: None,
+            polled: None,
+            heard: now,
+            looked: now,
+            stops: Vec::new(),
+            halt: None,
+            state: State::Idle,
+            locked: None,
+            attended: now,
+            events: VecDeque::new(),
+            stats,
+        }
+    }
+
+    fn track(&self) -> MutexGuard<'_, Track> {
+        self.track.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn report(&mut self, now: Nanos, body: RigEventBody) {
+        self.events.push_back((now, body));
+    }
+
+    fn fault(&mut self, now: Nanos, detail: impl Into<String>) {
+        let detail = detail.into();
+        self.report(now, RigEventBody::Fault(Fault::CommandRefused { detail }));
+    }
+
+    fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
+        self.answers.acknowledge(number, command);
+        self.tell_answers(now);
+    }
+
+    fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
+        self.answers.refuse(number, detail);
+        self.tell_answers(now);
+    }
+
+    fn tell_answers(&mut self, now: Nanos) {
+        while let Some(body) = self.answers.take() {
+            self.report(now, body);
+        }
+    }
+
+    /// Steps of the board in the direction of the rig.
+    fn pulses(&self, steps: i64) -> i64 {
+        self.settings.sign() * steps
+    }
+
+    fn begin(&mut self, now: Nanos, number: u64, command: RigCommand) {
+        match command {
+            RigCommand::EnableMotor => {
+                // With $1=255 the motor is always on; a lock would have been noticed.
+                self.is_motor_on = true;
+                self.acknowledge(now, number, command);
+            }
+            RigCommand::DefinePosition { pulses } => {
+                self.zero = self.pulses(self.steps) - pulses;
+                self.acknowledge(now, number, command);
+            }
+            RigCommand::MoveTo(wanted) => self.begin_move(now, number, wanted),
+            RigCommand::Oscillate(_) => self.refuse(
+                now,
+                number,
+                "Grbl makes no sines; choose a protocol of ramps",
+            ),
+            RigCommand::Stop | RigCommand::Halt => self.stop(now, command),
+        }
+    }
+
+    fn begin_move(&mut self, now: Nanos, number: u64, wanted: MoveTo) {
+        if !self.is_motor_on {
+            return self.refuse(now, number, "the motor is off; enable it first");
+        }
+        let settings = &self.settings;
+        let scale = 1.0 / (settings.mm_per_pulse * self.facts.steps_per_mm);
+        let feed = wanted.speed.0 * scale * 60.0;
+        if wanted.speed.0 > settings.speed_max.0 * (1.0 + 1e-9) || feed < FEED_MIN {
+            let (speed, most) = (wanted.speed, settings.speed_max);
+            let least = FEED_MIN / 60.0;
+            return self.refuse(
+                now,
+                number,
+                format!("a speed of {speed} is not between {least:.4} mm/s, the slowest of Grbl, and the {most} of the rig file"),
+            );
+        }
+        if (wanted.acceleration.0 / settings.acceleration.0 - 1.0).abs() > 1e-6 {
+            let (wanted, own) = (wanted.acceleration, settings.acceleration);
+            return self.refuse(
+                now,
+                number,
+                format!("an acceleration of {wanted} is not the {own} that the board is set to"),
+            );
+        }
+        let to = self.settings.sign() * (wanted.target_pulses + self.zero);
+        // Grbl reads eight digits of a number.
+        if (to as f64 / self.facts.steps_per_mm).abs() > 9_999.0 {
+            return self.refuse(now, number, "the target is more than ten metres away");
+        }
+        if to == self.steps {
+            // Grbl makes nothing of a way that is none; a sample shows it as a motion all the same.
+            let profile = Motion::profile(0.0, &wanted);
+            let here = self.pulses(self.steps) as f64;
+            self.track().moves(now, here, profile, 0.0);
+            self.track().rest(now, here as i64);
+            return self.acknowledge(now, number, RigCommand::MoveTo(wanted));
+        }
+        self.pace.begin();
+        let mm_per_pulse = self.settings.mm_per_pulse;
+        let motion = Motion::new(number, wanted, self.steps, to, feed, mm_per_pulse);
+        self.ends.leave(self.is_outwards(&motion));
+        self.motion = Some(motion);
+    }
+
+    /// Into the tissue.
+    fn is_outwards(&self, motion: &Motion) -> bool {
+        motion.side() * self.settings.sign() as f64 > 0.0
+    }
+
+    fn poll_every(&self, now: Nanos) -> Nanos {
+        let Some(motion) = &self.motion else {
+            return POLL;
+        };
+        let is_inwards = !self.is_outwards(motion);
+        let is_ending = motion.is_all_sent()
+            && motion
+                .started
+                .is_some_and(|started| now >= started + motion.duration());
+        if motion.cancelled.is_some() || is_inwards || is_ending {
+            POLL_CLOSELY
+        } else {
+            POLL
+        }
+    }
+
+    fn take_query(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        let is_free = self.asked.is_none_or(|asked| now.since(asked) > REPORT_MAX);
+        let is_due = self
+            .polled
+            .is_none_or(|at| now.since(at) >= self.poll_every(now));
+        if !is_free || !is_due {
+            return None;
+        }
+        self.asked = Some(now);
+        self.polled = Some(now);
+        Some(vec![QUERY])
+    }
+
+    /// The next jog of the motion under way, when its turn has come.
+    fn take_jog(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        if self.open.is_some() {
+            return None;
+        }
+        let axis = self.settings.axis;
+        let steps_per_mm = self.facts.steps_per_mm;
+        let motion = self
+            .motion
+            .as_mut()
+            .filter(|motion| motion.cancelled.is_none())?;
+        let end = motion.next_chunk(now, self.settings.mm_per_pulse)?;
+        let feed = motion.feed * self.pace.feed();
+        let line = protocol::jog(axis, end as f64 / steps_per_mm, feed);
+        self.open = Some(now);
+        Some(line.into_bytes())
+    }
+}
+
+impl Dialogue for Session {
+    fn attended(&mut self, at: Nanos) {
+        self.attended = at;
+    }
+
+    fn command(&mut self, now: Nanos, command: RigCommand) {
+        if command.is_stopping() {
+            return self.stop(now, command);
+        }
+        let number = self.answers.owe();
+        if let Some(why) = self.locked.clone() {
+            self.refuse(now, number, why);
+        } else if self.orders.len() >= ORDERS_MAX {
+            self.refuse(now, number, "too many commands at once");
+        } else {
+            self.orders.push_back((number, command));
+        }
+    }
+
+    fn overtaken(&mut self, now: Nanos, command: RigCommand) {
+        // The stop that comes next ends it, if it is a motion.
+        self.command(now, command);
+    }
+
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        for byte in bytes {
+            match self.parser.take(*byte) {
+                Some(Incoming::Ok) => self.on_ok(now),
+                Some(Incoming::Refused(refusal)) => self.on_refusal(now, &refusal),
+                Some(Incoming::Alarm(alarm)) => self.on_alarm(now, &alarm),
+                Some(Incoming::Hello(_)) => self.on_hello(now),
+                Some(Incoming::Status(status)) => self.on_status(now, &status),
+                // Settings and messages are in the log of raw bytes.
+                Some(Incoming::Setting(..) | Incoming::Message(_)) | None => {}
+                Some(Incoming::Other(_) | Incoming::Flood) => self.stats.resynchronised += 1,
+            }
+        }
+    }
+
+    fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>> {
+        self.watch(now);
+        if let Some(bytes) = self.urgent.pop_front() {
+            return Some(bytes);
+        }
+        if let Some(bytes) = self.take_query(now) {
+            return Some(bytes);
+        }
+        if self.motion.is_none()
+            && self.open.is_none()
+            && let Some((number, command)) = self.orders.pop_front()
+        {
+            self.begin(now, number, command);
+        }
+        self.take_jog(now)
+    }
+
+    fn next_at(&self, now: Nanos) -> Nanos {
+        // A millisecond is short against all that is waited for here.
+        now + Nanos::from_millis(1)
+    }
+
+    fn take_event(&mut self) -> Option<(Nanos, RigEventBody)> {
+        self.events.pop_front()
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        // A board that a limit switch has locked says nothing before it is reset, and nothing moves.
+        if let Some(halt) = &self.halt
+            && now.since(halt.begun) > RESET_MAX
+        {
+            let silence = RESET_MAX.0 as f64 * 1e-9;
+            return Some(format!(
+                "the board has not answered a reset for {silence} s; the axis comes to rest by itself, unless somebody else moves it: use the emergency stop"
+            ));
+        }
+        let is_unsure = self.locked.is_none() || self.state.is_moving();
+        let is_silent = now.since(self.heard) > SILENCE_MAX && is_unsure;
+        is_silent.then(|| {
+            let silence = SILENCE_MAX.0 as f64 * 1e-9;
+            format!("the board has said nothing for {silence} s; check cable and power. The axis comes to rest by itself")
+        })
+    }
+
+    fn stats(&self) -> LinkStats {
+        self.stats
+    }
+}
+
+impl Drop for Session {
+    /// However its thread ends, such as with a port that is gone: what the board was given ends in the track too.
+    fn drop(&mut self) {
+        self.leave(self.looked);
+    }
+}

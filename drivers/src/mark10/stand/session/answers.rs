@@ -1,0 +1,103 @@
+//! What an answer means: it belongs to the one question that is open.
+
+use super::{Asked, GARBLED_MAX, Motion, QUIET, QUIET_LOST, StandSession};
+use crate::mark10::stand::protocol::{Status, number};
+use crate::text::Taken;
+use palpate_model::Nanos;
+
+impl StandSession {
+    fn answered(&mut self, now: Nanos) {
+        if let Some((_, sent)) = self.asked.take() {
+            self.stats.push(now.since(sent));
+        }
+        self.lost = 0;
+        if !self.stop_due {
+            for command in std::mem::take(&mut self.unconfirmed) {
+                self.acknowledge(now, command);
+            }
+        }
+    }
+
+    fn on_line(&mut self, now: Nanos, line: &str) {
+        let Some((asked, sent)) = self.asked else {
+            return;
+        };
+        match asked {
+            Asked::Sample => {
+                if let Some((force, travel)) = self.pair.take(line) {
+                    self.answered(now);
+                    // It was taken somewhere between question and answer.
+                    let at = Nanos(sent.0 + now.since(sent).0 / 2);
+                    self.on_sample(now, at, force, travel);
+                }
+            }
+            Asked::Status => {
+                if let Some(status) = Status::parse(line) {
+                    self.answered(now);
+                    self.status = Some(status);
+                }
+            }
+            Asked::Speed(tenths) => {
+                if let Some(found) = number(line) {
+                    self.answered(now);
+                    self.check(now, (found * 10.0).round() as i64 == tenths, line, "speed");
+                }
+            }
+            Asked::Limit(hundredths) => {
+                if let Some(found) = number(line) {
+                    self.answered(now);
+                    let is_right = (found * 100.0).round() as i64 == hundredths;
+                    self.check(now, is_right, line, "travel limit");
+                }
+            }
+        }
+    }
+
+    /// What was set and read back while a move is set up.
+    fn check(&mut self, now: Nanos, is_right: bool, line: &str, what: &str) {
+        if !is_right && let Motion::Setting(..) = self.motion {
+            self.motion = Motion::Rest;
+            let line = line.trim();
+            self.refuse(
+                now,
+                format!("the stand reads back {line} for its {what}; check its range and that PC control is on"),
+            );
+        }
+    }
+
+    /// The answer did not come, or came and made no sense.
+    pub(super) fn lose_answer(&mut self, now: Nanos, quiet: Nanos) {
+        self.asked = None;
+        self.lost += if quiet == QUIET_LOST { 2 } else { 1 };
+        self.stats.resynchronised += 1;
+        self.lines.clear();
+        self.quiet_until = Some(now + quiet);
+        self.quiet = quiet;
+        if let Motion::Setting(..) = self.motion {
+            self.motion = Motion::Rest;
+            self.refuse(
+                now,
+                "its answer was lost or garbled, so it was not begun; check the cable",
+            );
+        }
+        // It stops at its limit by itself; no reason to wait for that.
+        self.stop_due |= self.is_going() && self.lost >= GARBLED_MAX;
+    }
+
+    pub(super) fn on_taken(&mut self, now: Nanos, taken: Taken) {
+        if self.asked.is_none() {
+            return;
+        }
+        self.lines_since += 1;
+        if let Taken::Line(line) = taken {
+            self.on_line(now, &line);
+        }
+        let lines = match self.asked {
+            Some((Asked::Sample, _)) => 2,
+            _ => 1,
+        };
+        if self.asked.is_some() && self.lines_since >= lines {
+            self.lose_answer(now, QUIET);
+        }
+    }
+}

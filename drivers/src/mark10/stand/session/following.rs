@@ -1,0 +1,216 @@
+//! From the stand's travel and force to a sample: where the axis is told to be, and whether it moves.
+
+use super::{Going, Motion, STILL, STILL_PULSES, StandSession, TICK, pulses_of};
+use crate::mark10::stand::protocol::{Crosshead, Force};
+use crate::mark10::stand::{LAG, MM_PER_PULSE, REST_TOLERANCE_MM, SPEED_TOLERANCE};
+use crate::rig::RigEventBody;
+use palpate_model::Nanos;
+use palpate_model::rig::command::position_from_pulses;
+use palpate_model::rig::{Age, AxisStatus, Fault, MoveTo, Profile, Reading};
+use palpate_model::units::{Seconds, Volts};
+
+impl StandSession {
+    pub(super) fn on_sample(&mut self, now: Nanos, at: Nanos, force: Force, travel: i64) {
+        if travel != self.travel {
+            self.travel_changed = now;
+        }
+        self.travel = travel;
+        let counts = match force {
+            Force::Reading(reading)
+                if reading.unit == self.scale.unit
+                    && reading.number.decimals == self.scale.decimals =>
+            {
+                reading.number.digits
+            }
+            Force::Overload if self.counts < 0 => -self.scale.counts_max,
+            Force::Overload => self.scale.counts_max,
+            // Another unit or another resolution: somebody has pressed a key of the gauge.
+            Force::Reading(_) => {
+                let tick = self.tick.unwrap_or(0);
+                return self.report(now, RigEventBody::Fault(Fault::SignalInvalid { tick }));
+            }
+        };
+        self.counts = counts;
+        self.look_for_overload(now);
+        let tick = at.since(self.opened).0 / TICK.0;
+        if self.tick.is_some_and(|before| tick <= before) {
+            return;
+        }
+        self.tick = Some(tick);
+        let (pulses, moving) = self.follow(now, tick);
+        let mut status = AxisStatus::MOTOR_ON | moving;
+        if self.settings.pulses(travel) <= 0 {
+            status = status | AxisStatus::HOME;
+        }
+        let (upper, lower) = self.status.map_or((false, false), |status| {
+            (status.is_at_upper, status.is_at_lower)
+        });
+        let (forward, reverse) = if self.settings.is_upwards {
+            (upper, lower)
+        } else {
+            (lower, upper)
+        };
+        if forward {
+            status = status | AxisStatus::FORWARD_LIMIT;
+        }
+        if reverse {
+            status = status | AxisStatus::REVERSE_LIMIT;
+        }
+        let reading = Reading {
+            tick,
+            counts: Some(counts),
+            volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
+            pulses,
+            status,
+            age: Some(Age {
+                by: now.since(at),
+                within: now.since(at),
+            }),
+        };
+        self.uncertainty = now.since(at) + Nanos(TICK.0 / 2);
+        self.report(now, RigEventBody::Reading(reading));
+    }
+
+    /// A reading at the end of the range stands for all that is beyond it, and no limit of force may see it.
+    fn look_for_overload(&mut self, now: Nanos) {
+        let is_beyond = self.counts.saturating_abs() >= self.scale.counts_max;
+        if is_beyond && !std::mem::replace(&mut self.is_beyond, is_beyond) {
+            self.stop_due |= self.is_going();
+            self.refuse(
+                now,
+                "the force is beyond the gauge's range; take the load off before it is damaged",
+            );
+        }
+        self.is_beyond = is_beyond;
+    }
+
+    /// Where the axis is told to be at a sample, and whether it moves.
+    fn follow(&mut self, now: Nanos, tick: u64) -> (i64, AxisStatus) {
+        let none = AxisStatus(0);
+        let true_pulses = self.told(self.travel);
+        match self.motion.clone() {
+            Motion::Rest | Motion::Setting(..) => (self.at_rest(true_pulses), none),
+            Motion::LetGo(going, since) => {
+                // A move that a stop has ended at once is told too, or nobody would know that it is over.
+                let is_over = going.target == going.from || self.stopped_at.is_some();
+                if !is_over && self.travel == going.from && !self.has_status_moved() {
+                    if now.since(since) > self.still(going.command) {
+                        self.motion = Motion::Rest;
+                        self.stop_due = true;
+                        self.refuse(
+                            now,
+                            "the crosshead has not begun to move; check PC control, its emergency stop and its limit switches",
+                        );
+                    }
+                    return (self.at_rest(true_pulses), none);
+                }
+                let command = going.command;
+                let from = self.at_rest(self.told(going.from));
+                let course = Profile::to_rest(
+                    position_from_pulses(from, MM_PER_PULSE),
+                    position_from_pulses(command.target_pulses, MM_PER_PULSE),
+                    command.speed,
+                    command.acceleration,
+                );
+                self.rests_at = None;
+                // A state that was told before it began is old.
+                self.status = None;
+                let stopped_tick = self.stopped_at.map(|_| tick);
+                self.motion = Motion::Moving {
+                    going,
+                    course: stopped_tick.map_or(course, |_| course.stopped_at(Seconds(0.0))),
+                    start_tick: tick,
+                    stopped_tick,
+                };
+                let stopping = stopped_tick.map_or(none, |_| AxisStatus::STOPPING);
+                (from, AxisStatus::MOVING | stopping)
+            }
+            Motion::Moving {
+                going,
+                course,
+                start_tick,
+                stopped_tick,
+            } => self.follow_course(now, tick, going, course, (start_tick, stopped_tick)),
+        }
+    }
+
+    fn follow_course(
+        &mut self,
+        now: Nanos,
+        tick: u64,
+        going: Going,
+        course: Profile,
+        (start_tick, stopped_tick): (u64, Option<u64>),
+    ) -> (i64, AxisStatus) {
+        let true_pulses = self.told(self.travel);
+        let secs = |from: u64| Seconds((tick - from) as f64 * TICK.0 as f64 * 1e-9);
+        let is_off = |pulses: i64, tolerance_mm: f64| {
+            (true_pulses - pulses).abs() as f64 * MM_PER_PULSE > tolerance_mm
+        };
+        let is_still = self.is_still(now, going.command);
+        let target = going.command.target_pulses;
+        if stopped_tick.is_none() {
+            let since = secs(start_tick);
+            let is_over = since.0 >= course.duration().0;
+            let is_there = !is_off(target, REST_TOLERANCE_MM);
+            if is_still && is_over && is_there {
+                self.motion = Motion::Rest;
+                self.rests_at = Some(target);
+                return (target, AxisStatus(0));
+            }
+            let is_cut_short = self.stopped_at.is_some() || is_still && !is_there;
+            if !is_cut_short {
+                let here = pulses_of(course.position(since));
+                let way = (here - self.told(going.from)).abs() as f64 * MM_PER_PULSE;
+                let tolerance =
+                    REST_TOLERANCE_MM + going.command.speed.0 * LAG.0 + SPEED_TOLERANCE * way;
+                // The truth, where it is not the course: who checks the path sees it.
+                let told = if is_off(here, tolerance) {
+                    true_pulses
+                } else {
+                    here
+                };
+                return (told, AxisStatus::MOVING);
+            }
+            let course = course.stopped_at(since);
+            let here = pulses_of(course.position(Seconds(0.0)));
+            self.motion = Motion::Moving {
+                going,
+                course,
+                start_tick,
+                stopped_tick: Some(tick),
+            };
+            return (here, AxisStatus::MOVING | AxisStatus::STOPPING);
+        }
+        if is_still {
+            self.motion = Motion::Rest;
+            self.rests_at = None;
+            return (true_pulses, AxisStatus(0));
+        }
+        let here = pulses_of(course.position(secs(stopped_tick.unwrap_or(tick))));
+        (here, AxisStatus::MOVING | AxisStatus::STOPPING)
+    }
+
+    /// Where it was commanded to be as long as it is about there, else where it is.
+    fn at_rest(&self, true_pulses: i64) -> i64 {
+        let near =
+            |told: &i64| (told - true_pulses).abs() as f64 * MM_PER_PULSE <= REST_TOLERANCE_MM;
+        self.rests_at.filter(near).unwrap_or(true_pulses)
+    }
+
+    pub(super) fn has_status_moved(&self) -> bool {
+        self.status
+            .is_some_and(|status| status.crosshead != Crosshead::Stopped)
+    }
+
+    /// Longest time without a new travel of a crosshead that moves.
+    fn still(&self, command: MoveTo) -> Nanos {
+        let pulses = STILL_PULSES * MM_PER_PULSE / command.speed.0.max(1e-6);
+        Nanos(STILL.0 + (pulses * 1e9) as u64)
+    }
+
+    fn is_still(&self, now: Nanos, command: MoveTo) -> bool {
+        let is_old = now.since(self.travel_changed) > self.still(command);
+        is_old || self.pace.has_status && self.status.is_some() && !self.has_status_moved()
+    }
+}
