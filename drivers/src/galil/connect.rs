@@ -117,7 +117,7 @@ pub fn connect(
         plan,
         has_watchdog,
         worst_case_mm,
-        raw: console.raw,
+        raw: console.link.raw,
     })
 }
 

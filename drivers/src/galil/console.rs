@@ -2,50 +2,37 @@
 
 use super::model::GalilOpenError;
 use super::protocol::{Incoming, Parser, Reply, error_of};
-use crate::wire::{HostClock, Link};
+use crate::wire::{HostClock, Link, TappedLink};
 use palpate_model::Nanos;
-use palpate_model::rig::RawBytes;
 use std::io;
 use std::sync::Arc;
-use std::time::Duration;
 
 /// An answer takes longer only after a download.
 pub const ANSWER_MAX: Nanos = Nanos::from_millis(1_000);
-/// Longest single wait for bytes.
-const READ_MAX: Duration = Duration::from_millis(5);
-
 /// A link to a controller with nothing else going on.
 pub struct Console<'a> {
-    link: &'a mut dyn Link,
-    clock: &'a HostClock,
+    /// The link and what was exchanged over it.
+    pub link: TappedLink<'a>,
     parser: Parser,
-    device: Arc<str>,
-    /// What was exchanged so far.
-    pub raw: Vec<RawBytes>,
 }
 
 impl<'a> Console<'a> {
     /// On a link.
     pub fn new(link: &'a mut dyn Link, clock: &'a HostClock, device: &Arc<str>) -> Self {
         Self {
-            link,
-            clock,
+            link: TappedLink::new(link, clock, device),
             parser: Parser::default(),
-            device: Arc::clone(device),
-            raw: Vec::new(),
         }
     }
 
     /// The host's clock.
     pub fn now(&self) -> Nanos {
-        (self.clock)()
+        self.link.now()
     }
 
     /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), GalilOpenError> {
-        self.link.write(text.as_bytes()).map_err(lost)?;
-        self.tap(true, text.as_bytes());
-        Ok(())
+        self.link.write(text.as_bytes()).map_err(lost)
     }
 
     /// Throws away what comes until nothing has come for `quiet`; tells how many prompts were in it. A device that never
@@ -139,22 +126,7 @@ impl<'a> Console<'a> {
     }
 
     fn read(&mut self) -> Result<Vec<u8>, GalilOpenError> {
-        let mut buffer = [0_u8; 1024];
-        let count = self.link.read(&mut buffer, READ_MAX).map_err(lost)?;
-        let bytes = buffer[..count].to_vec();
-        self.tap(false, &bytes);
-        Ok(bytes)
-    }
-
-    fn tap(&mut self, is_sent: bool, bytes: &[u8]) {
-        if !bytes.is_empty() {
-            self.raw.push(RawBytes {
-                at: self.now(),
-                device: Arc::clone(&self.device),
-                is_sent,
-                bytes: bytes.to_vec(),
-            });
-        }
+        self.link.read().map_err(lost)
     }
 }
 

@@ -5,7 +5,9 @@
 
 mod axis;
 mod connect;
+mod console;
 mod error;
+mod fitness;
 mod motion;
 mod pace;
 mod pins;
@@ -15,8 +17,9 @@ mod settings;
 mod times;
 
 pub use axis::open;
-pub use connect::{Connected, GrblOpenError, MM_PER_STEP_MIN, connect};
-pub use error::{Alarm, Refusal};
+pub use connect::{Connected, connect};
+pub use error::{Alarm, GrblOpenError, Refusal};
+pub use fitness::MM_PER_STEP_MIN;
 pub use motion::worst_case_mm;
 pub use session::{Session, SharedTrack};
 pub use settings::{Facts, GrblSettings, HomeSwitch};

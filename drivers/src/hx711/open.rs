@@ -65,7 +65,7 @@ pub fn open(
     Ok(OpenedCell {
         description,
         dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
-        raw: console.raw,
+        raw: console.link.raw,
         farewell: Vec::new(),
     })
 }

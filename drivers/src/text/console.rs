@@ -2,31 +2,24 @@
 
 use super::error::DeviceError;
 use super::lines::{Lines, Taken};
-use crate::wire::{HostClock, Link};
+use crate::wire::{HostClock, Link, TappedLink};
 use palpate_model::Nanos;
-use palpate_model::rig::RawBytes;
 use std::collections::VecDeque;
 use std::sync::Arc;
-use std::time::Duration;
 
-/// Longest single wait for bytes.
-const READ_MAX: Duration = Duration::from_millis(5);
 /// So much of what came is kept to tell who it is that answers.
 const HEARD_MAX: usize = 512;
 
 /// A link to a device that speaks in lines, with nothing else going on.
 pub struct TextConsole<'a> {
-    link: &'a mut dyn Link,
-    clock: &'a HostClock,
-    name: Arc<str>,
+    /// The link and what was exchanged over it.
+    pub link: TappedLink<'a>,
     /// What it is called in errors.
     device: &'static str,
     lines: Lines,
     ready: VecDeque<(Nanos, String)>,
     /// The newest bytes that came.
     pub heard: Vec<u8>,
-    /// What was exchanged so far.
-    pub raw: Vec<RawBytes>,
 }
 
 impl<'a> TextConsole<'a> {
@@ -38,30 +31,25 @@ impl<'a> TextConsole<'a> {
         device: &'static str,
     ) -> Self {
         Self {
-            link,
-            clock,
-            name: Arc::clone(name),
+            link: TappedLink::new(link, clock, name),
             device,
             lines: Lines::default(),
             ready: VecDeque::new(),
             heard: Vec::new(),
-            raw: Vec::new(),
         }
     }
 
     /// The host's clock.
     #[must_use]
     pub fn now(&self) -> Nanos {
-        (self.clock)()
+        self.link.now()
     }
 
     /// Writes bytes as they are.
     pub fn write(&mut self, text: &str) -> Result<(), DeviceError> {
         self.link
             .write(text.as_bytes())
-            .map_err(|err| DeviceError::lost(self.device, &err))?;
-        self.tap(true, text.as_bytes());
-        Ok(())
+            .map_err(|err| DeviceError::lost(self.device, &err))
     }
 
     /// The next whole line with its arrival; `None` when none comes within a time. Garbled ones are passed over.
@@ -106,32 +94,19 @@ impl<'a> TextConsole<'a> {
     }
 
     fn read(&mut self) -> Result<usize, DeviceError> {
-        let mut buffer = [0_u8; 1024];
-        let count = self
+        let bytes = self
             .link
-            .read(&mut buffer, READ_MAX)
+            .read()
             .map_err(|err| DeviceError::lost(self.device, &err))?;
         let at = self.now();
-        self.tap(false, &buffer[..count]);
-        self.heard.extend_from_slice(&buffer[..count]);
+        self.heard.extend_from_slice(&bytes);
         self.heard
             .drain(..self.heard.len().saturating_sub(HEARD_MAX));
-        for byte in &buffer[..count] {
+        for byte in &bytes {
             if let Some(Taken::Line(line)) = self.lines.take(*byte) {
                 self.ready.push_back((at, line));
             }
         }
-        Ok(count)
-    }
-
-    fn tap(&mut self, is_sent: bool, bytes: &[u8]) {
-        if !bytes.is_empty() {
-            self.raw.push(RawBytes {
-                at: self.now(),
-                device: Arc::clone(&self.name),
-                is_sent,
-                bytes: bytes.to_vec(),
-            });
-        }
+        Ok(bytes.len())
     }
 }

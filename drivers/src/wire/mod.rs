@@ -10,6 +10,7 @@ mod line;
 mod link;
 mod memory;
 mod place;
+mod tapped;
 
 pub use answers::Answers;
 pub use caller_time::CallerTime;
@@ -18,6 +19,7 @@ pub use line::{Line, LineSettings};
 pub use link::{Link, SerialLink, TcpLink};
 pub use memory::{MemoryLink, pair};
 pub use place::{Place, WireError};
+pub use tapped::TappedLink;
 
 use palpate_model::Nanos;
 use std::sync::Arc;

@@ -60,7 +60,7 @@ pub fn open(
     Ok(OpenedCell {
         description,
         dialogue: Box::new(GaugeDialogue::new(scale, rate, console.now())),
-        raw: console.raw,
+        raw: console.link.raw,
         farewell: FAREWELL.to_vec(),
     })
 }

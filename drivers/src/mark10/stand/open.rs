@@ -79,7 +79,7 @@ pub fn connect(
         scale,
         pace,
         stats,
-        raw: console.raw,
+        raw: console.link.raw,
     })
 }
 
