@@ -51,7 +51,7 @@ const SLIDE: [(u16, f64); 6] = [
 ];
 
 /// All settings.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct Eeprom {
     values: BTreeMap<u16, f64>,
     /// The text of `$I=`.

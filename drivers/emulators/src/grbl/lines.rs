@@ -2,6 +2,7 @@
 
 use super::gcode::{self, Flow, Motion, Parsed};
 use super::homing::Homing;
+use super::words;
 use super::{FEED_MIN, Grbl, LINE_MAX, State};
 use palpate_model::Nanos;
 
@@ -313,7 +314,7 @@ impl Grbl {
             return Ok(());
         }
         let line = command.strip_prefix('N');
-        let (key, rest) = gcode::number(line.unwrap_or(command)).ok_or(2)?;
+        let (key, rest) = words::number(line.unwrap_or(command)).ok_or(2)?;
         let value = rest.strip_prefix('=').ok_or(3)?;
         if line.is_some() {
             if self.state != State::Idle {
@@ -327,7 +328,7 @@ impl Grbl {
             value.clone_into(place);
             return Ok(());
         }
-        let (value, rest) = gcode::number(value).ok_or(2)?;
+        let (value, rest) = words::number(value).ok_or(2)?;
         if !rest.is_empty() || key > 255.0 {
             return Err(3);
         }

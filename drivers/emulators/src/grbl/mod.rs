@@ -8,8 +8,12 @@ mod eeprom;
 mod gcode;
 mod homing;
 mod lines;
+mod meaning;
 mod planner;
+mod real_time;
 mod report;
+mod start;
+mod words;
 
 pub use eeprom::Eeprom;
 
@@ -73,8 +77,9 @@ impl Default for GrblSettings {
 }
 
 /// Machine state (doc/markdown/interface.md).
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 enum State {
+    #[default]
     Idle,
     Run,
     Jog,
@@ -88,7 +93,7 @@ enum State {
 }
 
 /// The board.
-#[derive(Clone, Debug)]
+#[derive(Clone, Debug, Default)]
 pub struct Grbl {
     settings: GrblSettings,
     eeprom: Eeprom,
@@ -143,115 +148,12 @@ impl Grbl {
     pub fn new(settings: GrblSettings) -> Self {
         let mut grbl = Self {
             eeprom: settings.eeprom.clone(),
-            state: State::Idle,
-            is_waiting_for_reset: false,
-            is_cancelling: false,
-            is_line_owed: false,
-            busy_until: Nanos::ZERO,
-            is_resetting: false,
-            boots_at: None,
             is_first_start: settings.is_unused,
-            now: Nanos::ZERO,
-            rx: VecDeque::new(),
-            line: Vec::new(),
-            is_comment: None,
-            is_overlong: false,
-            waiting: None,
-            tx: Vec::new(),
-            planner: Planner::default(),
-            modes: Modes::default(),
-            offsets: Offsets::default(),
-            probed: ([0.0; AXES], false),
-            is_probing: false,
-            is_probe_away: false,
-            homing: None,
-            steps: [0; AXES],
-            shift: 0.0,
-            speed: 0.0,
-            switches: Switches::default(),
-            was_limit: false,
-            is_asked: false,
-            overrides: [100; 3],
-            reports: report::Counters::default(),
-            is_wrong: false,
-            credit: 0.0,
-            is_suspended: false,
-            is_hold_pressed: false,
             settings,
+            ..Self::default()
         };
         grbl.power_up();
         grbl
-    }
-
-    /// Its supply has come, or the converter has reset it: the position is forgotten (main.c).
-    fn power_up(&mut self) {
-        self.steps = [0; AXES];
-        self.state = if self.eeprom.flag(22) {
-            State::Alarm
-        } else {
-            State::Idle
-        };
-        self.say_hello();
-    }
-
-    /// What follows every reset: the position stays, lines and blocks go.
-    fn say_hello(&mut self) {
-        self.is_resetting = false;
-        self.busy_until = self.now;
-        self.rx.clear();
-        self.line.clear();
-        (self.is_comment, self.is_overlong) = (None, false);
-        self.waiting = None;
-        self.modes = Modes::default();
-        self.offsets.shift = [0.0; AXES];
-        self.offsets.tool = 0.0;
-        self.probed = ([0.0; AXES], false);
-        self.homing = None;
-        self.is_probing = false;
-        self.is_cancelling = false;
-        self.is_waiting_for_reset = false;
-        self.is_asked = false;
-        self.speed = 0.0;
-        self.reports = report::Counters::default();
-        self.overrides = [100; 3];
-        self.planner.clear(self.machine());
-        let mut is_first = false;
-        if std::mem::take(&mut self.is_first_start) {
-            // Observed with 1.1h on an emulated ATmega328P: unused memory is reported, then listed.
-            self.say("error:7\r\n");
-            let listing = self.eeprom.listing();
-            self.say(&listing);
-            is_first = true;
-        }
-        let hello = if self.is_wrong {
-            "\r\nGrbl 0.9j ['$' for help]\r\n"
-        } else {
-            "\r\nGrbl 1.1h ['$' for help]\r\n"
-        };
-        self.say(hello);
-        if self.eeprom.flag(21) && self.is_limit() {
-            self.say("[MSG:Check Limits]\r\n");
-            self.state = State::Alarm;
-        }
-        self.was_limit = self.is_limit();
-        if matches!(self.state, State::Alarm | State::Sleep) {
-            self.say("[MSG:'$H'|'$X' to unlock]\r\n");
-            self.state = State::Alarm;
-        } else {
-            self.state = State::Idle;
-            if is_first {
-                self.say(">:error:7\r\n>:error:7\r\n");
-            }
-            for line in self.eeprom.startup.clone() {
-                if !line.is_empty() {
-                    let said = match self.execute(&line) {
-                        Ok(_) => "ok".to_owned(),
-                        Err(code) => format!("error:{code}"),
-                    };
-                    self.say(&format!(">{line}:{said}\r\n"));
-                }
-            }
-        }
     }
 
     fn say(&mut self, text: &str) {
@@ -308,119 +210,6 @@ impl Grbl {
 
     fn has_line_under_way(&self) -> bool {
         self.waiting.is_some() || self.homing.is_some() || self.is_probing
-    }
-
-    /// An alarm, after which the axis stands still at once.
-    fn alarm(&mut self, code: u8, is_critical: bool) {
-        self.say(&format!("ALARM:{code}\r\n"));
-        self.busy_until = self.now + ALARM_PAUSE;
-        self.is_line_owed |= is_critical && self.has_line_under_way();
-        self.planner.clear(self.machine());
-        self.waiting = None;
-        self.homing = None;
-        self.is_probing = false;
-        self.is_cancelling = false;
-        self.speed = 0.0;
-        self.state = State::Alarm;
-        if is_critical {
-            self.say("[MSG:Reset to continue]\r\n");
-            self.is_waiting_for_reset = true;
-        }
-    }
-
-    /// Ctrl-X (motion_control.c, `mc_reset`).
-    fn reset(&mut self) {
-        // A line that is being done ends with its `ok` all the same (protocol.c, `protocol_main_loop`).
-        self.is_line_owed |= self.has_line_under_way();
-        if self.homing.is_some() {
-            self.alarm(6, false);
-        } else if self.is_moving() {
-            self.alarm(3, false);
-        }
-        self.is_resetting = true;
-        self.is_suspended = false;
-        self.finish_reset();
-    }
-
-    /// The welcome, once what came before it was told.
-    fn finish_reset(&mut self) {
-        if self.is_resetting && self.now >= self.busy_until {
-            if std::mem::take(&mut self.is_line_owed) {
-                self.say("ok\r\n");
-            }
-            self.say_hello();
-        }
-    }
-
-    /// A byte that is never queued; `false` for all others.
-    fn real_time(&mut self, byte: u8) -> bool {
-        match byte {
-            // It is known already.
-            0x18 if self.is_resetting => {}
-            b'?' => self.is_asked = self.homing.is_none() && !self.is_waiting_for_reset,
-            0x18 => self.reset(),
-            _ if self.is_waiting_for_reset => return matches!(byte, b'!' | b'~' | 0x80..),
-            0x85 if self.state == State::Jog => {
-                self.is_cancelling = true;
-                self.planner.hold();
-            }
-            // A hold of a jog is its end (doc/markdown/jogging.md).
-            b'!' if self.state == State::Jog => {
-                self.is_cancelling = true;
-                self.planner.hold();
-            }
-            b'!' if self.state == State::Run || self.state == State::Idle => {
-                self.state = State::Hold;
-                self.planner.hold();
-            }
-            0x84 if matches!(
-                self.state,
-                State::Run | State::Idle | State::Hold | State::Jog
-            ) =>
-            {
-                self.say("[MSG:Check Door]\r\n");
-                self.is_cancelling = self.state == State::Jog;
-                self.state = State::Door;
-                self.planner.hold();
-            }
-            b'~' if matches!(self.state, State::Hold | State::Door) && self.planner.is_idle() => {
-                self.planner.resume();
-                self.state = State::Idle;
-                self.start();
-            }
-            b'~' if self.state == State::Idle => self.is_suspended = false,
-            0x90..=0x9d => self.override_by(byte),
-            0xa0 if matches!(self.state, State::Idle | State::Run | State::Hold) => {
-                self.modes.has_coolant = !self.modes.has_coolant;
-                self.reports.tell_overrides();
-            }
-            b'!' | b'~' | 0x80.. => {}
-            _ => return false,
-        }
-        true
-    }
-
-    /// Feed, rapids, spindle (doc/markdown/commands.md, overrides); told, and nothing more.
-    fn override_by(&mut self, byte: u8) {
-        let [feed, rapid, spindle] = &mut self.overrides;
-        let (value, what) = match byte {
-            0x90..=0x94 => (feed, byte - 0x90),
-            0x99.. => (spindle, byte - 0x99),
-            0x95..=0x97 => {
-                *rapid = [100, 50, 25][usize::from(byte - 0x95)];
-                return self.reports.tell_overrides();
-            }
-            _ => return,
-        };
-        let changed = match what {
-            0 => 100,
-            1 => *value + 10,
-            2 => value.saturating_sub(10),
-            3 => *value + 1,
-            _ => value.saturating_sub(1),
-        };
-        *value = changed.clamp(10, 200);
-        self.reports.tell_overrides();
     }
 
     fn tell_status(&mut self) {
