@@ -1,8 +1,15 @@
 //! A load cell on a wire of its own: what every such device gives, whatever it speaks.
 
+use crate::text::{Lines, Taken};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
 use palpate_model::units::Volts;
+use std::collections::VecDeque;
+
+/// Values that may wait to be taken: a minute at 80 a second, 15 s at the fastest rate of a gauge.
+const SAMPLES_MAX: usize = 4_800;
+/// Troubles that may wait to be told.
+const TROUBLES_MAX: usize = 16;
 
 /// One value of a load cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,9 +46,6 @@ pub trait CellDialogue: Send {
     /// Bytes have arrived.
     fn received(&mut self, now: Nanos, bytes: &[u8]);
 
-    /// The next bytes to be written, if any.
-    fn take_line(&mut self, now: Nanos) -> Option<Vec<u8>>;
-
     /// The oldest value not taken yet.
     fn take_sample(&mut self) -> Option<CellSample>;
 
@@ -54,4 +58,92 @@ pub trait CellDialogue: Send {
 
     /// Why the device counts as gone, if it does.
     fn is_dead(&self, now: Nanos) -> Option<String>;
+}
+
+/// What the lines of a load cell mean.
+pub trait CellProtocol: Send {
+    /// A whole line. `false` where it means nothing, so that it counts as garbled.
+    fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool;
+
+    /// Why the device counts as gone, if it does; `newest` is when its newest value came.
+    fn is_dead(&self, now: Nanos, newest: Nanos) -> Option<String>;
+}
+
+/// What a load cell has told and nobody has taken.
+pub struct CellReports {
+    samples: VecDeque<CellSample>,
+    troubles: VecDeque<String>,
+    newest: Nanos,
+}
+
+impl CellReports {
+    /// One more value. Where there is no room left the oldest goes.
+    pub fn sample(&mut self, sample: CellSample) {
+        self.newest = sample.at;
+        if self.samples.len() >= SAMPLES_MAX {
+            self.samples.pop_front();
+        }
+        self.samples.push_back(sample);
+    }
+
+    /// Something that the operator has to hear.
+    pub fn trouble(&mut self, words: &str) {
+        if self.troubles.len() < TROUBLES_MAX {
+            self.troubles.push_back(words.to_owned());
+        }
+    }
+}
+
+/// A load cell that sends lines by itself.
+pub struct LineCell<P> {
+    protocol: P,
+    lines: Lines,
+    reports: CellReports,
+    garbled: u64,
+}
+
+impl<P: CellProtocol> LineCell<P> {
+    /// Goes on with a cell from `now`.
+    #[must_use]
+    pub fn on(protocol: P, now: Nanos) -> Self {
+        Self {
+            protocol,
+            lines: Lines::default(),
+            reports: CellReports {
+                samples: VecDeque::new(),
+                troubles: VecDeque::new(),
+                newest: now,
+            },
+            garbled: 0,
+        }
+    }
+}
+
+impl<P: CellProtocol> CellDialogue for LineCell<P> {
+    fn received(&mut self, now: Nanos, bytes: &[u8]) {
+        for byte in bytes {
+            let is_garbled = match self.lines.take(*byte) {
+                None => false,
+                Some(Taken::Garbled) => true,
+                Some(Taken::Line(line)) => !self.protocol.take(now, &line, &mut self.reports),
+            };
+            self.garbled += u64::from(is_garbled);
+        }
+    }
+
+    fn take_sample(&mut self) -> Option<CellSample> {
+        self.reports.samples.pop_front()
+    }
+
+    fn take_trouble(&mut self) -> Option<String> {
+        self.reports.troubles.pop_front()
+    }
+
+    fn garbled(&self) -> u64 {
+        self.garbled
+    }
+
+    fn is_dead(&self, now: Nanos) -> Option<String> {
+        self.protocol.is_dead(now, self.reports.newest)
+    }
 }

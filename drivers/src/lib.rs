@@ -5,6 +5,7 @@
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
 //! no hardware. [`doubles`] is for tests only.
 
+mod board_clock;
 pub mod cell;
 pub mod detect;
 pub mod device;

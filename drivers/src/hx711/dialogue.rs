@@ -1,46 +1,25 @@
 //! An HX711 board in progress: it sends by itself, nothing is asked.
 
 use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
-use crate::cell::{CellDialogue, CellSample};
-use crate::text::{Lines, Taken};
+use crate::board_clock::{BoardClock, BoardTime};
+use crate::cell::{CellProtocol, CellReports, CellSample, LineCell};
 use palpate_model::Nanos;
 use palpate_model::units::Volts;
-use std::collections::VecDeque;
 
 /// Ten conversions of the slow chip: longer than an answer of the board can be late.
 const SILENCE_MAX: Nanos = Nanos::from_millis(1_000);
-/// Values that may wait to be taken: a minute of the fast chip.
-const SAMPLES_MAX: usize = 4_800;
-/// Troubles that may wait to be told.
-const TROUBLES_MAX: usize = 16;
-/// An Arduino's resonator is right to half a percent; so much may its clock gain on the host's.
-const FAST_MAX: f64 = 0.02;
-/// Lines of an earlier moment may arrive in one go with that of now.
-const AHEAD_MAX: Nanos = Nanos::from_millis(2_000);
-
-/// The board's clock, its wraps taken out.
-#[derive(Clone, Copy, Debug)]
-struct BoardClock {
-    /// As the board told it last.
-    micros: u32,
-    /// The same without wraps and restarts.
-    time: Nanos,
-    /// Arrival of that.
-    at: Nanos,
-    /// Board's time and host's when counting began.
-    from: (Nanos, Nanos),
-}
+/// `micros()`.
+const NANOS_PER_TICK: u64 = 1_000;
+const RESTARTED: &str = "the HX711 board has started anew; check its supply";
 
 /// A board that sends values.
-pub struct Hx711Dialogue {
+pub type Hx711Dialogue = LineCell<Hx711Lines>;
+
+/// What its lines mean.
+pub struct Hx711Lines {
     header: Header,
     volts_per_count: f64,
-    lines: Lines,
-    clock: Option<BoardClock>,
-    newest: Nanos,
-    samples: VecDeque<CellSample>,
-    troubles: VecDeque<String>,
-    garbled: u64,
+    clock: BoardClock,
     is_beyond: bool,
     is_missing: bool,
     other: Option<String>,
@@ -50,111 +29,45 @@ impl Hx711Dialogue {
     /// Goes on with the board of a header from `now`.
     #[must_use]
     pub fn new(header: Header, volts_per_count: f64, now: Nanos) -> Self {
-        Self {
+        let lines = Hx711Lines {
             header,
             volts_per_count,
-            lines: Lines::default(),
-            clock: None,
-            newest: now,
-            samples: VecDeque::new(),
-            troubles: VecDeque::new(),
-            garbled: 0,
+            clock: BoardClock::new(NANOS_PER_TICK),
             is_beyond: false,
             is_missing: false,
             other: None,
-        }
+        };
+        Self::on(lines, now)
     }
+}
 
-    fn message(&mut self, now: Nanos, message: Message) {
-        match message {
-            Message::Value { micros, count } => self.value(now, micros, count),
-            Message::Started { micros, header } => {
-                self.trouble("the HX711 board has started anew; check its supply");
-                self.restart(now, micros);
-                self.check(header);
+impl Hx711Lines {
+    /// `false` for a value that was there already.
+    fn value(&mut self, now: Nanos, micros: u32, count: i32, reports: &mut CellReports) -> bool {
+        let time = match self.clock.take(now, micros) {
+            BoardTime::Repeated => return false,
+            BoardTime::At(time) => time,
+            BoardTime::Restarted(time) => {
+                // The line that would have told it was lost.
+                reports.trouble(RESTARTED);
+                time
             }
-            Message::Header { header, .. } => self.check(header),
-            Message::Missing { .. } => {
-                if !std::mem::replace(&mut self.is_missing, true) {
-                    self.trouble(
-                        "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply",
-                    );
-                }
-            }
-        }
-    }
-
-    fn value(&mut self, now: Nanos, micros: u32, count: i32) {
-        let Some(time) = self.board_time(now, micros) else {
-            self.garbled += 1;
-            return;
         };
         self.is_missing = false;
-        self.newest = now;
         let is_beyond = count == COUNT_MIN || count == COUNT_MAX;
         if is_beyond && !self.is_beyond {
-            self.trouble(
+            reports.trouble(
                 "the bridge's signal is beyond the HX711's range; check the cell's wires, or set gain 64 in the sketch",
             );
         }
         self.is_beyond = is_beyond;
-        if self.samples.len() >= SAMPLES_MAX {
-            self.samples.pop_front();
-        }
-        self.samples.push_back(CellSample {
+        reports.sample(CellSample {
             at: now,
             device_time: Some(time),
             counts: count,
             volts: Volts(f64::from(count) * self.volts_per_count),
         });
-    }
-
-    /// The board's time of a value; `None` for one that was there already.
-    fn board_time(&mut self, now: Nanos, micros: u32) -> Option<Nanos> {
-        let Some(clock) = self.clock else {
-            // The first count of the board is its time; whatever came before is nobody's business.
-            let time = Nanos(u64::from(micros) * 1_000);
-            self.clock = Some(BoardClock {
-                micros,
-                time,
-                at: now,
-                from: (time, now),
-            });
-            return Some(time);
-        };
-        let step = micros.wrapping_sub(clock.micros);
-        if step == 0 {
-            return None;
-        }
-        let time = Nanos(clock.time.0 + u64::from(step) * 1_000);
-        let run = time.since(clock.from.0).0 as f64;
-        let host = now.since(clock.from.1).0 as f64;
-        if run > host * (1.0 + FAST_MAX) + AHEAD_MAX.0 as f64 {
-            // The line that would have told it was lost.
-            self.trouble("the HX711 board has started anew; check its supply");
-            self.restart(now, micros);
-            return self.clock.map(|clock| clock.time);
-        }
-        self.clock = Some(BoardClock {
-            micros,
-            time,
-            at: now,
-            ..clock
-        });
-        Some(time)
-    }
-
-    /// The board counts from the beginning; its time goes on by the host's clock.
-    fn restart(&mut self, now: Nanos, micros: u32) {
-        if let Some(clock) = &mut self.clock {
-            let time = Nanos(clock.time.0 + now.since(clock.at).0.max(1));
-            *clock = BoardClock {
-                micros,
-                time,
-                at: now,
-                from: (time, now),
-            };
-        }
+        true
     }
 
     fn check(&mut self, header: Header) {
@@ -165,49 +78,37 @@ impl Hx711Dialogue {
             ));
         }
     }
-
-    fn trouble(&mut self, words: &str) {
-        if self.troubles.len() < TROUBLES_MAX {
-            self.troubles.push_back(words.to_owned());
-        }
-    }
 }
 
-impl CellDialogue for Hx711Dialogue {
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        for byte in bytes {
-            match self.lines.take(*byte) {
-                None => {}
-                Some(Taken::Garbled) => self.garbled += 1,
-                Some(Taken::Line(line)) => match parse(&line) {
-                    Some(message) => self.message(now, message),
-                    None => self.garbled += 1,
-                },
+impl CellProtocol for Hx711Lines {
+    fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
+        match parse(line) {
+            Some(Message::Value { micros, count }) => {
+                return self.value(now, micros, count, reports);
             }
+            Some(Message::Started { micros, header }) => {
+                reports.trouble(RESTARTED);
+                self.clock.restart(now, micros);
+                self.check(header);
+            }
+            Some(Message::Header { header, .. }) => self.check(header),
+            Some(Message::Missing { .. }) => {
+                if !std::mem::replace(&mut self.is_missing, true) {
+                    reports.trouble(
+                        "the HX711 chip does not answer its board; check DOUT, SCK and the chip's supply",
+                    );
+                }
+            }
+            None => return false,
         }
+        true
     }
 
-    fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
-        None
-    }
-
-    fn take_sample(&mut self) -> Option<CellSample> {
-        self.samples.pop_front()
-    }
-
-    fn take_trouble(&mut self) -> Option<String> {
-        self.troubles.pop_front()
-    }
-
-    fn garbled(&self) -> u64 {
-        self.garbled
-    }
-
-    fn is_dead(&self, now: Nanos) -> Option<String> {
+    fn is_dead(&self, now: Nanos, newest: Nanos) -> Option<String> {
         if self.other.is_some() {
             return self.other.clone();
         }
-        if now.since(self.newest) <= SILENCE_MAX {
+        if now.since(newest) <= SILENCE_MAX {
             return None;
         }
         Some(if self.is_missing {
@@ -222,6 +123,7 @@ impl CellDialogue for Hx711Dialogue {
 mod tests {
     use super::super::protocol::line;
     use super::*;
+    use crate::cell::CellDialogue;
 
     fn header(board: &str) -> Header {
         Header {

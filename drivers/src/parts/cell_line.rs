@@ -155,7 +155,7 @@ impl Dialogue for CellLine {
             );
         }
         self.take_samples(now);
-        self.cell.take_line(now)
+        None
     }
 
     fn next_at(&self, now: Nanos) -> Nanos {
@@ -202,10 +202,6 @@ mod tests {
                 counts: i32::from(*byte),
                 volts: Volts(0.0),
             }));
-        }
-
-        fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
-            None
         }
 
         fn take_sample(&mut self) -> Option<CellSample> {

@@ -3,18 +3,14 @@
 //! The language has no checksum. A reading counts only with the unit and as many digits behind the point as when the
 //! gauge was opened; a digit lost or changed before the point is not seen here, only as a jump of the force.
 
-use crate::cell::{CellDialogue, CellSample};
+use crate::cell::{CellProtocol, CellReports, CellSample, LineCell};
 use crate::mark10::protocol::{ForceUnit, GaugeLine, Reading};
-use crate::text::{Lines, Taken};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
-use std::collections::VecDeque;
 
 /// A gauge is gone when so many readings in a row have not come, and at least a second.
 const READINGS_MISSED: f64 = 5.0;
 const SILENCE_MIN: Nanos = Nanos::from_millis(1_000);
-/// Readings that may wait to be taken: 15 s at the fastest rate.
-const SAMPLES_MAX: usize = 4_000;
 /// Gauges show no number beyond 110 % of their capacity: a guess, to be checked on the device.
 const RANGE: f64 = 1.1;
 
@@ -51,36 +47,32 @@ impl GaugeScale {
 }
 
 /// A gauge that sends readings.
-pub struct GaugeDialogue {
+pub type GaugeDialogue = LineCell<GaugeReadings>;
+
+/// What its lines mean.
+pub struct GaugeReadings {
     scale: GaugeScale,
     silence_max: Nanos,
-    lines: Lines,
-    newest: Nanos,
     counts: i32,
-    samples: VecDeque<CellSample>,
     is_beyond: bool,
-    trouble: Option<String>,
-    garbled: u64,
 }
 
 impl GaugeDialogue {
     /// Goes on with a gauge that sends so many readings a second, from `now`.
     #[must_use]
     pub fn new(scale: GaugeScale, per_second: f64, now: Nanos) -> Self {
-        Self {
+        let readings = GaugeReadings {
             scale,
             silence_max: SILENCE_MIN.max(Nanos((READINGS_MISSED * 1e9 / per_second) as u64)),
-            lines: Lines::default(),
-            newest: now,
             counts: 0,
-            samples: VecDeque::new(),
             is_beyond: false,
-            trouble: None,
-            garbled: 0,
-        }
+        };
+        Self::on(readings, now)
     }
+}
 
-    fn line(&mut self, now: Nanos, line: &str) {
+impl CellProtocol for GaugeReadings {
+    fn take(&mut self, now: Nanos, line: &str, reports: &mut CellReports) -> bool {
         let counts = match GaugeLine::parse(line) {
             GaugeLine::Reading(Reading { number, unit })
                 if unit == self.scale.unit && number.decimals == self.scale.decimals =>
@@ -90,62 +82,27 @@ impl GaugeDialogue {
             // The end of the range on the side where it was, so that every limit sees it.
             GaugeLine::Overload if self.counts < 0 => -self.scale.counts_max,
             GaugeLine::Overload => self.scale.counts_max,
-            _ => {
-                self.garbled += 1;
-                return;
-            }
+            _ => return false,
         };
-        self.newest = now;
         self.counts = counts;
         let is_beyond = counts.saturating_abs() >= self.scale.counts_max;
         if is_beyond && !self.is_beyond {
-            self.trouble = Some(
-                "the force is beyond the gauge's range; take the load off before it is damaged"
-                    .into(),
+            reports.trouble(
+                "the force is beyond the gauge's range; take the load off before it is damaged",
             );
         }
         self.is_beyond = is_beyond;
-        if self.samples.len() >= SAMPLES_MAX {
-            self.samples.pop_front();
-        }
-        self.samples.push_back(CellSample {
+        reports.sample(CellSample {
             at: now,
             device_time: None,
             counts,
             volts: Volts(f64::from(counts) * self.scale.volts_per_count()),
         });
-    }
-}
-
-impl CellDialogue for GaugeDialogue {
-    fn received(&mut self, now: Nanos, bytes: &[u8]) {
-        for byte in bytes {
-            match self.lines.take(*byte) {
-                None => {}
-                Some(Taken::Garbled) => self.garbled += 1,
-                Some(Taken::Line(line)) => self.line(now, &line),
-            }
-        }
+        true
     }
 
-    fn take_line(&mut self, _now: Nanos) -> Option<Vec<u8>> {
-        None
-    }
-
-    fn take_sample(&mut self) -> Option<CellSample> {
-        self.samples.pop_front()
-    }
-
-    fn take_trouble(&mut self) -> Option<String> {
-        self.trouble.take()
-    }
-
-    fn garbled(&self) -> u64 {
-        self.garbled
-    }
-
-    fn is_dead(&self, now: Nanos) -> Option<String> {
-        (now.since(self.newest) > self.silence_max).then(|| {
+    fn is_dead(&self, now: Nanos, newest: Nanos) -> Option<String> {
+        (now.since(newest) > self.silence_max).then(|| {
             "the gauge has fallen silent; check its cable and battery, zero it and open the rig again"
                 .into()
         })
@@ -155,6 +112,7 @@ impl CellDialogue for GaugeDialogue {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::cell::CellDialogue;
     use crate::mark10::protocol::Decimal;
 
     fn dialogue() -> GaugeDialogue {

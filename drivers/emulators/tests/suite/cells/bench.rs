@@ -108,9 +108,6 @@ impl<E: EmulatedCell> CellBench<E> {
         let mut samples = Vec::new();
         let mut buffer = [0_u8; 256];
         while clock() < end {
-            while let Some(line) = dialogue.take_line(clock()) {
-                self.write(&line).expect("the link");
-            }
             let Ok(count) = self.read(&mut buffer, Duration::from_millis(1)) else {
                 break;
             };
