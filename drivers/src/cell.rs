@@ -1,10 +1,13 @@
 //! A load cell on a wire of its own: what every such device gives, whatever it speaks.
 
-use crate::text::{Lines, Taken};
+use crate::text::{DeviceError, Lines, OpenedCell, Taken};
+use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use palpate_model::rig::AdcDescription;
 use palpate_model::units::Volts;
 use std::collections::VecDeque;
+use std::fmt::Debug;
+use std::sync::Arc;
 
 /// Values that may wait to be taken: a minute at 80 a second, 15 s at the fastest rate of a gauge.
 const SAMPLES_MAX: usize = 4_800;
@@ -39,6 +42,17 @@ pub struct CellDescription {
     pub delay: Nanos,
     /// Newtons of a volt where the device itself is calibrated, as a force gauge is.
     pub newtons_per_volt: Option<f64>,
+}
+
+/// A load cell beside an axis, as its rig file describes it.
+pub trait CellDevice: Debug + Send + Sync {
+    /// Makes sure who answers on a link, sets it up and lets it send. `name` is what the log of bytes calls it.
+    fn open(
+        &self,
+        link: &mut dyn Link,
+        clock: &HostClock,
+        name: &Arc<str>,
+    ) -> Result<OpenedCell, DeviceError>;
 }
 
 /// A load cell that sends values by itself, in progress. It must neither wait nor read a clock.

@@ -5,7 +5,8 @@
 //! load cell on an HX711 tells its header; a Galil controller refuses the command with a `?` of its own (DMC-1700/1800
 //! user manual, chapter 5), after which it may be asked for its revision (`^R^V`).
 
-use crate::galil::GalilBoard;
+use crate::devices::{DeviceKind, lines_of};
+use crate::galil::{self, GalilBoard};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
 use std::fmt;
@@ -20,18 +21,14 @@ const ANSWER_MAX: Nanos = Nanos::from_millis(700);
 const READ_MAX: Duration = Duration::from_millis(5);
 /// More than any of these devices says; what comes after it is not looked at.
 const BYTES_MAX: usize = 4096;
+/// So much of what was heard is shown.
+const SHOWN_MAX: usize = 80;
 
 /// What answers.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Found {
-    /// A Galil controller, by its revision.
-    Galil(String),
-    /// Grbl, by its banner or status report.
-    Grbl(String),
-    /// A Mark-10 force gauge, by a reading.
-    Gauge(String),
-    /// Our sketch on a board with an HX711, by its header.
-    Hx711(String),
+    /// A device that palpate drives: its word in a rig file, its introduction, and what it said of itself.
+    Device(&'static str, &'static str, String),
     /// Something that palpate does not know, by what it said.
     Unknown(String),
     /// Nothing answers.
@@ -39,28 +36,17 @@ pub enum Found {
 }
 
 impl Found {
+    fn of(kind: &'static DeviceKind, said: &str) -> Self {
+        let said = said.chars().take(SHOWN_MAX).collect();
+        Self::Device(kind.word, kind.introduction, said)
+    }
+
     /// The word for it in a rig file, if palpate drives it.
     #[must_use]
     pub const fn device(&self) -> Option<&'static str> {
         match self {
-            Self::Galil(_) => Some("galil"),
-            Self::Grbl(_) => Some("grbl"),
-            Self::Gauge(_) => Some("mark10"),
-            Self::Hx711(_) => Some("hx711"),
+            Self::Device(word, ..) => Some(word),
             Self::Unknown(_) | Self::Silent => None,
-        }
-    }
-
-    /// What it said of itself.
-    #[must_use]
-    pub fn said(&self) -> &str {
-        match self {
-            Self::Galil(said)
-            | Self::Grbl(said)
-            | Self::Gauge(said)
-            | Self::Hx711(said)
-            | Self::Unknown(said) => said,
-            Self::Silent => "",
         }
     }
 }
@@ -68,10 +54,7 @@ impl Found {
 impl fmt::Display for Found {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
-            Self::Galil(said) => write!(f, "Galil controller, {said}"),
-            Self::Grbl(said) => write!(f, "Grbl, {said}"),
-            Self::Gauge(said) => write!(f, "force gauge that reads {said}"),
-            Self::Hx711(said) => write!(f, "load cell on an HX711, {said}"),
+            Self::Device(_, introduction, said) => write!(f, "{introduction}{said}"),
             Self::Unknown(said) => write!(f, "unknown, says \"{said}\""),
             Self::Silent => f.write_str("silent at this baud rate"),
         }
@@ -107,10 +90,15 @@ pub fn ask(link: &mut dyn Link, clock: &HostClock) -> io::Result<Found> {
         let from = text.find("DMC").or_else(|| text.find("RIO"));
         if let Some(from) = from {
             let revision = text[from..].trim_end_matches([':', '?', ' ']);
-            return Ok(Found::Galil(match GalilBoard::parse(revision) {
+            let said = match GalilBoard::parse(revision) {
                 Ok(board) => board.revision,
                 Err(err) => format!("{revision}: {err}"),
-            }));
+            };
+            return Ok(Found::Device(
+                galil::KIND.word,
+                galil::KIND.introduction,
+                said,
+            ));
         }
     }
     Ok(if heard.is_empty() {
@@ -143,40 +131,15 @@ fn recognise(heard: &[u8]) -> Option<Found> {
         .iter()
         .rposition(|byte| matches!(byte, b'\r' | b'\n'))?;
     let text = String::from_utf8_lossy(&heard[..end]);
-    text.split(['\r', '\n']).map(str::trim).find_map(|line| {
-        let said = || line.chars().take(80).collect::<String>();
-        if line.starts_with("Grbl ") || is_status(line) {
-            Some(Found::Grbl(said()))
-        } else if line.contains("palpate-hx711") {
-            Some(Found::Hx711(said()))
-        } else if is_reading(line) {
-            Some(Found::Gauge(said()))
-        } else {
-            None
-        }
-    })
-}
-
-/// A status report: `<Idle|MPos:0.000,0.000,0.000|FS:0,0>`.
-fn is_status(line: &str) -> bool {
-    line.strip_prefix('<')
-        .and_then(|rest| rest.strip_suffix('>'))
-        .is_some_and(|inside| inside.contains("Pos:"))
-}
-
-/// A reading with its unit: `-18.78 lbF`, `4.285 N`.
-fn is_reading(line: &str) -> bool {
-    const UNITS: [&str; 8] = ["N", "mN", "kN", "lbF", "ozF", "gF", "kgF", "tF"];
-    line.split_once(' ').is_some_and(|(number, unit)| {
-        number.parse::<f64>().is_ok_and(f64::is_finite) && UNITS.contains(&unit.trim())
-    })
+    let (kind, said) = DeviceKind::of_lines(&lines_of(&text))?;
+    Some(Found::of(kind, said))
 }
 
 /// What was heard, fit to be shown: the first line's worth, marks in place of what is no text.
 fn readable(heard: &[u8]) -> String {
     let text = String::from_utf8_lossy(heard);
     let plain = text.chars().map(|c| if c.is_control() { ' ' } else { c });
-    let plain: String = plain.take(80).collect();
+    let plain: String = plain.take(SHOWN_MAX).collect();
     plain.trim().to_owned()
 }
 

@@ -9,6 +9,7 @@ mod board_clock;
 pub mod cell;
 pub mod detect;
 pub mod device;
+pub mod devices;
 pub mod doubles;
 pub mod galil;
 pub mod grbl;

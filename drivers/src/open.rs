@@ -125,8 +125,12 @@ mod tests {
     /// A box that answers for its rig hides whatever it does not hand on.
     #[test]
     fn boxed_rig_tells_what_its_sensors_say() {
-        let mut rig = open("sim", &SimSettings::default()).unwrap();
-        while rig.next_event(Nanos::from_millis(100)).is_some() {}
+        let settings = SimSettings {
+            bath: "37".parse().unwrap(),
+            ..SimSettings::default()
+        };
+        let mut rig = open("sim", &settings).unwrap();
+        while rig.next_event(Nanos::from_millis(2_000)).is_some() {}
         assert!(!Rig::take_sensors(&mut rig).is_empty());
     }
 

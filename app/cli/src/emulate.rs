@@ -3,15 +3,13 @@
 use super::Failure;
 use super::output::Output;
 use super::rig::BenchArgs;
+use clap::builder::PossibleValuesParser;
 use clap::{Args, Subcommand};
 use palpate_emulators::bench::Bench;
-use palpate_emulators::cell::EmulatedCell;
+use palpate_emulators::cell::{emulated_cell, emulated_cells};
 use palpate_emulators::galil::{GalilEmulator, GalilModel, GalilSettings};
 use palpate_emulators::grbl::{Eeprom, Grbl, GrblSettings, HomeWiring};
-use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
-use palpate_emulators::mark10::{
-    EmulatedGauge, EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings,
-};
+use palpate_emulators::mark10::{EmulatedGaugeSettings, EmulatedStand, EmulatedStandSettings};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_emulators::{Device, ScheduledFault};
 use palpate_model::Nanos;
@@ -103,9 +101,9 @@ pub struct GalilArgs {
 pub struct GrblArgs {
     #[command(flatten)]
     wire: WireArgs,
-    /// Load cell beside it: hx711 or mark10
-    #[arg(long, default_value = "hx711")]
-    cell: CellKind,
+    /// Load cell beside it
+    #[arg(long, default_value = "hx711", value_parser = PossibleValuesParser::new(emulated_cells()))]
+    cell: String,
     /// Link to the pseudo-terminal of the load cell, which has one also where --tcp is the board's address
     #[arg(long, value_name = "PATH")]
     cell_pty: Option<PathBuf>,
@@ -129,12 +127,6 @@ pub struct Mark10Args {
     wire: WireArgs,
     #[command(flatten)]
     bench: BenchArgs,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
-enum CellKind {
-    Hx711,
-    Mark10,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
@@ -253,19 +245,10 @@ fn grbl(args: &GrblArgs, output: &Output) -> Result<(), Failure> {
         ..GrblSettings::default()
     });
     let seed = args.bench.seed;
-    let (model, cell): (_, Box<dyn EmulatedCell>) = match args.cell {
-        CellKind::Hx711 => (
-            "hx711",
-            Box::new(EmulatedHx711::new(EmulatedHx711Settings::default())),
-        ),
-        CellKind::Mark10 => (
-            "mark10",
-            Box::new(EmulatedGauge::new(EmulatedGaugeSettings {
-                seed,
-                ..EmulatedGaugeSettings::default()
-            })),
-        ),
-    };
+    let model = &args.cell;
+    // One of those that are emulated: it was checked when the arguments were read.
+    let cell = emulated_cell(model, seed)
+        .ok_or_else(|| Failure::usage(format!("no emulated load cell is called {model}")))?;
     let mut device = Bench::new(&args.bench.settings(), Box::new(board), cell);
     let mut ready = |places: &str| {
         let (at, cell_at) = places.split_once(", ").unwrap_or((places, ""));

@@ -242,7 +242,7 @@ pub(super) fn open_rig_file(file_name: &str) -> Result<(Box<dyn Rig>, Vec<Holder
     // Two programs may be connected to one controller on a network; only one may drive it.
     let locks = file
         .places()
-        .into_iter()
+        .iter()
         .map(|place| {
             let name = place.to_string();
             let plain = |c: char| if c.is_ascii_alphanumeric() { c } else { '-' };

@@ -2,6 +2,10 @@
 //! own.
 
 use super::DeviceFault;
+use super::hx711::{EmulatedHx711, EmulatedHx711Settings};
+use super::line_cell::EmulatedLineCell;
+use super::mark10::{EmulatedGauge, EmulatedGaugeSettings};
+use palpate_drivers::devices::{DEVICES, Role};
 use palpate_model::Nanos;
 use palpate_model::units::{Newtons, Volts};
 
@@ -27,4 +31,40 @@ pub trait EmulatedCell: Send {
 
     /// A fault of the device itself begins or ends.
     fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
+}
+
+/// Makes an emulated load cell out of a seed.
+type Program = fn(u64) -> Box<dyn EmulatedCell>;
+
+/// Emulated load cells beside an axis that are programs of their own, by their words in a rig file.
+const PROGRAMS: [(&str, Program); 2] = [
+    ("hx711", |_| {
+        Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
+    }),
+    ("mark10", |seed| {
+        let usual = EmulatedGaugeSettings::default();
+        Box::new(EmulatedGauge::new(EmulatedGaugeSettings { seed, ..usual }))
+    }),
+];
+
+/// The words of all load cells that can be emulated beside an axis.
+#[must_use]
+pub fn emulated_cells() -> Vec<&'static str> {
+    let words = DEVICES.iter().map(|kind| kind.word);
+    words
+        .filter(|word| emulated_cell(word, 0).is_some())
+        .collect()
+}
+
+/// An emulated load cell, by its word in a rig file.
+#[must_use]
+pub fn emulated_cell(word: &str, seed: u64) -> Option<Box<dyn EmulatedCell>> {
+    if let Some((_, program)) = PROGRAMS.iter().find(|(name, _)| *name == word) {
+        return Some(program(seed));
+    }
+    let kind = DEVICES.iter().find(|kind| kind.word == word)?;
+    match kind.role {
+        Role::Cell { emulation, .. } => Some(Box::new(EmulatedLineCell::new(emulation?))),
+        Role::Axis(_) => None,
+    }
 }

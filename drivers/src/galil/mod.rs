@@ -20,9 +20,23 @@ mod sine;
 mod timing;
 mod watchdog;
 
+use crate::devices::{DeviceKind, Role, first};
+
 pub use connect::{Connected, connect};
 pub use error::GalilError;
 pub use model::{GalilBoard, GalilOpenError};
 pub use rig::{GalilDevice, GalilRig};
 pub use session::Session;
 pub use settings::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
+
+pub(crate) const KIND: DeviceKind = DeviceKind {
+    word: "galil",
+    title: "a Galil controller",
+    introduction: "Galil controller, ",
+    role: Role::Axis(crate::rig_file::galil),
+    recognise: |lines| {
+        first(lines, |line| {
+            line.starts_with("DMC") || line.starts_with("RIO")
+        })
+    },
+};

@@ -16,6 +16,9 @@ mod session;
 mod settings;
 mod times;
 
+use crate::devices::{DeviceKind, Role, first};
+use protocol::Incoming;
+
 pub use axis::open;
 pub use connect::{Connected, connect};
 pub use error::{Alarm, GrblOpenError, Refusal};
@@ -23,3 +26,22 @@ pub use fitness::MM_PER_STEP_MIN;
 pub use motion::worst_case_mm;
 pub use session::{Session, SharedTrack};
 pub use settings::{Facts, GrblSettings, HomeSwitch};
+
+pub(crate) const KIND: DeviceKind = DeviceKind {
+    word: "grbl",
+    title: "a Grbl controller",
+    introduction: "Grbl, ",
+    role: Role::Axis(crate::rig_file::grbl),
+    recognise: |lines| first(lines, is_of_grbl),
+};
+
+/// Its banner, a status report, an error, an alarm or a message.
+fn is_of_grbl(line: &str) -> bool {
+    match Incoming::parse(line) {
+        Incoming::Hello(_) | Incoming::Status(_) => true,
+        Incoming::Refused(refusal) => refusal.code.is_some(),
+        Incoming::Alarm(alarm) => alarm.code.is_some(),
+        Incoming::Message(message) => message.starts_with("MSG:"),
+        _ => false,
+    }
+}

@@ -164,7 +164,9 @@ pub enum Incoming {
 }
 
 impl Incoming {
-    fn parse(line: &str) -> Self {
+    /// Reads a line without its end.
+    #[must_use]
+    pub fn parse(line: &str) -> Self {
         let other = || Self::Other(line.to_owned());
         if line == "ok" {
             return Self::Ok;

@@ -1,6 +1,6 @@
 //! A load cell bridge on an HX711 converter, with palpate's sketch on the Arduino that reads it.
 //!
-//! Read [`protocol`] first: lines that the sketch sends. [`open`] makes sure who answers, [`Hx711Dialogue`] goes on.
+//! Read [`protocol`] first: lines that the sketch sends. `open.rs` makes sure who answers, [`Hx711Dialogue`] goes on.
 //!
 //! # Volts
 //!
@@ -16,9 +16,27 @@ mod open;
 pub mod protocol;
 
 pub use dialogue::Hx711Dialogue;
-pub use open::open;
 
+use crate::cell::CellDevice;
+use crate::devices::{DeviceKind, Role, first};
+use crate::rig_file::Fields;
 use palpate_model::units::Volts;
+use std::sync::Arc;
+
+pub(crate) const KIND: DeviceKind = DeviceKind {
+    word: "hx711",
+    title: "an HX711 board",
+    introduction: "load cell on an HX711, ",
+    role: Role::Cell {
+        read,
+        emulation: None,
+    },
+    recognise: |lines| {
+        first(lines, |line| {
+            line.contains("palpate-hx711") || protocol::parse(line).is_some()
+        })
+    },
+};
 
 /// What palpate has to know of an HX711 board.
 #[derive(Clone, Debug, PartialEq)]
@@ -49,4 +67,17 @@ impl Hx711Settings {
     pub fn volts_per_count(&self, gain: u8) -> f64 {
         self.full_scale.0 / f64::from(1_u32 << 23) * 128.0 / f64::from(gain)
     }
+}
+
+fn read(fields: &mut Fields) -> Option<Arc<dyn CellDevice>> {
+    let usual = Hx711Settings::default();
+    Some(Arc::new(Hx711Settings {
+        board: fields.text("cell.board"),
+        full_scale: fields
+            .number("cell.full_scale_v", 1e-3, 1000.0)
+            .map_or(usual.full_scale, Volts),
+        noise: fields
+            .number("cell.noise_v", 1e-9, 1.0)
+            .map_or(usual.noise, Volts),
+    }))
 }

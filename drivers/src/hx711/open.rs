@@ -3,7 +3,7 @@
 use super::Hx711Settings;
 use super::dialogue::Hx711Dialogue;
 use super::protocol::{COUNT_MAX, COUNT_MIN, Header, Message, parse};
-use crate::cell::CellDescription;
+use crate::cell::{CellDescription, CellDevice};
 use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
 use crate::wire::{HostClock, Link};
 use palpate_model::Nanos;
@@ -23,51 +23,53 @@ const MEASURED: usize = 9;
 /// So long may they take at 10 a second.
 const MEASURE_MAX: Nanos = Nanos::from_millis(2_500);
 
-/// Waits for the board, makes sure which it is and measures its rate.
-pub fn open(
-    link: &mut dyn Link,
-    clock: &HostClock,
-    settings: &Hx711Settings,
-    name: &Arc<str>,
-) -> Result<OpenedCell, DeviceError> {
-    let is_scale = settings.full_scale.0.is_finite() && settings.full_scale.0 > 0.0;
-    if !is_scale {
-        return Err(unfit("its full scale must be above 0 V".into()));
+impl CellDevice for Hx711Settings {
+    /// Waits for the board, makes sure which it is and measures its rate.
+    fn open(
+        &self,
+        link: &mut dyn Link,
+        clock: &HostClock,
+        name: &Arc<str>,
+    ) -> Result<OpenedCell, DeviceError> {
+        let is_scale = self.full_scale.0.is_finite() && self.full_scale.0 > 0.0;
+        if !is_scale {
+            return Err(unfit("its full scale must be above 0 V".into()));
+        }
+        let mut console = TextConsole::new(link, clock, name, DEVICE);
+        let header = identify(&mut console)?;
+        if let Some(expected) = &self.board
+            && *expected != header.board
+        {
+            return Err(DeviceError::OtherSerial {
+                device: DEVICE,
+                found: header.board,
+                expected: expected.clone(),
+            });
+        }
+        let rate = measure(&mut console)?;
+        let volts_per_count = self.volts_per_count(header.gain);
+        let description = CellDescription {
+            identity: format!(
+                "HX711 board {}, {rate:.1} values a second, gain {}, {} of full scale",
+                header.board, header.gain, self.full_scale
+            ),
+            adc: AdcDescription {
+                counts_min: COUNT_MIN,
+                counts_max: COUNT_MAX,
+                volts_per_count,
+            },
+            noise_expected: self.noise,
+            rate,
+            delay: Nanos((0.5 * SETTLING / rate * 1e9) as u64),
+            newtons_per_volt: None,
+        };
+        Ok(OpenedCell {
+            description,
+            dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
+            raw: console.link.raw,
+            farewell: Vec::new(),
+        })
     }
-    let mut console = TextConsole::new(link, clock, name, DEVICE);
-    let header = identify(&mut console)?;
-    if let Some(expected) = &settings.board
-        && *expected != header.board
-    {
-        return Err(DeviceError::OtherSerial {
-            device: DEVICE,
-            found: header.board,
-            expected: expected.clone(),
-        });
-    }
-    let rate = measure(&mut console)?;
-    let volts_per_count = settings.volts_per_count(header.gain);
-    let description = CellDescription {
-        identity: format!(
-            "HX711 board {}, {rate:.1} values a second, gain {}, {} of full scale",
-            header.board, header.gain, settings.full_scale
-        ),
-        adc: AdcDescription {
-            counts_min: COUNT_MIN,
-            counts_max: COUNT_MAX,
-            volts_per_count,
-        },
-        noise_expected: settings.noise,
-        rate,
-        delay: Nanos((0.5 * SETTLING / rate * 1e9) as u64),
-        newtons_per_volt: None,
-    };
-    Ok(OpenedCell {
-        description,
-        dialogue: Box::new(Hx711Dialogue::new(header, volts_per_count, console.now())),
-        raw: console.link.raw,
-        farewell: Vec::new(),
-    })
 }
 
 fn identify(console: &mut TextConsole<'_>) -> Result<Header, DeviceError> {

@@ -2,10 +2,10 @@
 
 use super::cell_line::{CellLine, TICK};
 use super::track::Track;
+use crate::cell::CellDevice;
 use crate::device::{DeviceRig, OpenError, Opened, RigDevice};
 use crate::grbl::{self, GrblSettings};
 use crate::rig::RigEventBody;
-use crate::rig_file::CellFile;
 use crate::text::OpenedCell;
 use crate::wire::{HostClock, Line, LineSettings, Place};
 use palpate_model::Nanos;
@@ -28,7 +28,7 @@ pub type PartsRig = DeviceRig<Parts>;
 /// An axis and a load cell to be opened.
 pub struct Parts {
     axis: (Place, GrblSettings),
-    cell: (Place, CellFile),
+    cell: (Place, Arc<dyn CellDevice>),
     /// Of what was opened last.
     track: Arc<Mutex<Track>>,
     /// The host's clock where ticks begin.
@@ -42,7 +42,7 @@ pub struct Parts {
 impl Parts {
     /// A Grbl board and a load cell, each with its place.
     #[must_use]
-    pub fn new(axis: (Place, GrblSettings), cell: (Place, CellFile)) -> Self {
+    pub fn new(axis: (Place, GrblSettings), cell: (Place, Arc<dyn CellDevice>)) -> Self {
         Self {
             axis,
             cell,
@@ -57,6 +57,7 @@ impl Parts {
 impl RigDevice for Parts {
     fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
         let ((axis_place, settings), (cell_place, cell)) = (&self.axis, &self.cell);
+        let device: Arc<str> = "cell".into();
         let axis_link = axis_place.open()?;
         let mut link = cell_place.open()?;
         let (mut description, axis) = grbl::open(axis_link, settings, clock)?;
@@ -65,7 +66,7 @@ impl RigDevice for Parts {
             dialogue,
             raw,
             farewell,
-        } = cell.open(link.as_mut(), clock)?;
+        } = cell.open(link.as_mut(), clock, &device)?;
         (self.track, self.start) = (axis.track, clock());
         (self.zero, self.motions_shown) = (0, 0);
         let line = CellLine::new(
@@ -74,10 +75,7 @@ impl RigDevice for Parts {
             Arc::clone(&self.track),
             self.start,
         );
-        let line_settings = LineSettings {
-            device: "cell".into(),
-            farewell,
-        };
+        let line_settings = LineSettings { device, farewell };
         let cell_line = Line::start(link, line, clock, line_settings)?;
         description.identity = format!("{}; {}", description.identity, cell.identity);
         description.tick_nanos = TICK.0;

@@ -1,10 +1,21 @@
 //! The keys of a Galil controller.
 
+use super::RigFile;
 use super::fields::Fields;
 use super::place::place;
-use crate::galil::{AnalogRange, GalilSettings, Levels, MotorType, Sampling};
+use crate::device::DeviceRig;
+use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
+
+/// A rig with the controller of a rig file.
+pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
+    let (place, settings) = read(name, fields)?;
+    Some(RigFile::new(vec![place.clone()], move |clock| {
+        let device = GalilDevice::new(place.clone(), settings.clone());
+        Ok(Box::new(DeviceRig::open(device, clock.clone())?))
+    }))
+}
 
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {

@@ -10,52 +10,29 @@ mod grbl;
 mod place;
 mod stand;
 
-pub use cell::CellFile;
-pub use fields::Mistake;
+pub(crate) use cell::gauge;
+pub use fields::{Fields, Mistake};
+pub(crate) use galil::galil;
+pub(crate) use grbl::grbl;
+pub(crate) use stand::stand;
 
-use crate::device::{DeviceRig, OpenError};
-use crate::galil::{GalilDevice, GalilSettings};
-use crate::grbl::GrblSettings;
-use crate::mark10::{StandDevice, StandSettings};
-use crate::parts::Parts;
+use crate::device::OpenError;
+use crate::devices::{DEVICES, Role};
 use crate::rig::Rig;
 use crate::wire::{HostClock, Place};
-use fields::Fields;
 use std::fmt;
 use thiserror::Error;
 
 /// A longer rig file is something else.
 pub const BYTES_MAX: usize = 64 * 1024;
 
+/// Opens the devices of a rig file.
+type Opener = dyn Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync;
+
 /// A rig as its file describes it.
-#[derive(Clone, Debug, PartialEq)]
-#[non_exhaustive]
-pub enum RigFile {
-    /// Slide and load cell on one Galil controller.
-    Galil {
-        /// Where the controller is.
-        place: Place,
-        /// How it is wired.
-        settings: GalilSettings,
-    },
-    /// A slide on a Grbl board, and a load cell on a wire of its own.
-    Grbl {
-        /// Where the board is.
-        place: Place,
-        /// How it is wired.
-        settings: GrblSettings,
-        /// Where the cell is.
-        cell_place: Place,
-        /// What it is.
-        cell: CellFile,
-    },
-    /// A Mark-10 stand with its gauge on one line.
-    Stand {
-        /// Where it is.
-        place: Place,
-        /// What it is.
-        settings: StandSettings,
-    },
+pub struct RigFile {
+    places: Vec<Place>,
+    open: Box<Opener>,
 }
 
 /// A rig file with mistakes, all of them.
@@ -92,83 +69,41 @@ impl RigFile {
         }
     }
 
+    /// Devices at these places, that of the axis first, and how they are opened.
+    pub(crate) fn new(
+        places: Vec<Place>,
+        open: impl Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync + 'static,
+    ) -> Self {
+        let open = Box::new(open);
+        Self { places, open }
+    }
+
     /// Where its devices are, that of the axis first.
     #[must_use]
-    pub fn places(&self) -> Vec<&Place> {
-        match self {
-            Self::Galil { place, .. } | Self::Stand { place, .. } => vec![place],
-            Self::Grbl {
-                place, cell_place, ..
-            } => vec![place, cell_place],
-        }
+    pub fn places(&self) -> &[Place] {
+        &self.places
     }
 
     /// Opens the devices and checks them against the file. Nothing moves.
     pub fn open(&self, clock: &HostClock) -> Result<Box<dyn Rig>, OpenError> {
-        let clock = clock.clone();
-        Ok(match self.clone() {
-            Self::Galil { place, settings } => {
-                Box::new(DeviceRig::open(GalilDevice::new(place, settings), clock)?)
-            }
-            Self::Grbl {
-                place,
-                settings,
-                cell_place,
-                cell,
-            } => {
-                let parts = Parts::new((place, settings), (cell_place, cell));
-                Box::new(DeviceRig::open(parts, clock)?)
-            }
-            Self::Stand { place, settings } => {
-                Box::new(DeviceRig::open(StandDevice { place, settings }, clock)?)
-            }
-        })
+        (self.open)(clock)
     }
 }
 
-#[derive(Clone, Copy)]
-enum Device {
-    Galil,
-    Grbl,
-    Stand,
+impl fmt::Debug for RigFile {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("RigFile").field(&self.places).finish()
+    }
 }
 
 fn read(file: &str, fields: &mut Fields) -> Option<RigFile> {
-    let devices = [
-        ("galil", Device::Galil),
-        ("grbl", Device::Grbl),
-        ("mark10-stand", Device::Stand),
-    ];
-    let device = fields.choice("device", &devices, None)?;
+    let axes = DEVICES.iter().filter_map(|kind| match kind.role {
+        Role::Axis(read) => Some((kind.word, read)),
+        Role::Cell { .. } => None,
+    });
+    let read = fields.choice("device", &axes.collect::<Vec<_>>(), None)?;
     let name = fields.text("name").unwrap_or_else(|| stem(file));
-    match device {
-        Device::Galil => {
-            let (place, settings) = galil::read(name, fields)?;
-            Some(RigFile::Galil { place, settings })
-        }
-        Device::Grbl => {
-            // Both are read, so that the mistakes of both are told.
-            let (axis, cell) = (grbl::read(name, fields), cell::read(fields));
-            let ((place, settings), (cell_place, cell)) = (axis?, cell?);
-            if place == cell_place {
-                fields.mistake(
-                    "cell.port",
-                    "the board is at this port; the load cell has another",
-                );
-                return None;
-            }
-            Some(RigFile::Grbl {
-                place,
-                settings,
-                cell_place,
-                cell,
-            })
-        }
-        Device::Stand => {
-            let (place, settings) = stand::read(name, fields)?;
-            Some(RigFile::Stand { place, settings })
-        }
-    }
+    read(name, fields)
 }
 
 /// The file's name without folders and ending.

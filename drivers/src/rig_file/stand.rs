@@ -1,11 +1,23 @@
 //! The keys of a Mark-10 stand with its gauge.
 
+use super::RigFile;
 use super::cell::gauge;
 use super::fields::Fields;
 use super::place::place;
-use crate::mark10::StandSettings;
+use crate::device::DeviceRig;
+use crate::mark10::{StandDevice, StandSettings};
 use crate::wire::Place;
 use palpate_model::units::{MmPerS, MmPerS2, Position};
+
+/// A rig with the stand of a rig file.
+pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
+    let (place, settings) = read(name, fields)?;
+    Some(RigFile::new(vec![place.clone()], move |clock| {
+        let (place, settings) = (place.clone(), settings.clone());
+        let device = StandDevice { place, settings };
+        Ok(Box::new(DeviceRig::open(device, clock.clone())?))
+    }))
+}
 
 /// Where the stand is, and what it is.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {

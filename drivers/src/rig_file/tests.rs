@@ -1,5 +1,6 @@
 use super::*;
-use crate::galil::{AnalogRange, Sampling};
+use crate::galil::{AnalogRange, GalilSettings, Sampling};
+use crate::grbl::GrblSettings;
 use palpate_model::rig::RigDescription;
 use palpate_model::units::Position;
 
@@ -14,10 +15,14 @@ converter = "16 bit"
 "#;
 
 fn galil(file: &str, text: &str) -> (Place, GalilSettings) {
-    match RigFile::parse(file, text).unwrap() {
-        RigFile::Galil { place, settings } => (place, settings),
-        other => panic!("{other:?}"),
-    }
+    assert_eq!(RigFile::parse(file, text).unwrap().places().len(), 1);
+    let mut fields = Fields::read(text).unwrap();
+    let name = fields.text("name").unwrap_or_else(|| stem(file));
+    super::galil::read(name, &mut fields).unwrap()
+}
+
+fn grbl_settings(text: &str) -> (Place, GrblSettings) {
+    super::grbl::read("bench".into(), &mut Fields::read(text).unwrap()).unwrap()
 }
 
 fn mistakes(text: &str) -> Vec<(usize, String)> {
@@ -150,13 +155,13 @@ fn a_rig_of_parts_has_two_places() {
         ["/dev/ttyACM0 at 115200 baud", "/dev/ttyACM1 at 115200 baud"]
     );
     let gauge = PARTS.replace("hx711", "mark10") + "capacity_n = 25\nfilter = 4\n";
-    let RigFile::Grbl { cell, settings, .. } = RigFile::parse("bench.toml", &gauge).unwrap() else {
-        panic!("no parts");
-    };
+    assert_eq!(
+        RigFile::parse("bench.toml", &gauge).unwrap().places().len(),
+        2
+    );
+    let (_, settings) = grbl_settings(&gauge);
     assert!(!settings.is_unlocking && settings.axis == 'X');
-    let CellFile::Mark10(gauge) = cell else {
-        panic!("{cell:?}");
-    };
+    let gauge = super::gauge(&mut Fields::read(&gauge).unwrap()).unwrap();
     assert_eq!((gauge.capacity.0, gauge.filter), (25.0, Some(4)));
 }
 
@@ -180,7 +185,6 @@ fn a_stand_is_one_device() {
     let text = "device = \"mark10-stand\"\nport = \"/dev/ttyUSB0\"\ntravel_mm = 300\nspeed_max_mm_s = 10\n\
         acceleration_mm_s2 = 100\n[cell]\ncapacity_n = 25\n";
     let file = RigFile::parse("stand.toml", text).unwrap();
-    assert!(matches!(file, RigFile::Stand { .. }), "{file:?}");
     assert_eq!(file.places().len(), 1);
 }
 
@@ -212,12 +216,12 @@ fn what_a_grbl_board_cannot_do_is_told_with_its_line() {
     );
     let probe = PARTS.replace("\"probe\"\n", "\"probe\"\nclosed_is_home = true\n");
     assert_eq!(mistakes(&probe)[0].0, 8);
-    let RigFile::Grbl { settings, .. } =
-        RigFile::parse("bench.toml", &probe.replace("\"probe\"", "\"limit\"")).unwrap()
-    else {
-        panic!("no parts");
-    };
-    assert!(settings.is_closed_home);
+    let limit = probe.replace("\"probe\"", "\"limit\"");
+    assert_eq!(
+        RigFile::parse("bench.toml", &limit).unwrap().places().len(),
+        2
+    );
+    assert!(grbl_settings(&limit).1.is_closed_home);
 }
 
 #[test]

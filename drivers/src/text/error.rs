@@ -1,5 +1,7 @@
 //! Why a device that speaks in lines cannot be used, in words.
 
+use crate::devices::{DeviceKind, lines_of};
+use crate::galil;
 use std::io;
 use thiserror::Error;
 
@@ -70,21 +72,9 @@ const QUOTE_MAX: usize = 60;
 #[must_use]
 pub fn stranger(said: &[u8]) -> String {
     let text = String::from_utf8_lossy(said);
-    let has = |part: &str| text.contains(part);
-    let named = if has("Grbl") || has("[MSG:") || has("error:") || has("ALARM:") {
-        Some("a Grbl controller")
-    } else if has(",palpate-hx711,") || has("D,") && has("*") {
-        Some("an HX711 board")
-    } else if has("DMC") || is_prompts(&text) {
-        Some("a Galil controller")
-    } else if has(" mm") || has(" in\r") {
-        Some("a Mark-10 stand")
-    } else if has(";CUR;") || has(" N\r") || has(" lbF") || has("*10") {
-        Some("a Mark-10 gauge")
-    } else {
-        None
-    };
-    named.map_or_else(
+    let known = DeviceKind::of_lines(&lines_of(&text)).map(|(kind, _)| kind.title);
+    let known = known.or_else(|| is_prompts(&text).then_some(galil::KIND.title));
+    known.map_or_else(
         || {
             let quote: String = text.chars().take(QUOTE_MAX).collect();
             format!("something that says {quote:?}")

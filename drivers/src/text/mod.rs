@@ -1,11 +1,13 @@
 //! Devices that speak in lines of text: what came cut into lines, and question and answer while one is opened.
 
 mod console;
+mod decimal;
 mod error;
 mod lines;
 mod opened;
 
 pub use console::TextConsole;
+pub use decimal::Decimal;
 pub use error::{DeviceError, stranger};
 pub use lines::{Lines, Taken};
 pub use opened::OpenedCell;

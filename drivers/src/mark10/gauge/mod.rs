@@ -4,10 +4,31 @@ mod dialogue;
 mod open;
 
 pub use dialogue::{GaugeDialogue, GaugeScale};
-pub use open::open;
 pub(crate) use open::{check, check_list, commands, filters};
 
+use super::protocol::GaugeLine;
+use crate::devices::{DeviceKind, Role, first};
+use crate::rig_file::{Fields, gauge};
 use palpate_model::units::{Newtons, Volts};
+use std::sync::Arc;
+
+pub(crate) const KIND: DeviceKind = DeviceKind {
+    word: "mark10",
+    title: "a Mark-10 gauge",
+    introduction: "force gauge that reads ",
+    role: Role::Cell {
+        read: |fields: &mut Fields| Some(Arc::new(gauge(fields)?)),
+        emulation: None,
+    },
+    recognise: |lines| {
+        first(lines, |line| {
+            matches!(
+                GaugeLine::parse(line),
+                GaugeLine::Reading(_) | GaugeLine::List(_) | GaugeLine::Error(_)
+            )
+        })
+    },
+};
 
 /// Rates of `AOUT` (Model 7i user's guide, page 30).
 pub const RATES: [u16; 8] = [1, 2, 5, 10, 25, 50, 125, 250];

@@ -2,7 +2,7 @@
 
 use super::dialogue::{GaugeDialogue, GaugeScale};
 use super::{FAREWELL, FILTER_MAX, GaugeSettings, RATES};
-use crate::cell::CellDescription;
+use crate::cell::{CellDescription, CellDevice};
 use crate::mark10::protocol::{GaugeLine, GaugeList, Reading};
 use crate::text::{DeviceError, OpenedCell, TextConsole, stranger};
 use crate::wire::{HostClock, Link};
@@ -22,47 +22,50 @@ const MEASURE_MAX: Nanos = Nanos::from_millis(3_000);
 /// A rate that is further off than a converter's packets explain is another one.
 const RATE_OFF: f64 = 0.25;
 
-/// Makes sure which gauge it is, sets it up and lets it send.
-pub fn open(
-    link: &mut dyn Link,
-    clock: &HostClock,
-    settings: &GaugeSettings,
-    name: &Arc<str>,
-) -> Result<OpenedCell, DeviceError> {
-    check(settings)?;
-    let mut console = TextConsole::new(link, clock, name, DEVICE);
-    let found = quieten(&mut console)?;
-    let model = identify(&mut console, settings, &found)?;
-    let set = set_up(&mut console, settings)?;
-    console.write("?C\r")?;
-    let like = reading(&mut console)?.ok_or_else(|| unfit("it gives no reading to ?C".into()))?;
-    let scale = GaugeScale::new(like, settings.capacity);
-    console.write(&format!("AOUT{}\r", settings.per_second))?;
-    let rate = measure(&mut console, scale, settings.per_second)?;
-    let step = Volts(scale.volts_per_count());
-    let filters = filters(&set);
-    let description = CellDescription {
-        identity: format!(
-            "{model}firmware {}, {} to {}, {rate} readings a second{filters}",
-            set.firmware, step.0, settings.capacity
-        ),
-        adc: AdcDescription {
-            counts_min: -scale.counts_max,
-            counts_max: scale.counts_max,
-            volts_per_count: step.0,
-        },
-        noise_expected: settings.noise_expected(step),
-        rate,
-        // Nothing is published of what its filters take.
-        delay: Nanos::ZERO,
-        newtons_per_volt: Some(1.0),
-    };
-    Ok(OpenedCell {
-        description,
-        dialogue: Box::new(GaugeDialogue::new(scale, rate, console.now())),
-        raw: console.link.raw,
-        farewell: FAREWELL.to_vec(),
-    })
+impl CellDevice for GaugeSettings {
+    /// Makes sure which gauge it is, sets it up and lets it send.
+    fn open(
+        &self,
+        link: &mut dyn Link,
+        clock: &HostClock,
+        name: &Arc<str>,
+    ) -> Result<OpenedCell, DeviceError> {
+        check(self)?;
+        let mut console = TextConsole::new(link, clock, name, DEVICE);
+        let found = quieten(&mut console)?;
+        let model = identify(&mut console, self, &found)?;
+        let set = set_up(&mut console, self)?;
+        console.write("?C\r")?;
+        let like =
+            reading(&mut console)?.ok_or_else(|| unfit("it gives no reading to ?C".into()))?;
+        let scale = GaugeScale::new(like, self.capacity);
+        console.write(&format!("AOUT{}\r", self.per_second))?;
+        let rate = measure(&mut console, scale, self.per_second)?;
+        let step = Volts(scale.volts_per_count());
+        let filters = filters(&set);
+        let description = CellDescription {
+            identity: format!(
+                "{model}firmware {}, {} to {}, {rate} readings a second{filters}",
+                set.firmware, step.0, self.capacity
+            ),
+            adc: AdcDescription {
+                counts_min: -scale.counts_max,
+                counts_max: scale.counts_max,
+                volts_per_count: step.0,
+            },
+            noise_expected: self.noise_expected(step),
+            rate,
+            // Nothing is published of what its filters take.
+            delay: Nanos::ZERO,
+            newtons_per_volt: Some(1.0),
+        };
+        Ok(OpenedCell {
+            description,
+            dialogue: Box::new(GaugeDialogue::new(scale, rate, console.now())),
+            raw: console.link.raw,
+            farewell: FAREWELL.to_vec(),
+        })
+    }
 }
 
 /// What no gauge can do.
@@ -166,13 +169,7 @@ fn set_up(
     console: &mut TextConsole<'_>,
     settings: &GaugeSettings,
 ) -> Result<GaugeList, DeviceError> {
-    let polarity = format!("IPOL{}", u8::from(settings.is_reversed));
-    let mut commands = vec!["N", "CUR", "FULL", &polarity, "OPOL0", "AOFF0"];
-    let filters = settings
-        .filter
-        .map(|n| [format!("FLTC{n}"), format!("FLTP{n}")]);
-    commands.extend(filters.iter().flatten().map(String::as_str));
-    for command in commands {
+    for command in commands(settings) {
         console.write(&format!("{command}\r"))?;
         // Silent when it is done, and the language does not say how fast one may follow the other.
         console.drain(Nanos(QUIET.0 / 3))?;

@@ -26,7 +26,23 @@ pub use rig::{StandDevice, StandRig, open};
 pub use session::{Pace, StandSession};
 
 use super::gauge::GaugeSettings;
+use super::protocol::GaugeLine;
+use crate::devices::{DeviceKind, Role, first};
+use crate::rig_file;
 use palpate_model::units::{MmPerS, MmPerS2, Position, Seconds};
+
+pub(crate) const KIND: DeviceKind = DeviceKind {
+    word: "mark10-stand",
+    title: "a Mark-10 stand",
+    introduction: "force stand at ",
+    role: Role::Axis(rig_file::stand),
+    // A travel alone may be that of any caliper.
+    recognise: |lines| {
+        let is_reading = |line: &str| matches!(GaugeLine::parse(line), GaugeLine::Reading(_));
+        first(lines, is_reading)?;
+        first(lines, |line| protocol::travel(line).is_some())
+    },
+};
 
 /// Smallest step of a travel limit, and so of a move.
 pub const MM_PER_PULSE: f64 = 0.01;

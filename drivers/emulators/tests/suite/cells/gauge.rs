@@ -1,7 +1,8 @@
 //! The Mark-10 gauge.
 
 use super::bench::{CellBench, Stranger};
-use palpate_drivers::mark10::gauge::{GaugeSettings, open};
+use palpate_drivers::cell::CellDevice;
+use palpate_drivers::mark10::gauge::GaugeSettings;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
 use palpate_emulators::cell::EmulatedCell;
@@ -16,12 +17,7 @@ fn opened<E: EmulatedCell>(
     bench: &CellBench<E>,
     settings: &GaugeSettings,
 ) -> Result<OpenedCell, DeviceError> {
-    open(
-        &mut bench.clone(),
-        &bench.clock(),
-        settings,
-        &"gauge".into(),
-    )
+    settings.open(&mut bench.clone(), &bench.clock(), &"gauge".into())
 }
 
 fn refused<E: EmulatedCell>(bench: &CellBench<E>, settings: &GaugeSettings) -> String {

@@ -1,8 +1,8 @@
 //! The HX711 board.
 
 use super::bench::{CellBench, Stranger};
-use palpate_drivers::cell::CellDescription;
-use palpate_drivers::hx711::{Hx711Settings, open};
+use palpate_drivers::cell::{CellDescription, CellDevice};
+use palpate_drivers::hx711::Hx711Settings;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
 use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
@@ -16,12 +16,7 @@ fn opened<E: palpate_emulators::cell::EmulatedCell>(
     bench: &CellBench<E>,
     settings: &Hx711Settings,
 ) -> Result<OpenedCell, DeviceError> {
-    open(
-        &mut bench.clone(),
-        &bench.clock(),
-        settings,
-        &"hx711".into(),
-    )
+    settings.open(&mut bench.clone(), &bench.clock(), &"hx711".into())
 }
 
 fn usual() -> (CellBench<EmulatedHx711>, OpenedCell) {

@@ -1,10 +1,10 @@
 //! Random bytes: no panic, bounded memory, equal events however they are cut.
 
 use super::bench::CellBench;
-use palpate_drivers::cell::{CellDialogue, CellSample};
+use palpate_drivers::cell::{CellDevice, CellDialogue, CellSample};
 use palpate_drivers::hx711::protocol::{Header, Message, line};
-use palpate_drivers::hx711::{self, Hx711Dialogue, Hx711Settings};
-use palpate_drivers::mark10::gauge::{self, GaugeDialogue, GaugeScale, GaugeSettings};
+use palpate_drivers::hx711::{Hx711Dialogue, Hx711Settings};
+use palpate_drivers::mark10::gauge::{GaugeDialogue, GaugeScale, GaugeSettings};
 use palpate_drivers::mark10::protocol::ForceUnit;
 use palpate_drivers::text::{DeviceError, OpenedCell};
 use palpate_emulators::DeviceFault;
@@ -200,20 +200,12 @@ fn opening_comes_to_an_end_whoever_answers() {
         let babbler = || CellBench::new(Babbler(Dice(Pcg64::new(seed, 29))));
         let name = "cell".into();
         let bench = babbler();
-        let opened = hx711::open(
-            &mut bench.clone(),
-            &bench.clock(),
-            &Hx711Settings::default(),
-            &name,
-        );
+        let settings = Hx711Settings::default();
+        let opened = settings.open(&mut bench.clone(), &bench.clock(), &name);
         check(&bench, opened, seed);
         let bench = babbler();
-        let opened = gauge::open(
-            &mut bench.clone(),
-            &bench.clock(),
-            &GaugeSettings::default(),
-            &name,
-        );
+        let settings = GaugeSettings::default();
+        let opened = settings.open(&mut bench.clone(), &bench.clock(), &name);
         check(&bench, opened, seed);
     }
 }

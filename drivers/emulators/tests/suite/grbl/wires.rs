@@ -6,10 +6,8 @@ use palpate_drivers::wire::HostClock;
 use palpate_drivers::{Rig, RigEventBody};
 use palpate_emulators::ScheduledFault;
 use palpate_emulators::bench::Bench;
-use palpate_emulators::cell::EmulatedCell;
+use palpate_emulators::cell::emulated_cell;
 use palpate_emulators::grbl::{Grbl, GrblSettings};
-use palpate_emulators::hx711::{EmulatedHx711, EmulatedHx711Settings};
-use palpate_emulators::mark10::{EmulatedGauge, EmulatedGaugeSettings};
 use palpate_emulators::serve::{Place, ServeOptions, Told, serve};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Fault, MoveTo, PathTracker, Reading, RigCommand};
@@ -40,12 +38,12 @@ impl Drop for Served {
 }
 
 /// `None`, with a word, where there are no pseudo-terminals.
-fn start(is_gauge: bool, faults: Vec<ScheduledFault>) -> Option<Served> {
-    start_at(is_gauge, faults, vec![None, None])
+fn start(cell: &'static str, faults: Vec<ScheduledFault>) -> Option<Served> {
+    start_at(cell, faults, vec![None, None])
 }
 
 fn start_at(
-    is_gauge: bool,
+    cell: &'static str,
     faults: Vec<ScheduledFault>,
     links: Vec<Option<PathBuf>>,
 ) -> Option<Served> {
@@ -59,11 +57,7 @@ fn start_at(
     let thread = std::thread::Builder::new()
         .name("emulator".into())
         .spawn(move || {
-            let cell: Box<dyn EmulatedCell> = if is_gauge {
-                Box::new(EmulatedGauge::new(EmulatedGaugeSettings::default()))
-            } else {
-                Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
-            };
+            let cell = emulated_cell(cell, 1).expect("it is emulated");
             let board = Grbl::new(GrblSettings::default());
             let mut device = Bench::new(&SimSettings::default(), Box::new(board), cell);
             let options = ServeOptions {
@@ -169,12 +163,12 @@ const GAUGE: &str = "device = \"mark10\"\ncapacity_n = 25";
 
 #[test]
 fn samples_follow_the_path_with_either_cell() {
-    for (is_gauge, cell) in [(false, HX711), (true, GAUGE)] {
-        let Some(served) = start(is_gauge, Vec::new()) else {
+    for (word, cell, newtons_per_volt) in [("hx711", HX711, None), ("mark10", GAUGE, Some(1.0))] {
+        let Some(served) = start(word, Vec::new()) else {
             return;
         };
         let mut client = Client::open(&served, cell);
-        assert_eq!(client.rig.newtons_per_volt(), is_gauge.then_some(1.0));
+        assert_eq!(client.rig.newtons_per_volt(), newtons_per_volt);
         assert_eq!(client.rig.links().len(), 2);
         let mut tracker = PathTracker::new(client.rig.description());
         client.tell(RigCommand::EnableMotor);
@@ -218,7 +212,7 @@ fn samples_follow_the_path_with_either_cell() {
 
 #[test]
 fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
-    let Some(served) = start(false, Vec::new()) else {
+    let Some(served) = start("hx711", Vec::new()) else {
         return;
     };
     let mut client = Client::open(&served, HX711);
@@ -243,7 +237,7 @@ fn a_stop_ends_a_move_and_both_ends_of_a_pulled_plug_are_told() {
 
 #[test]
 fn a_cell_that_falls_silent_stops_the_axis() {
-    let Some(served) = start(false, Vec::new()) else {
+    let Some(served) = start("hx711", Vec::new()) else {
         return;
     };
     let mut client = Client::open(&served, HX711);
@@ -270,7 +264,7 @@ fn a_cell_that_falls_silent_stops_the_axis() {
 fn both_plugs_pulled_and_put_back_the_rig_is_connected_anew_and_nothing_moves() {
     let folder = tempfile::tempdir().expect("a folder");
     let links = ["board", "cell"].map(|name| Some(folder.path().join(name)));
-    let Some(served) = start_at(false, Vec::new(), links.to_vec()) else {
+    let Some(served) = start_at("hx711", Vec::new(), links.to_vec()) else {
         return;
     };
     let mut client = Client::open(&served, HX711);
