@@ -14,9 +14,9 @@ use super::settings::GalilSettings;
 use super::sine::Feed;
 use super::timing::Timing;
 use crate::rig::RigEventBody;
-use crate::wire::{Dialogue, LinkStats};
+use crate::wire::{Answers, Dialogue, LinkStats};
 use palpate_model::Nanos;
-use palpate_model::rig::{Ack, Fault, RigCommand};
+use palpate_model::rig::RigCommand;
 use search::{MARKERS_MAX, QUIET, Search};
 use std::collections::VecDeque;
 
@@ -72,13 +72,6 @@ enum Asked {
     Marker(u32),
 }
 
-/// A command that was not answered for yet.
-#[derive(Clone, Debug)]
-struct Owed {
-    number: u64,
-    answer: Option<RigEventBody>,
-}
-
 /// A line to be written.
 #[derive(Clone, Debug, PartialEq)]
 struct Outgoing {
@@ -117,9 +110,7 @@ pub struct Session {
     beginning: Option<(Outgoing, Nanos)>,
     orders: VecDeque<(u64, RigCommand)>,
     order: Option<(u64, Order)>,
-    /// Commands in the order in which they came, so that answers come in it too.
-    owed: VecDeque<Owed>,
-    commands: u64,
+    answers: Answers,
     is_motion_begun: bool,
     search: Option<Search>,
     /// Stops whose answers went by while the order was being looked for.
@@ -163,8 +154,7 @@ impl Session {
             beginning: None,
             orders: VecDeque::new(),
             order: None,
-            owed: VecDeque::new(),
-            commands: 0,
+            answers: Answers::default(),
             is_motion_begun: false,
             search: None,
             unconfirmed: Vec::new(),
@@ -191,35 +181,20 @@ impl Session {
         }
     }
 
-    /// Notes a command that wants an answer.
-    fn owe(&mut self) -> u64 {
-        self.commands += 1;
-        self.owed.push_back(Owed {
-            number: self.commands,
-            answer: None,
-        });
-        self.commands
-    }
-
-    /// Answers a command; it is told when all before it are answered.
-    fn answer(&mut self, now: Nanos, number: u64, answer: RigEventBody) {
-        if let Some(owed) = self.owed.iter_mut().find(|owed| owed.number == number) {
-            owed.answer = Some(answer);
-        }
-        while let Some(answer) = self.owed.front_mut().and_then(|owed| owed.answer.take()) {
-            self.owed.pop_front();
-            self.report_in_order(now, answer);
-        }
-    }
-
     fn acknowledge(&mut self, now: Nanos, number: u64, command: RigCommand) {
-        self.answer(now, number, RigEventBody::Ack(Ack { command }));
+        self.answers.acknowledge(number, command);
+        self.tell_answers(now);
     }
 
     fn refuse(&mut self, now: Nanos, number: u64, detail: impl Into<String>) {
-        let detail = detail.into();
-        let fault = Fault::CommandRefused { detail };
-        self.answer(now, number, RigEventBody::Fault(fault));
+        self.answers.refuse(number, detail);
+        self.tell_answers(now);
+    }
+
+    fn tell_answers(&mut self, now: Nanos) {
+        while let Some(answer) = self.answers.take() {
+            self.report_in_order(now, answer);
+        }
     }
 }
 
@@ -234,7 +209,7 @@ impl Dialogue for Session {
             self.stop(now, command);
             return;
         }
-        let number = self.owe();
+        let number = self.answers.owe();
         if self.is_reset {
             self.refuse(now, number, RESET);
         } else if self.orders.len() >= ORDERS_MAX {

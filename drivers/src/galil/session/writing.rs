@@ -35,7 +35,7 @@ impl Session {
     pub(super) fn stop(&mut self, now: Nanos, command: RigCommand) {
         self.sine = None;
         self.drop_motions(now, OVERTAKEN);
-        let number = self.owe();
+        let number = self.answers.owe();
         let halting = Halting {
             number: Some(number),
             command,
