@@ -15,6 +15,7 @@ pub const DEVICES: &[DeviceKind] = &[
     mark10::stand::KIND,
     hx711::KIND,
     mark10::gauge::KIND,
+    crate::plain_numbers::KIND,
 ];
 
 /// A kind of device.

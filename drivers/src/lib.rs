@@ -17,6 +17,7 @@ pub mod hx711;
 pub mod mark10;
 pub mod open;
 pub mod parts;
+pub mod plain_numbers;
 pub mod priority;
 pub mod rig;
 pub mod rig_file;

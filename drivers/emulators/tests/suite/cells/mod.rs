@@ -3,5 +3,6 @@
 mod bench;
 mod gauge;
 mod hx711;
+mod plain_numbers;
 mod sketch;
 mod streams;

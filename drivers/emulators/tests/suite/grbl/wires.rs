@@ -159,11 +159,16 @@ fn to(target_pulses: i64, speed: f64) -> MoveTo {
 }
 
 const HX711: &str = "device = \"hx711\"";
+const NUMBERS: &str = "device = \"plain-numbers\"\nunit = \"counts\"\nfull_scale = 8388607";
 const GAUGE: &str = "device = \"mark10\"\ncapacity_n = 25";
 
 #[test]
-fn samples_follow_the_path_with_either_cell() {
-    for (word, cell, newtons_per_volt) in [("hx711", HX711, None), ("mark10", GAUGE, Some(1.0))] {
+fn samples_follow_the_path_with_every_cell() {
+    for (word, cell, newtons_per_volt) in [
+        ("hx711", HX711, None),
+        ("mark10", GAUGE, Some(1.0)),
+        ("plain-numbers", NUMBERS, None),
+    ] {
         let Some(served) = start(word, Vec::new()) else {
             return;
         };
