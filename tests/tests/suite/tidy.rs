@@ -215,20 +215,6 @@ fn colours_live_in_the_tokens() {
 }
 
 #[test]
-fn doubles_are_for_tests_only() {
-    for package in ["app", "protocols", "sessions"] {
-        for file in files_below(&workspace().join(package).join("src"), "rs") {
-            let text = fs::read_to_string(&file).unwrap();
-            assert!(
-                !text.contains("palpate_drivers::doubles"),
-                "{} names a test double",
-                file.display()
-            );
-        }
-    }
-}
-
-#[test]
 fn files_stay_readable() {
     for package in TOPS {
         for file in files_below(&workspace().join(package), "rs") {
