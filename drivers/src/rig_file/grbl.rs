@@ -1,13 +1,11 @@
 //! The keys of a Grbl board.
 
 use super::RigFile;
-use super::fields::Fields;
+use super::fields::{DIRECTIONS, Fields};
 use super::place::place;
-use crate::device::DeviceRig;
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
 use crate::parts::Parts;
 use crate::wire::Place;
-use palpate_model::units::{MmPerS, MmPerS2, Position};
 
 /// A rig with the board and the load cell beside it of a rig file.
 pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
@@ -21,13 +19,8 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
         );
         return None;
     }
-    Some(RigFile::new(
-        vec![axis.0.clone(), cell.0.clone()],
-        move |clock| {
-            let parts = Parts::new(axis.clone(), cell.clone());
-            Ok(Box::new(DeviceRig::open(parts, clock.clone())?))
-        },
-    ))
+    let places = vec![axis.0.clone(), cell.0.clone()];
+    Some(RigFile::of(places, Parts::new(axis, cell)))
 }
 
 /// Where the board is, and how it is wired.
@@ -43,15 +36,8 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             "Grbl tells places in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
         );
     }
-    let is_reversed = fields.choice(
-        "direction",
-        &[("forward", false), ("reverse", true)],
-        Some(false),
-    );
-    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
-    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
-    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
-    let unseen = fields.unseen();
+    let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
+    let limits = fields.limits();
     let home = fields.choice(
         "home_switch",
         &[("limit", HomeSwitch::Limit), ("probe", HomeSwitch::Probe)],
@@ -66,6 +52,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
     }
     let build_info = fields.text("build_info");
     let is_unlocking = fields.flag("unlock").unwrap_or(false);
+    let limits = limits?;
     Some((
         place?,
         GrblSettings {
@@ -73,10 +60,10 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             axis: axis?,
             mm_per_pulse: mm_per_pulse?,
             is_reversed: is_reversed?,
-            travel: Position(travel?),
-            speed_max: MmPerS(speed_max?),
-            acceleration: MmPerS2(acceleration?),
-            unseen,
+            travel: limits.travel,
+            speed_max: limits.speed_max,
+            acceleration: limits.acceleration,
+            unseen: limits.unseen,
             home: home?,
             is_closed_home: is_closed_home.unwrap_or(false),
             build_info,
