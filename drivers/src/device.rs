@@ -180,8 +180,8 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
 
     fn reconnect(&mut self) -> Result<(), RigError> {
         // The old links say farewell and are closed, or their ports would be busy with them.
-        self.opened.raw = self.take_raw_of_host();
-        self.opened.lines.clear();
+        let closed = self.opened.lines.drain(..).flat_map(Line::close);
+        self.opened.raw.extend(closed);
         self.pending.clear();
         self.refused.clear();
         let mut opened = self
