@@ -16,7 +16,7 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
 
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
-    let place = place(fields, "", true);
+    let place = place(fields, "");
     let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {

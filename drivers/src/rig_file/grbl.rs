@@ -26,7 +26,7 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
 /// Where the board is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
-    let place = place(fields, "", true);
+    let place = place(fields, "");
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);

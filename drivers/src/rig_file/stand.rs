@@ -16,7 +16,7 @@ pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
 
 /// Where the stand is, and what it is.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
-    let place = place(fields, "", true);
+    let place = place(fields, "");
     let limits = fields.limits();
     let is_upwards = fields.choice("direction", &[("down", false), ("up", true)], Some(false));
     let gauge = gauge(fields);
