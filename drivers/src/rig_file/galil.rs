@@ -30,30 +30,10 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
     let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
     let limits = fields.limits();
-    let motor_type = fields.choice(
-        "motor_type",
-        &[
-            ("active-low", MotorType::ActiveLow),
-            ("active-high", MotorType::ActiveHigh),
-        ],
-        Some(MotorType::ActiveLow),
-    );
-    let levels = [
-        ("active-low", Levels::ActiveLow),
-        ("active-high", Levels::ActiveHigh),
-    ];
-    let limit_switches = fields.choice("limit_switches", &levels, Some(Levels::ActiveLow));
-    let home = fields.choice("home_switch", &levels, Some(Levels::ActiveLow));
-    let range = fields.choice(
-        "range",
-        &[
-            ("-10..10 V", AnalogRange::Bipolar10),
-            ("-5..5 V", AnalogRange::Bipolar5),
-            ("0..5 V", AnalogRange::Unipolar5),
-            ("0..10 V", AnalogRange::Unipolar10),
-        ],
-        Some(AnalogRange::Bipolar10),
-    );
+    let motor_type = fields.choice("motor_type", &MOTOR_TYPES, Some(MotorType::ActiveLow));
+    let limit_switches = fields.choice("limit_switches", &LEVELS, Some(Levels::ActiveLow));
+    let home = fields.choice("home_switch", &LEVELS, Some(Levels::ActiveLow));
+    let range = fields.choice("range", &RANGES, Some(AnalogRange::Bipolar10));
     let bits = fields.choice("converter", &[("12 bit", 12), ("16 bit", 16)], None);
     let noise = fields.number("noise_v", 1e-9, 1.0);
     let filter = fields.text("filter");
@@ -101,6 +81,23 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
         },
     ))
 }
+
+const MOTOR_TYPES: [(&str, MotorType); 2] = [
+    ("active-low", MotorType::ActiveLow),
+    ("active-high", MotorType::ActiveHigh),
+];
+
+const LEVELS: [(&str, Levels); 2] = [
+    ("active-low", Levels::ActiveLow),
+    ("active-high", Levels::ActiveHigh),
+];
+
+const RANGES: [(&str, AnalogRange); 4] = [
+    ("-10..10 V", AnalogRange::Bipolar10),
+    ("-5..5 V", AnalogRange::Bipolar5),
+    ("0..5 V", AnalogRange::Unipolar5),
+    ("0..10 V", AnalogRange::Unipolar10),
+];
 
 const SAMPLINGS: [(&str, Sampling); 3] = [
     ("auto", Sampling::Auto),
