@@ -115,11 +115,9 @@ impl<D: RigDevice> DeviceRig<D> {
             return None;
         };
         loop {
-            let is_any = self.pending.iter().any(Option::is_some);
             let mut left = end.since((self.clock)());
             for (place, line) in self.opened.lines.iter().enumerate() {
-                let is_any = is_any || self.pending.iter().any(Option::is_some);
-                if is_any {
+                if self.pending.iter().any(Option::is_some) {
                     left = Nanos::ZERO;
                 }
                 if self.pending[place].is_none() {
@@ -182,8 +180,8 @@ impl<D: RigDevice> Rig for DeviceRig<D> {
 
     fn reconnect(&mut self) -> Result<(), RigError> {
         // The old links say farewell and are closed, or their ports would be busy with them.
-        self.opened.raw = self.take_raw_of_host();
-        self.opened.lines.clear();
+        let closed = self.opened.lines.drain(..).flat_map(Line::close);
+        self.opened.raw.extend(closed);
         self.pending.clear();
         self.refused.clear();
         let mut opened = self

@@ -3,14 +3,13 @@
 //! This crate turns commands into bytes and bytes into readings. It never decides: what to do
 //! with a reading is the engine's business, and nothing here starts a move by itself.
 //! Start reading at [`rig`], the trait every rig implements, then [`sim`] for the rig that needs
-//! no hardware. [`doubles`] is for tests only.
+//! no hardware.
 
 mod board_clock;
 pub mod cell;
 pub mod detect;
 pub mod device;
 pub mod devices;
-pub mod doubles;
 pub mod galil;
 pub mod grbl;
 pub mod hx711;

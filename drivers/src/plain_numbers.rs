@@ -44,6 +44,8 @@ pub(crate) const KIND: DeviceKind = DeviceKind {
 const DEVICE: &str = "load cell that sends plain numbers";
 /// Opening the port resets an Arduino, whose boot loader waits up to two seconds; sketches take their time to begin.
 const START_MAX: Nanos = Nanos::from_millis(8_000);
+/// Lines that come closer than this may have waited somewhere; looked for ten times as long.
+const BACKLOG: Nanos = Nanos::from_millis(20);
 /// A longer pause between two numbers is a start; slower cells leave the axis too long unseen.
 const PAUSE_MAX: Nanos = Nanos::from_millis(1_100);
 /// The rate is measured over so long, and over so many numbers.
@@ -147,8 +149,11 @@ impl PlainNumbers {
             }
         };
         let number = number.trim();
-        let number = number.strip_prefix('+').unwrap_or(number);
-        Some((ticks, Decimal::parse(number)?))
+        let unsigned = number.strip_prefix('+');
+        if unsigned.is_some_and(|rest| rest.starts_with('-')) {
+            return None;
+        }
+        Some((ticks, Decimal::parse(unsigned.unwrap_or(number))?))
     }
 
     /// Waits for numbers that come one after the other; gives one of them and their rate.
@@ -156,7 +161,8 @@ impl PlainNumbers {
         let start = console.now();
         let mut all: Vec<(Nanos, u32, Decimal)> = Vec::new();
         let mut wrong = None;
-        // The first line may be the end of one.
+        // What somebody has kept for us comes at once and says nothing of the rate; the line behind it may be the end of one.
+        console.drain(BACKLOG)?;
         console.line(START_MAX)?;
         while let Some(left) = START_MAX.0.checked_sub(console.now().since(start).0) {
             let Some((at, line)) = console.line(Nanos(left))? else {

@@ -4,7 +4,7 @@
 //! `cargo run -p palpate-tests --example wired_session -- FOLDER`
 #![expect(clippy::print_stdout, reason = "a program that prints")]
 
-use palpate_drivers::doubles::WiredRig;
+use palpate_doubles::WiredRig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::rig::RawBytes;
 use palpate_model::units::{Depth, MmPerS, Seconds};

@@ -33,8 +33,11 @@ pub trait EmulatedCell: Send {
     fn suffer(&mut self, now: Nanos, fault: DeviceFault, is_on: bool);
 }
 
-/// Emulated load cells beside an axis that are programs of their own, by their words in a rig file; the number is a seed.
-const PROGRAMS: [(&str, fn(u64) -> Box<dyn EmulatedCell>); 2] = [
+/// Makes an emulated load cell out of a seed.
+type Program = fn(u64) -> Box<dyn EmulatedCell>;
+
+/// Emulated load cells beside an axis that are programs of their own, by their words in a rig file.
+const PROGRAMS: [(&str, Program); 2] = [
     ("hx711", |_| {
         Box::new(EmulatedHx711::new(EmulatedHx711Settings::default()))
     }),

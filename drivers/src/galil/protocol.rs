@@ -74,19 +74,9 @@ impl Reply {
 pub struct Parser {
     reply: Vec<u8>,
     unasked: Vec<u8>,
-    /// Bytes of a counted read that are still to come, after which a prompt follows.
-    counted: usize,
-    /// The reply began with a counted read, so that its last bytes are no line end.
-    is_counted: bool,
 }
 
 impl Parser {
-    /// The next reply begins with so many bytes of any value, as that of `QR` does.
-    pub fn expect_bytes(&mut self, count: usize) {
-        self.counted = count.min(REPLY_MAX);
-        self.is_counted = true;
-    }
-
     /// Forgets what has come of a reply.
     pub fn clear(&mut self) {
         *self = Self::default();
@@ -100,19 +90,13 @@ impl Parser {
 
     /// Takes a byte; gives what it completed.
     pub fn take(&mut self, byte: u8) -> Option<Incoming> {
-        if self.counted > 0 {
-            self.counted -= 1;
-            self.reply.push(byte);
-            return None;
-        }
         if byte & 0x80 != 0 {
             return self.take_unasked(byte & 0x7f);
         }
         match byte {
             b':' | b'?' => {
                 let mut bytes = std::mem::take(&mut self.reply);
-                let is_text = !std::mem::take(&mut self.is_counted);
-                while is_text && matches!(bytes.last(), Some(b'\r' | b'\n' | &UPLOAD_END)) {
+                while matches!(bytes.last(), Some(b'\r' | b'\n' | &UPLOAD_END)) {
                     bytes.pop();
                 }
                 Some(Incoming::Reply(Reply {

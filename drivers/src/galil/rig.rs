@@ -11,6 +11,7 @@ use std::sync::Arc;
 pub type GalilRig = DeviceRig<GalilDevice>;
 
 /// A controller to be opened.
+#[derive(Clone)]
 pub struct GalilDevice {
     place: Place,
     settings: GalilSettings,

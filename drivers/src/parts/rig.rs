@@ -26,6 +26,7 @@ pub struct Axis {
 pub type PartsRig = DeviceRig<Parts>;
 
 /// An axis and a load cell to be opened.
+#[derive(Clone)]
 pub struct Parts {
     axis: (Place, GrblSettings),
     cell: (Place, Arc<dyn CellDevice>),

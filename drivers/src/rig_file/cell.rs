@@ -17,7 +17,7 @@ pub(super) fn read(fields: &mut Fields) -> Option<(Place, Arc<dyn CellDevice>)> 
         Role::Axis(_) => None,
     });
     let cell = fields.choice("cell.device", &cells.collect::<Vec<_>>(), None);
-    let place = place(fields, "cell.", true);
+    let place = place(fields, "cell.");
     let cell = cell?(fields)?;
     Some((place?, cell))
 }

@@ -2,7 +2,7 @@
 //! is called `table.key`.
 
 use palpate_model::rig::RigDescription;
-use palpate_model::units::Position;
+use palpate_model::units::{MmPerS, MmPerS2, Position};
 use std::ops::Range;
 use toml::de::{DeTable, DeValue};
 
@@ -39,6 +39,21 @@ struct Field {
     value: Value,
     is_taken: bool,
 }
+
+/// What a slide can do and may do.
+pub(super) struct Limits {
+    /// End of the travel from home.
+    pub travel: Position,
+    /// Fastest speed.
+    pub speed_max: MmPerS,
+    /// Acceleration of every move.
+    pub acceleration: MmPerS2,
+    /// How far the probe may go while no sample comes.
+    pub unseen: Position,
+}
+
+/// Words for where positive positions of a drive lead: from home into the tissue, or the other way.
+pub(super) const DIRECTIONS: [(&str, bool); 2] = [("forward", false), ("reverse", true)];
 
 /// The keys of a file.
 pub struct Fields {
@@ -161,11 +176,19 @@ impl Fields {
         }
     }
 
-    /// How far the probe may go while no sample comes.
-    pub fn unseen(&mut self) -> Position {
+    /// What the slide can do and may do, whatever drives it.
+    pub(super) fn limits(&mut self) -> Option<Limits> {
+        let travel = self.needed("travel_mm", 1.0, 10_000.0);
+        let speed_max = self.needed("speed_max_mm_s", 1e-3, 1000.0);
+        let acceleration = self.needed("acceleration_mm_s2", 1e-3, 1e6);
         // Less is below what a desktop computer's pauses leave at any speed; more is deep for a force nobody saw.
         let unseen = self.number("unseen_mm", 0.02, 0.5);
-        unseen.map_or(RigDescription::UNSEEN_USUAL, Position)
+        Some(Limits {
+            travel: Position(travel?),
+            speed_max: MmPerS(speed_max?),
+            acceleration: MmPerS2(acceleration?),
+            unseen: unseen.map_or(RigDescription::UNSEEN_USUAL, Position),
+        })
     }
 
     /// A number within bounds that must be there.

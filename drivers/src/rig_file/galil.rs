@@ -1,12 +1,18 @@
 //! The keys of a Galil controller.
 
 use super::RigFile;
-use super::fields::Fields;
+use super::fields::{DIRECTIONS, Fields};
 use super::place::place;
-use crate::device::DeviceRig;
 use crate::galil::{AnalogRange, GalilDevice, GalilSettings, Levels, MotorType, Sampling};
 use crate::wire::Place;
-use palpate_model::units::{MmPerS, MmPerS2, Position, Volts};
+use palpate_model::units::Volts;
+
+/// A rig with the controller of a rig file.
+pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
+    let (place, settings) = read(name, fields)?;
+    let device = GalilDevice::new(place.clone(), settings);
+    Some(RigFile::of(vec![place], device))
+}
 
 /// A rig with the controller of a rig file.
 pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
@@ -19,7 +25,7 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
 
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
-    let place = place(fields, "", true);
+    let place = place(fields, "");
     let serial_number = fields.whole("serial_number", 0, 1_000_000_000_000_000);
     let axis = fields.text("axis").unwrap_or_else(|| "A".into());
     let axis = match axis.as_bytes() {
@@ -31,39 +37,12 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     };
     let input = fields.whole("input", 1, 8).unwrap_or(1);
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
-    let is_reversed = fields.choice(
-        "direction",
-        &[("forward", false), ("reverse", true)],
-        Some(false),
-    );
-    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
-    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
-    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
-    let unseen = fields.unseen();
-    let motor_type = fields.choice(
-        "motor_type",
-        &[
-            ("active-low", MotorType::ActiveLow),
-            ("active-high", MotorType::ActiveHigh),
-        ],
-        Some(MotorType::ActiveLow),
-    );
-    let levels = [
-        ("active-low", Levels::ActiveLow),
-        ("active-high", Levels::ActiveHigh),
-    ];
-    let limits = fields.choice("limit_switches", &levels, Some(Levels::ActiveLow));
-    let home = fields.choice("home_switch", &levels, Some(Levels::ActiveLow));
-    let range = fields.choice(
-        "range",
-        &[
-            ("-10..10 V", AnalogRange::Bipolar10),
-            ("-5..5 V", AnalogRange::Bipolar5),
-            ("0..5 V", AnalogRange::Unipolar5),
-            ("0..10 V", AnalogRange::Unipolar10),
-        ],
-        Some(AnalogRange::Bipolar10),
-    );
+    let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
+    let limits = fields.limits();
+    let motor_type = fields.choice("motor_type", &MOTOR_TYPES, Some(MotorType::ActiveLow));
+    let limit_switches = fields.choice("limit_switches", &LEVELS, Some(Levels::ActiveLow));
+    let home = fields.choice("home_switch", &LEVELS, Some(Levels::ActiveLow));
+    let range = fields.choice("range", &RANGES, Some(AnalogRange::Bipolar10));
     let bits = fields.choice("converter", &[("12 bit", 12), ("16 bit", 16)], None);
     let noise = fields.number("noise_v", 1e-9, 1.0);
     let filter = fields.text("filter");
@@ -71,9 +50,9 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
     let sampling = fields.choice("sampling", &SAMPLINGS, Some(Sampling::Auto));
     // Up to 1000, as `TM` starts; at 500 the watchdog is still renewed often enough.
     let sample_us = fields.whole("sample_us", 500, 1000);
-    let (mm_per_pulse, acceleration) = (mm_per_pulse?, acceleration?);
+    let (mm_per_pulse, limits) = (mm_per_pulse?, limits?);
     // The least acceleration that the controller makes (`AC`, DMC-40x0 command reference).
-    if acceleration / mm_per_pulse < 1024.0 {
+    if limits.acceleration.0 / mm_per_pulse < 1024.0 {
         let least = 1024.0 * mm_per_pulse;
         fields.mistake(
             "acceleration_mm_s2",
@@ -92,12 +71,12 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
             input: input as u8,
             mm_per_pulse,
             is_reversed: is_reversed?,
-            travel: Position(travel?),
-            speed_max: MmPerS(speed_max?),
-            acceleration: MmPerS2(acceleration),
-            unseen,
+            travel: limits.travel,
+            speed_max: limits.speed_max,
+            acceleration: limits.acceleration,
+            unseen: limits.unseen,
             motor_type: motor_type?,
-            limits: limits?,
+            limits: limit_switches?,
             home: home?,
             range,
             bits,
@@ -111,6 +90,23 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSet
         },
     ))
 }
+
+const MOTOR_TYPES: [(&str, MotorType); 2] = [
+    ("active-low", MotorType::ActiveLow),
+    ("active-high", MotorType::ActiveHigh),
+];
+
+const LEVELS: [(&str, Levels); 2] = [
+    ("active-low", Levels::ActiveLow),
+    ("active-high", Levels::ActiveHigh),
+];
+
+const RANGES: [(&str, AnalogRange); 4] = [
+    ("-10..10 V", AnalogRange::Bipolar10),
+    ("-5..5 V", AnalogRange::Bipolar5),
+    ("0..5 V", AnalogRange::Unipolar5),
+    ("0..10 V", AnalogRange::Unipolar10),
+];
 
 const SAMPLINGS: [(&str, Sampling); 3] = [
     ("auto", Sampling::Auto),

@@ -1,13 +1,28 @@
 //! The keys of a Grbl board.
 
 use super::RigFile;
-use super::fields::Fields;
+use super::fields::{DIRECTIONS, Fields};
 use super::place::place;
 use crate::device::DeviceRig;
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
 use crate::parts::Parts;
 use crate::wire::Place;
-use palpate_model::units::{MmPerS, MmPerS2, Position};
+
+/// A rig with the board and the load cell beside it of a rig file.
+pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
+    // Both are read, so that the mistakes of both are told.
+    let (axis, cell) = (read(name, fields), super::cell::read(fields));
+    let (axis, cell) = (axis?, cell?);
+    if axis.0 == cell.0 {
+        fields.mistake(
+            "cell.port",
+            "the board is at this port; the load cell has another",
+        );
+        return None;
+    }
+    let places = vec![axis.0.clone(), cell.0.clone()];
+    Some(RigFile::of(places, Parts::new(axis, cell)))
+}
 
 /// A rig with the board and the load cell beside it of a rig file.
 pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
@@ -33,7 +48,7 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
 /// Where the board is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSettings)> {
     // A pseudo-terminal or a port; servers for serial ports on a network do no harm either.
-    let place = place(fields, "", true);
+    let place = place(fields, "");
     let axes = [("X", 'X'), ("Y", 'Y'), ("Z", 'Z')];
     let axis = fields.choice("axis", &axes, Some('X'));
     let mm_per_pulse = fields.needed("mm_per_pulse", 1e-6, 1.0);
@@ -43,15 +58,8 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             "Grbl tells places in thousandths of a mm, so a step must not be shorter; set the drive to coarser microsteps",
         );
     }
-    let is_reversed = fields.choice(
-        "direction",
-        &[("forward", false), ("reverse", true)],
-        Some(false),
-    );
-    let travel = fields.needed("travel_mm", 1.0, 10_000.0);
-    let speed_max = fields.needed("speed_max_mm_s", 1e-3, 1000.0);
-    let acceleration = fields.needed("acceleration_mm_s2", 1e-3, 1e6);
-    let unseen = fields.unseen();
+    let is_reversed = fields.choice("direction", &DIRECTIONS, Some(false));
+    let limits = fields.limits();
     let home = fields.choice(
         "home_switch",
         &[("limit", HomeSwitch::Limit), ("probe", HomeSwitch::Probe)],
@@ -66,6 +74,7 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
     }
     let build_info = fields.text("build_info");
     let is_unlocking = fields.flag("unlock").unwrap_or(false);
+    let limits = limits?;
     Some((
         place?,
         GrblSettings {
@@ -73,10 +82,10 @@ pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GrblSett
             axis: axis?,
             mm_per_pulse: mm_per_pulse?,
             is_reversed: is_reversed?,
-            travel: Position(travel?),
-            speed_max: MmPerS(speed_max?),
-            acceleration: MmPerS2(acceleration?),
-            unseen,
+            travel: limits.travel,
+            speed_max: limits.speed_max,
+            acceleration: limits.acceleration,
+            unseen: limits.unseen,
             home: home?,
             is_closed_home: is_closed_home.unwrap_or(false),
             build_info,

@@ -16,7 +16,7 @@ pub(crate) use galil::galil;
 pub(crate) use grbl::grbl;
 pub(crate) use stand::stand;
 
-use crate::device::OpenError;
+use crate::device::{DeviceRig, OpenError, RigDevice};
 use crate::devices::{DEVICES, Role};
 use crate::rig::Rig;
 use crate::wire::{HostClock, Place};
@@ -69,12 +69,13 @@ impl RigFile {
         }
     }
 
-    /// Devices at these places, that of the axis first, and how they are opened.
-    pub(crate) fn new(
-        places: Vec<Place>,
-        open: impl Fn(&HostClock) -> Result<Box<dyn Rig>, OpenError> + Send + Sync + 'static,
-    ) -> Self {
-        let open = Box::new(open);
+    /// A rig whose devices are at these places, that of the axis first.
+    pub(crate) fn of(places: Vec<Place>, device: impl RigDevice + Clone + Sync + 'static) -> Self {
+        let open = Box::new(
+            move |clock: &HostClock| -> Result<Box<dyn Rig>, OpenError> {
+                Ok(Box::new(DeviceRig::open(device.clone(), clock.clone())?))
+            },
+        );
         Self { places, open }
     }
 

@@ -3,16 +3,11 @@
 use super::fields::Fields;
 use crate::wire::Place;
 
-/// Reads `port`, `baud`, `handshake` and, for a device that can be on a network, `address`, behind a table's name and a
-/// dot or nothing.
-pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Option<Place> {
+/// Reads `port`, `baud`, `handshake` and `address`, behind a table's name and a dot or nothing.
+pub(super) fn place(fields: &mut Fields, table: &str) -> Option<Place> {
     let key = |name: &str| format!("{table}{name}");
     let port = fields.text(&key("port"));
-    let address = if has_network {
-        fields.text(&key("address"))
-    } else {
-        None
-    };
+    let address = fields.text(&key("address"));
     let baud = fields.whole(&key("baud"), 300, 4_000_000);
     let has_handshake = fields.choice(
         &key("handshake"),
@@ -41,11 +36,6 @@ pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Opti
             None
         }
         (None, None) => {
-            let network = if has_network {
-                " or address = \"192.168.1.10:23\""
-            } else {
-                ""
-            };
             let what = if table.is_empty() {
                 "controller"
             } else {
@@ -53,7 +43,9 @@ pub(super) fn place(fields: &mut Fields, table: &str, has_network: bool) -> Opti
             };
             fields.mistake(
                 &key("port"),
-                &format!("where is the {what}? Give port = \"/dev/ttyUSB0\"{network}"),
+                &format!(
+                    "where is the {what}? Give port = \"/dev/ttyUSB0\" or address = \"192.168.1.10:23\""
+                ),
             );
             None
         }

@@ -60,6 +60,17 @@ amount!(
     SimInput, "input", 0, (0..=86_400), "0 to 86400 (whole seconds; 0 for no input)"
 );
 
+amount!(
+    /// How much softer the simulated tissue is where it has been deeper: the largest share of its elastic force that is
+    /// lost, in whole percent. Tissue that lost more than 90 would not come back by itself.
+    SimSoftening, "softening", 0, (0..=90), "0 to 90 (whole percent)"
+);
+amount!(
+    /// Percent of the greatest depth by which the surface recedes in the end, where that is far beyond a centimetre. One
+    /// that recedes further than 30 is no longer found where a second cycle looks for it.
+    SimPreconditioning, "preconditioning", 0, (0..=30), "0 to 30 (whole percent)"
+);
+
 /// Samples a second in thousands. A tick of either clock divides by each of them into whole nanoseconds.
 const KILOHERTZ: [u32; 8] = [1, 2, 4, 5, 8, 10, 16, 20];
 
@@ -115,6 +126,22 @@ impl SimNoise {
 
 impl SimStiffness {
     /// As a share: 1 is usual.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        f64::from(self.0) / 100.0
+    }
+}
+
+impl SimSoftening {
+    /// The share, 0 to 0.9.
+    #[must_use]
+    pub fn share(self) -> f64 {
+        f64::from(self.0) / 100.0
+    }
+}
+
+impl SimPreconditioning {
+    /// The share, 0 to 0.3.
     #[must_use]
     pub fn share(self) -> f64 {
         f64::from(self.0) / 100.0

@@ -18,14 +18,14 @@ mod slider;
 mod tissue;
 
 pub use amounts::{
-    SimBath, SimCompliance, SimInput, SimNoise, SimRate, SimStiffness, SimThickness,
+    SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
+    SimStiffness, SimThickness,
 };
 pub use bench::Bench;
 pub use load_cell::calibration;
 pub use load_cell::{LoadCell, counts_from_volts, volts_from_counts};
-pub use preconditioning::SimPreconditioning;
 pub use random::{Cause, Random};
-pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings, SimSoftening};
+pub use settings::{SimClock, SimProfile, SimSettingError, SimSettings};
 pub use slider::SWITCH_MARGIN_MM;
 
 use crate::rig::{Rig, RigEvent, RigEventBody};

@@ -15,9 +15,7 @@
 //! depth `x - s`. The set grows only where the force is positive and shrinks only where it is zero, so the power
 //! `F ds/dt` that it takes is never negative: no energy comes out of it.
 
-use super::settings::SimSettingError;
-use std::fmt;
-use std::str::FromStr;
+use super::amounts::SimPreconditioning;
 
 /// Ways, in greatest depths, after which the set is all but a share `1/e` of its limit. With it and the usual minute
 /// or minutes of rest, loops of a simulated stomach repeat within a percent after five to nine cycles.
@@ -32,42 +30,6 @@ const HEALING: f64 = 600.0;
 
 /// Forces in N up to here are none: what rounding leaves of a body that has relaxed.
 const FREE: f64 = 1e-9;
-
-/// Percent of the greatest depth by which the surface recedes in the end, where that is far beyond a centimetre.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SimPreconditioning(u8);
-
-/// Largest percentage: a surface that recedes further is no longer found where a second cycle looks for it.
-const PERCENT_MAX: u8 = 30;
-
-impl SimPreconditioning {
-    /// So many percent; `None` above 30.
-    #[must_use]
-    pub fn percent(percent: u8) -> Option<Self> {
-        (percent <= PERCENT_MAX).then_some(Self(percent))
-    }
-
-    /// The share, 0 to 0.3.
-    #[must_use]
-    pub fn share(self) -> f64 {
-        f64::from(self.0) / 100.0
-    }
-}
-
-impl fmt::Display for SimPreconditioning {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl FromStr for SimPreconditioning {
-    type Err = SimSettingError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let percent = text.parse().ok().and_then(Self::percent);
-        percent
-            .ok_or_else(|| SimSettingError::new("preconditioning", text, "0 to 30 (whole percent)"))
-    }
-}
 
 /// How far the surface has receded.
 #[derive(Clone, Copy, Debug)]
@@ -149,7 +111,7 @@ mod tests {
     impl Press {
         fn new(percent: u8) -> Self {
             let settings = SimSettings {
-                preconditioning: SimPreconditioning::percent(percent).unwrap(),
+                preconditioning: percent.to_string().parse().unwrap(),
                 ..SimSettings::default()
             };
             let tissue = Tissue::new(&mut Random::new(4, Cause::Tissue), &settings);

@@ -1,9 +1,9 @@
 //! What makes one simulated rig differ from another; with these values it can be rebuilt.
 
 use super::amounts::{
-    SimBath, SimCompliance, SimInput, SimNoise, SimRate, SimStiffness, SimThickness,
+    SimBath, SimCompliance, SimInput, SimNoise, SimPreconditioning, SimRate, SimSoftening,
+    SimStiffness, SimThickness,
 };
-use super::preconditioning::SimPreconditioning;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::str::FromStr;
@@ -37,28 +37,6 @@ impl SimClock {
             Self::Nominal => 1_000_000,
             Self::Galil => 976_000,
         }
-    }
-}
-
-/// How much softer the simulated tissue is where it has been deeper: the largest share of its elastic force
-/// that is lost, in whole percent, 0 to 90.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub struct SimSoftening(u8);
-
-/// Largest percentage: tissue that loses more would not come back by itself.
-const SOFTENING_MAX: u8 = 90;
-
-impl SimSoftening {
-    /// So many percent; `None` above 90.
-    #[must_use]
-    pub fn percent(percent: u8) -> Option<Self> {
-        (percent <= SOFTENING_MAX).then_some(Self(percent))
-    }
-
-    /// The share, 0 to 0.9.
-    #[must_use]
-    pub fn share(self) -> f64 {
-        f64::from(self.0) / 100.0
     }
 }
 
@@ -145,28 +123,6 @@ impl SimSettings {
         map.extend(unusual.into_iter().flatten());
         map
     }
-
-    /// The inverse of [`SimSettings::to_map`]; other values are ignored.
-    pub fn from_map(map: &BTreeMap<String, String>) -> Result<Self, SimSettingError> {
-        let text = |name: &str| map.get(name).map_or("", String::as_str);
-        let seed = text("seed");
-        Ok(Self {
-            profile: text("profile").parse()?,
-            seed: seed
-                .parse()
-                .map_err(|_| SimSettingError::new("seed", seed, "a whole number from 0"))?,
-            clock: text("clock").parse()?,
-            rate: usual_or(map, "rate")?,
-            softening: usual_or(map, "softening")?,
-            noise: usual_or(map, "noise")?,
-            stiffness: usual_or(map, "stiffness")?,
-            thickness: usual_or(map, "thickness")?,
-            compliance: usual_or(map, "compliance")?,
-            preconditioning: usual_or(map, "preconditioning")?,
-            bath: usual_or(map, "bath")?,
-            input: usual_or(map, "input")?,
-        })
-    }
 }
 
 /// A setting with its name, unless it is the usual one: rigs are described as they always were.
@@ -177,118 +133,95 @@ fn unusual<T: Default + PartialEq + fmt::Display>(
     (value != T::default()).then(|| (name.to_owned(), value.to_string()))
 }
 
-/// A setting by its name, the usual one where it is not given.
-fn usual_or<T: Default + FromStr<Err = SimSettingError>>(
-    map: &BTreeMap<String, String>,
-    name: &str,
-) -> Result<T, SimSettingError> {
-    map.get(name).map_or(Ok(T::default()), |text| text.parse())
-}
-
-impl fmt::Display for SimProfile {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Lab => "lab",
-            Self::Ideal => "ideal",
-        })
-    }
-}
-
-impl FromStr for SimProfile {
-    type Err = SimSettingError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "lab" => Ok(Self::Lab),
-            "ideal" => Ok(Self::Ideal),
-            _ => Err(SimSettingError::new("profile", text, "'lab' or 'ideal'")),
+/// A setting that is one of some words.
+macro_rules! words {
+    ($name:ident, $setting:literal, $choices:literal, $($variant:ident = $word:literal),+) => {
+        impl fmt::Display for $name {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$variant => $word,)+
+                })
+            }
         }
-    }
-}
 
-impl fmt::Display for SimSoftening {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        self.0.fmt(f)
-    }
-}
-
-impl FromStr for SimSoftening {
-    type Err = SimSettingError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        let percent = text.parse().ok().and_then(Self::percent);
-        percent.ok_or_else(|| SimSettingError::new("softening", text, "0 to 90 (whole percent)"))
-    }
-}
-
-impl fmt::Display for SimClock {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Nominal => "nominal",
-            Self::Galil => "galil",
-        })
-    }
-}
-
-impl FromStr for SimClock {
-    type Err = SimSettingError;
-    fn from_str(text: &str) -> Result<Self, Self::Err> {
-        match text {
-            "nominal" => Ok(Self::Nominal),
-            "galil" => Ok(Self::Galil),
-            _ => Err(SimSettingError::new("clock", text, "'nominal' or 'galil'")),
+        impl FromStr for $name {
+            type Err = SimSettingError;
+            fn from_str(text: &str) -> Result<Self, Self::Err> {
+                match text {
+                    $($word => Ok(Self::$variant),)+
+                    _ => Err(SimSettingError::new($setting, text, $choices)),
+                }
+            }
         }
-    }
+    };
 }
+
+words!(
+    SimProfile,
+    "profile",
+    "'lab' or 'ideal'",
+    Lab = "lab",
+    Ideal = "ideal"
+);
+words!(
+    SimClock,
+    "clock",
+    "'nominal' or 'galil'",
+    Nominal = "nominal",
+    Galil = "galil"
+);
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
+    /// Rigs are described as they always were: what is usual is not in the map.
     #[test]
-    fn settings_survive_their_map() {
-        for profile in [SimProfile::Lab, SimProfile::Ideal] {
-            for clock in [SimClock::Nominal, SimClock::Galil] {
-                for percent in [0, 40] {
-                    let settings = SimSettings {
-                        profile,
-                        seed: u64::MAX - 3,
-                        clock,
-                        softening: SimSoftening::percent(percent).unwrap(),
-                        preconditioning: SimPreconditioning::percent(percent / 4).unwrap(),
-                        ..SimSettings::default()
-                    };
-                    let map = settings.to_map();
-                    assert_eq!(SimSettings::from_map(&map), Ok(settings));
-                    // Rigs whose tissue does not soften are described as they always were.
-                    assert_eq!(map.contains_key("softening"), percent > 0);
-                    assert_eq!(map.contains_key("preconditioning"), percent > 0);
-                }
-            }
-        }
-    }
-
-    #[test]
-    fn amounts_survive_their_map_and_usual_ones_are_not_in_it() {
+    fn map_has_every_setting_that_is_not_usual() {
+        let usual = SimSettings::default().to_map();
+        let usual: Vec<_> = usual
+            .iter()
+            .map(|(key, value)| (key.as_str(), value.as_str()))
+            .collect();
+        assert_eq!(
+            usual,
+            [("clock", "nominal"), ("profile", "lab"), ("seed", "0")]
+        );
         let settings = SimSettings {
+            profile: "ideal".parse().unwrap(),
+            seed: u64::MAX - 3,
+            clock: "galil".parse().unwrap(),
             rate: "20000".parse().unwrap(),
+            softening: "40".parse().unwrap(),
             noise: "5".parse().unwrap(),
             stiffness: "200".parse().unwrap(),
             thickness: "12.5".parse().unwrap(),
-            compliance: "40".parse().unwrap(),
+            compliance: "41".parse().unwrap(),
+            preconditioning: "10".parse().unwrap(),
             bath: "37".parse().unwrap(),
             input: "30".parse().unwrap(),
-            ..SimSettings::default()
         };
         let map = settings.to_map();
-        assert_eq!(SimSettings::from_map(&map), Ok(settings));
-        assert_eq!(
-            (map["noise"].as_str(), map["thickness"].as_str()),
-            ("5", "12.5")
-        );
-        assert_eq!(
-            (settings.tick_nanos(), map["rate"].as_str()),
-            (50_000, "20000")
-        );
-        assert_eq!(SimSettings::default().to_map().len(), 3);
+        let map: Vec<_> = map
+            .iter()
+            .map(|(key, value)| (key.as_str(), value.as_str()))
+            .collect();
+        let all = [
+            ("bath", "37"),
+            ("clock", "galil"),
+            ("compliance", "41"),
+            ("input", "30"),
+            ("noise", "5"),
+            ("preconditioning", "10"),
+            ("profile", "ideal"),
+            ("rate", "20000"),
+            ("seed", "18446744073709551612"),
+            ("softening", "40"),
+            ("stiffness", "200"),
+            ("thickness", "12.5"),
+        ];
+        assert_eq!(map, all);
+        assert_eq!(settings.tick_nanos(), 48_800);
     }
 
     #[test]
@@ -301,11 +234,9 @@ mod tests {
         let err = "91".parse::<SimSoftening>().unwrap_err();
         assert!(err.choices.contains("0 to 90"), "{err}");
         let err = "31".parse::<SimPreconditioning>().unwrap_err();
-        assert_eq!((err.setting, err.value.as_str()), ("preconditioning", "31"));
-        let mut map = SimSettings::default().to_map();
-        map.insert("seed".to_owned(), "-1".to_owned());
-        assert_eq!(SimSettings::from_map(&map).unwrap_err().setting, "seed");
-        map.remove("seed");
-        assert_eq!(SimSettings::from_map(&map).unwrap_err().value, "");
+        assert!(
+            err.to_string()
+                .contains("preconditioning cannot be '31'; give 0 to 30")
+        );
     }
 }

@@ -7,7 +7,8 @@
 //! tick of first contact. Tissue pushes and cannot pull: where the body's force would be negative
 //! the probe has lifted off and the cell feels nothing, while the body goes on relaxing.
 
-use super::preconditioning::{Set, SimPreconditioning};
+use super::amounts::SimPreconditioning;
+use super::preconditioning::Set;
 use super::random::Random;
 use super::settings::SimSettings;
 use palpate_model::viscoelastic::{KelvinState, ModifiedKelvin};
@@ -144,12 +145,11 @@ impl Tissue {
 #[cfg(test)]
 mod tests {
     use super::super::random::Cause;
-    use super::super::settings::SimSoftening;
     use super::*;
 
     fn specimen(seed: u64, percent: u8) -> Tissue {
         let settings = SimSettings {
-            softening: SimSoftening::percent(percent).unwrap(),
+            softening: percent.to_string().parse().unwrap(),
             ..SimSettings::default()
         };
         Tissue::new(&mut Random::new(seed, Cause::Tissue), &settings)

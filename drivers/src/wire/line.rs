@@ -187,13 +187,26 @@ impl Line {
     }
 }
 
-impl Drop for Line {
-    fn drop(&mut self) {
+impl Line {
+    /// Says farewell, closes the link and gives the bytes that nobody has taken.
+    #[must_use]
+    pub fn close(mut self) -> Vec<RawBytes> {
+        self.end();
+        self.take_raw()
+    }
+
+    fn end(&mut self) {
         self.is_closing.store(true, Ordering::Relaxed);
         if let Some(thread) = self.thread.take() {
             // It ends within a read and a write; a panic in it was reported as a lost link.
             let _ = thread.join();
         }
+    }
+}
+
+impl Drop for Line {
+    fn drop(&mut self) {
+        self.end();
     }
 }
 

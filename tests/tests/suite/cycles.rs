@@ -2,7 +2,7 @@
 
 use palpate_analysis::cycles::CycleSource;
 use palpate_analysis::report::cycles::{CycleReport, Question, picture, whole};
-use palpate_drivers::sim::{SimPreconditioning, SimProfile, SimRig, SimSettings};
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::Phase;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
 use palpate_model::viscoelastic::KelvinState;
@@ -16,7 +16,7 @@ fn rig(percent: u8) -> SimRig {
     SimRig::new(SimSettings {
         profile: SimProfile::Ideal,
         seed: 3,
-        preconditioning: SimPreconditioning::percent(percent).unwrap(),
+        preconditioning: percent.to_string().parse().unwrap(),
         ..SimSettings::default()
     })
 }

@@ -1,6 +1,6 @@
 //! Whatever fails, the run ends with its reason, the axis stopped and the session closed.
 
-use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
+use palpate_doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_model::Nanos;
 use palpate_model::rig::{AxisStatus, Phase};

@@ -1,7 +1,7 @@
 //! Random plans, faults and operators: however a run goes, it ends with the axis stopped, its limits kept but for
 //! the way of the brake, and a reason. A few hundred here; `scripts/soak runs` for a hundred thousand.
+use palpate_doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::Rig;
-use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, Truth};
 use palpate_model::Nanos;
 use palpate_model::random::SplitMix;

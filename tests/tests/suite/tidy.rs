@@ -175,7 +175,9 @@ fn every_member_of_the_workspace_has_a_rule() {
     let members: BTreeSet<&str> = members.split('"').skip(1).step_by(2).collect();
     let ruled = PACKAGES.iter().map(|(package, _)| *package);
     // What tests are made of may use everything.
-    let known: BTreeSet<&str> = ruled.chain(["tests", "tests/support"]).collect();
+    let known: BTreeSet<&str> = ruled
+        .chain(["tests", "tests/doubles", "tests/support"])
+        .collect();
     assert_eq!(members, known);
     // Their manifests are read as they are written.
     for (package, ours) in PACKAGES {
@@ -235,18 +237,6 @@ fn colours_live_in_the_tokens() {
         "Rgba::from",
     ];
     assert_without(&files, &literals);
-}
-
-#[test]
-fn doubles_are_for_tests_only() {
-    for (package, _) in PACKAGES {
-        // Where they live, they are named.
-        if package != "drivers" {
-            let files = sources([format!("{package}/src").as_str()]);
-            assert_without(&files, &["palpate_drivers::doubles"]);
-        }
-    }
-    assert!(workspace().join("drivers/src/doubles").exists());
 }
 
 #[test]

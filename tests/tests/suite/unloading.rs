@@ -1,7 +1,7 @@
 //! Unloading: what the fitted law says of tissue whose own law is another one, and of real tissue.
 
 use palpate_analysis::source::{Stretch, read_stretch, samples_of};
-use palpate_drivers::sim::{SimProfile, SimRig, SimSettings, SimSoftening};
+use palpate_drivers::sim::{SimProfile, SimRig, SimSettings};
 use palpate_model::rig::Phase;
 use palpate_model::signal::work;
 use palpate_model::units::{Depth, MmPerS, Newtons, Seconds};
@@ -17,7 +17,7 @@ fn run(speed: f64, depth: f64, unload: f64) -> Session {
     let rig = SimRig::new(SimSettings {
         profile: SimProfile::Ideal,
         seed: 7,
-        softening: SimSoftening::percent(40).unwrap(),
+        softening: "40".parse().unwrap(),
         ..SimSettings::default()
     });
     let params = RampHold {

@@ -1,6 +1,6 @@
 //! A rig on wires: its bytes are in the session, and a computer that stands still before it ends the run.
 
-use palpate_drivers::doubles::WiredRig;
+use palpate_doubles::WiredRig;
 use palpate_drivers::sim::{SimRig, SimSettings};
 use palpate_drivers::{Rig, RigEvent};
 use palpate_model::Nanos;

@@ -89,13 +89,22 @@ impl Grbl {
                 text.push('H');
             }
         }
+        self.add_now_and_then(&mut text, list(&scaled(offset)));
+        self.reports.offset = self.reports.offset.saturating_sub(1);
+        self.reports.overrides = self.reports.overrides.saturating_sub(1);
+        text.push_str(">\r\n");
+        self.say(&text);
+    }
+
+    /// What only some reports have: the offset of the work coordinates, else the overrides.
+    fn add_now_and_then(&mut self, text: &mut String, offset: String) {
         let is_busy = self.is_moving();
         let again = |busy| if is_busy { busy } else { REST };
         if self.reports.offset == 0 {
             self.reports.offset = again(OFFSET_BUSY);
             // The overrides follow in the next report.
             self.reports.overrides = self.reports.overrides.max(1);
-            let _ = write!(text, "|WCO:{}", list(&scaled(offset)));
+            let _ = write!(text, "|WCO:{}", offset);
         } else if self.reports.overrides == 0 {
             self.reports.overrides = again(OVERRIDES_BUSY);
             let [feed, rapid, of_spindle] = self.overrides;
@@ -112,10 +121,6 @@ impl Grbl {
                 let _ = write!(text, "|A:{accessories}");
             }
         }
-        self.reports.offset = self.reports.offset.saturating_sub(1);
-        self.reports.overrides = self.reports.overrides.saturating_sub(1);
-        text.push_str(">\r\n");
-        self.say(&text);
     }
 
     pub(super) fn say_probe(&mut self) {

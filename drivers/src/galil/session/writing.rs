@@ -156,21 +156,7 @@ impl Session {
 
     pub(super) fn next_line(&mut self, now: Nanos) -> Option<Outgoing> {
         self.stop_if_abandoned(now);
-        if let Some(line) = self.urgent.pop_front() {
-            if let Some(search) = &mut self.search {
-                // Its answers go by unseen; it will be asked for again.
-                search.marker_at = None;
-                search.last_byte = now;
-                for asked in &line.asked {
-                    if let Asked::Stop(halting) = asked {
-                        self.confirm_later(*halting);
-                    }
-                }
-                return Some(Outgoing {
-                    asked: Vec::new(),
-                    ..line
-                });
-            }
+        if let Some(line) = self.take_urgent(now) {
             return Some(line);
         }
         if self.search.is_some() {
@@ -210,20 +196,10 @@ impl Session {
         if let Some(line) = self.lines.pop_front() {
             return Some(line);
         }
-        if let Some((_, due)) = &self.beginning {
-            if now < *due {
-                return None;
-            }
-            let (line, _) = self.beginning.take()?;
-            if let Some((_, order)) = &mut self.order {
-                order.is_begun = true;
-                if let Some(mut feed) = order.feed.take() {
-                    feed.begun(now);
-                    self.sine = Some(feed);
-                }
-            }
-            self.asked_at = Some(now);
-            return Some(line);
+        match &self.beginning {
+            Some((_, due)) if now < *due => return None,
+            Some(_) => return self.take_beginning(now),
+            None => {}
         }
         let is_due = self
             .asked_at
@@ -242,5 +218,39 @@ impl Session {
             });
         }
         None
+    }
+
+    /// A stop, or whatever else waits for nothing.
+    fn take_urgent(&mut self, now: Nanos) -> Option<Outgoing> {
+        let line = self.urgent.pop_front()?;
+        let Some(search) = &mut self.search else {
+            return Some(line);
+        };
+        // Its answers go by unseen; it will be asked for again.
+        search.marker_at = None;
+        search.last_byte = now;
+        for asked in &line.asked {
+            if let Asked::Stop(halting) = asked {
+                self.confirm_later(*halting);
+            }
+        }
+        Some(Outgoing {
+            asked: Vec::new(),
+            ..line
+        })
+    }
+
+    /// The part of an order that begins something.
+    fn take_beginning(&mut self, now: Nanos) -> Option<Outgoing> {
+        let (line, _) = self.beginning.take()?;
+        if let Some((_, order)) = &mut self.order {
+            order.is_begun = true;
+            if let Some(mut feed) = order.feed.take() {
+                feed.begun(now);
+                self.sine = Some(feed);
+            }
+        }
+        self.asked_at = Some(now);
+        Some(line)
     }
 }

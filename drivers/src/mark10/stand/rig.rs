@@ -12,6 +12,7 @@ use std::sync::Arc;
 pub type StandRig = DeviceRig<StandDevice>;
 
 /// A stand to be opened.
+#[derive(Clone)]
 pub struct StandDevice {
     /// Where it is.
     pub place: Place,

@@ -1,7 +1,7 @@
 //! The faulty stand-in fails as told, when told, and otherwise is the rig inside.
 
 use super::host::{self, FOREVER, answer_to, events_with, move_to, settings};
-use palpate_drivers::doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
+use palpate_doubles::{FaultKind, FaultyRig, Rail, ScriptedFault};
 use palpate_drivers::sim::{SimClock, SimProfile, SimRig};
 use palpate_drivers::{Rig, RigEvent, RigEventBody, open};
 use palpate_model::rig::{AxisStatus, Fault, PathTracker, Reading, RigCommand};

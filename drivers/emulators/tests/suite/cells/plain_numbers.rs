@@ -147,7 +147,10 @@ fn a_drop_of_the_supply_is_silence_and_then_numbers_again() {
 
 #[test]
 fn words_at_the_start_and_the_rest_of_a_line_are_passed_over() {
-    let script = Script::new(&["345\r\n", "HX711 ready\r\n", "1.20\n", "1.21\n"], 20);
+    let mut lines = vec!["345\r\n"];
+    lines.extend(["1.20\n"; 17]);
+    lines.extend(["HX711 ready\r\n", "1.20\n", "1.21\n"]);
+    let script = Script::new(&lines, 20);
     let cell = opened(&CellBench::new(script), "unit = \"N\"\nfull_scale = 25\n").expect("a cell");
     let found = cell.description;
     assert_eq!(
@@ -164,7 +167,7 @@ fn words_at_the_start_and_the_rest_of_a_line_are_passed_over() {
 
 #[test]
 fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
-    // 80 a second, and after four numbers the boot loader.
+    // 80 a second, and after thirty numbers the boot loader.
     struct Booting(Nanos, u32, Vec<u8>);
     impl EmulatedCell for Booting {
         fn receive(&mut self, _now: Nanos, _bytes: &[u8]) {}
@@ -172,7 +175,7 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
             if now >= self.0 {
                 self.1 += 1;
                 self.2.extend_from_slice(b"100\r\n");
-                let pause = if self.1 == 4 {
+                let pause = if self.1 == 30 {
                     1_600_000_000
                 } else {
                     12_500_000
@@ -192,10 +195,9 @@ fn a_start_anew_while_it_is_opened_does_not_spoil_the_rate() {
 
 #[test]
 fn what_is_not_as_the_rig_file_says_is_told() {
-    let mixed = refused(
-        Script::new(&["1.5\n", "1.5\n", "1.25\n"], 20),
-        "unit = \"N\"\nfull_scale = 25\n",
-    );
+    let mut lines = vec!["1.5\n"; 20];
+    lines.push("1.25\n");
+    let mixed = refused(Script::new(&lines, 20), "unit = \"N\"\nfull_scale = 25\n");
     assert!(mixed.contains("1 and now 2 digits"), "{mixed}");
     let timed = format!("{USUAL}time_column = \"us\"\n");
     let without = refused(Script::new(&["100\r\n"], 20), &timed);

@@ -1,6 +1,6 @@
 //! A rig as if on wires: it tells the bytes it exchanges.
 
-use crate::rig::{Rig, RigEvent, RigEventBody};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
 use std::sync::Arc;

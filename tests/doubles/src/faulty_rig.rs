@@ -1,8 +1,8 @@
 //! A rig that fails by script, around any other rig.
 
 use super::script::{FaultKind, Rail, ScriptedFault};
-use crate::rig::{Rig, RigEvent, RigEventBody};
-use crate::sim::{Cause, Random, counts_from_volts, volts_from_counts};
+use palpate_drivers::sim::{Cause, Random, counts_from_volts, volts_from_counts};
+use palpate_drivers::{Rig, RigEvent, RigEventBody};
 use palpate_model::rig::{
     AxisStatus, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
 };

@@ -1,6 +1,6 @@
 //! Faulty stand-ins for tests: they take a rig's commands and give its reports, and fail as told.
 //!
-//! For tests only. No runtime code names this module.
+//! For tests only: no program depends on this crate.
 
 mod faulty_rig;
 mod script;
