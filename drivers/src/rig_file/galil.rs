@@ -14,15 +14,6 @@ pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(vec![place], device))
 }
 
-/// A rig with the controller of a rig file.
-pub(crate) fn galil(name: String, fields: &mut Fields) -> Option<RigFile> {
-    let (place, settings) = read(name, fields)?;
-    Some(RigFile::new(vec![place.clone()], move |clock| {
-        let device = GalilDevice::new(place.clone(), settings.clone());
-        Ok(Box::new(DeviceRig::open(device, clock.clone())?))
-    }))
-}
-
 /// Where the controller is, and how it is wired.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, GalilSettings)> {
     let place = place(fields, "");

@@ -3,7 +3,6 @@
 use super::RigFile;
 use super::fields::{DIRECTIONS, Fields};
 use super::place::place;
-use crate::device::DeviceRig;
 use crate::grbl::{GrblSettings, HomeSwitch, MM_PER_STEP_MIN};
 use crate::parts::Parts;
 use crate::wire::Place;
@@ -22,27 +21,6 @@ pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
     }
     let places = vec![axis.0.clone(), cell.0.clone()];
     Some(RigFile::of(places, Parts::new(axis, cell)))
-}
-
-/// A rig with the board and the load cell beside it of a rig file.
-pub(crate) fn grbl(name: String, fields: &mut Fields) -> Option<RigFile> {
-    // Both are read, so that the mistakes of both are told.
-    let (axis, cell) = (read(name, fields), super::cell::read(fields));
-    let (axis, cell) = (axis?, cell?);
-    if axis.0 == cell.0 {
-        fields.mistake(
-            "cell.port",
-            "the board is at this port; the load cell has another",
-        );
-        return None;
-    }
-    Some(RigFile::new(
-        vec![axis.0.clone(), cell.0.clone()],
-        move |clock| {
-            let parts = Parts::new(axis.clone(), cell.clone());
-            Ok(Box::new(DeviceRig::open(parts, clock.clone())?))
-        },
-    ))
 }
 
 /// Where the board is, and how it is wired.

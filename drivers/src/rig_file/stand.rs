@@ -14,16 +14,6 @@ pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
     Some(RigFile::of(places, StandDevice { place, settings }))
 }
 
-/// A rig with the stand of a rig file.
-pub(crate) fn stand(name: String, fields: &mut Fields) -> Option<RigFile> {
-    let (place, settings) = read(name, fields)?;
-    Some(RigFile::new(vec![place.clone()], move |clock| {
-        let (place, settings) = (place.clone(), settings.clone());
-        let device = StandDevice { place, settings };
-        Ok(Box::new(DeviceRig::open(device, clock.clone())?))
-    }))
-}
-
 /// Where the stand is, and what it is.
 pub(super) fn read(name: String, fields: &mut Fields) -> Option<(Place, StandSettings)> {
     let place = place(fields, "");
