@@ -43,6 +43,9 @@ fn click_row(flow: &mut Flow, number: usize, modifiers: Modifiers) {
 
 /// Takes a name from a list that is open.
 fn pick(flow: &mut Flow, name: &str) {
+    flow.wait(name, |window| {
+        window.query_by_role_and_label(Role::Button, name).is_some()
+    });
     let button = flow.window.get_by_role_and_label(Role::Button, name);
     button.click_accesskit();
     flow.window.run_steps(2);

@@ -84,6 +84,8 @@ fn an_interrupted_ramp_is_not_resumed_but_finished_early() {
     let mut flow = Flow::open(TimeScale::Factor(10.0));
     choose(&mut flow, "Preconditioning to a depth");
     short_preconditioning(&mut flow, "3");
+    // A ramp that a busy computer does not miss: a minute of session time.
+    flow.type_into("speed", "0.09");
     flow.window.key_press(Key::F5);
     flow.wait_for_phase(Phase::Ramp);
     flow.window.key_press(Key::F7);

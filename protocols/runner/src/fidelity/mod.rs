@@ -333,7 +333,7 @@ mod tests {
     use std::path::Path;
 
     fn recorded() -> Session {
-        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/sessions");
+        let sessions = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/sessions");
         Session::open(&sessions.join("ramp-hold-lab")).unwrap()
     }
 

@@ -171,7 +171,10 @@ fn a_frame_is_due_sixty_times_a_second_whatever_the_rate() {
 
 #[test]
 fn the_kept_recording_is_computed_again() {
-    let folder = concat!(env!("CARGO_MANIFEST_DIR"), "/tests/recordings/scene-poke");
+    let folder = concat!(
+        env!("CARGO_MANIFEST_DIR"),
+        "/../tests/recordings/scene-poke"
+    );
     let found = Recording::read(std::path::Path::new(folder), COLUMNS).unwrap();
     let file = SceneFile::parse("settings.toml", &found.settings).unwrap();
     let mut again = LedScene::new(file.settings(0).unwrap()).unwrap();
