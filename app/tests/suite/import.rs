@@ -152,7 +152,7 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     };
     check(
         &["import", "good.csv", "bad.csv", "--into", "in"],
-        "say --decimal point or --decimal comma",
+        "say which decimal sign counts",
     );
     check(
         &["import", "good.csv", "good.csv", "--into", "in"],

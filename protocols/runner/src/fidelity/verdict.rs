@@ -44,7 +44,7 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
         count => {
             let mut text = reasons[..count.min(REASONS_MAX)].join("; ");
             if count > REASONS_MAX {
-                text += &format!("; and {} more, see 'palpate report'", count - REASONS_MAX);
+                text += &format!("; and {} more", count - REASONS_MAX);
             }
             (Verdict::Suspect, text)
         }
@@ -168,7 +168,7 @@ mod tests {
                     targets: vec![target(1.0); 9],
                     ..fine.clone()
                 },
-                "and 6 more, see 'palpate report'",
+                "and 6 more",
             ),
         ] {
             let (verdict, reason) = of(EndingKind::Finish, &change);

@@ -166,7 +166,7 @@ pub fn parse_foreign(file: &str, bytes: Vec<u8>, told: &Told) -> Result<Foreign,
     );
     said.say("encoding", how, told.encoding.is_some(), "--encoding NAME");
     let delimiter = told.delimiter.or_else(|| Delimiter::detect(&lines));
-    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say so with --delimiter")?;
+    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say by what")?;
     said.say(
         "delimiter",
         delimiter.name(),
@@ -245,10 +245,7 @@ fn understand(
             Err(Unknown::NoMeasurement(reason)) => left_out.push(named(reason)),
             Err(Unknown::Other(reason)) if is_whole => return Err(reason),
             Err(Unknown::Other(reason)) => {
-                return Err(format!(
-                    "{}; other parts can be chosen with --part",
-                    named(reason)
-                ));
+                return Err(format!("{}; other parts can be chosen", named(reason)));
             }
         }
     }
