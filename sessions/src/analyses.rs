@@ -132,7 +132,7 @@ pub enum AnalysisError {
         name: String,
     },
     /// There is none, or not any more.
-    #[error("the session has no analysis '{name}'{known}; 'palpate info' shows them")]
+    #[error("the session has no analysis '{name}'{known}")]
     None {
         /// The name.
         name: String,

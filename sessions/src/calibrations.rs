@@ -13,7 +13,7 @@ pub type Shelf = shelf::Shelf<Calibration>;
 impl Document for Calibration {
     const KIND: &'static str = "calibration";
     const FOLDER: &'static str = "calibrations";
-    const LISTED: &'static str = "'palpate calibration list'";
+    const LISTED: &'static str = "its folder calibrations";
     const RENEW: &'static str = "import it anew";
 
     fn name(&self) -> &str {

@@ -26,7 +26,7 @@ pub enum TradeFileError {
         source: io::Error,
     },
     /// Something else than curves.
-    #[error("this file holds no curves ({reason}); measure again with 'palpate trade', {}", path.display())]
+    #[error("this file holds no curves ({reason}); measure again, {}", path.display())]
     NotCurves {
         /// The file.
         path: PathBuf,
@@ -34,7 +34,7 @@ pub enum TradeFileError {
         reason: String,
     },
     /// Other content than was written.
-    #[error("these curves were changed after they were measured; measure again with 'palpate trade', {}", path.display())]
+    #[error("these curves were changed after they were measured; measure again, {}", path.display())]
     Checksum {
         /// The file.
         path: PathBuf,

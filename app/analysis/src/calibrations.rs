@@ -1,7 +1,8 @@
 //! The library's calibrations read, judged and added to, away from the window's thread.
 
 use crate::report::calibration::{Entry, Told};
-use crate::report::calibration_plot::Curves;
+use crate::report::calibration_plot::plots;
+use palpate_figures::figure::Plot;
 use palpate_model::calibration::{Bench, Calibration};
 use palpate_runner::programme::calibration_of;
 use palpate_runner::wall_now;
@@ -25,7 +26,7 @@ pub struct Shown {
     /// The document.
     pub calibration: Calibration,
     /// What it is like and its curves, or why it makes none.
-    pub told: Result<(Told, Curves), String>,
+    pub told: Result<(Told, [Plot; 4]), String>,
     /// What speaks against using it on the rig it is said to be of.
     pub doubts: Vec<String>,
 }
@@ -33,8 +34,8 @@ pub struct Shown {
 impl Shown {
     fn of(entry: Entry, calibration: Calibration, rig: &str) -> Self {
         let told = Told::of(&calibration).and_then(|told| {
-            let curves = Curves::of(&calibration, &told)?;
-            Ok((told, curves))
+            let plots = plots(&calibration, &told)?;
+            Ok((told, plots))
         });
         Self {
             told: told.map_err(|err| err.to_string()),

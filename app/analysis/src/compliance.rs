@@ -129,7 +129,7 @@ pub enum CorrectionError {
     Library(#[from] LibraryError),
     /// None is kept for the rig.
     #[error(
-        "the library has no compliance of rig {rig}; run stiff-surface on it and keep what 'palpate compliance SESSION --save' finds"
+        "the library has no compliance of rig {rig}; run stiff-surface on it and keep what its session tells"
     )]
     NoneInForce {
         /// The rig.
@@ -298,7 +298,7 @@ impl Correction {
             )
         } else {
             format!(
-                "depths are raw; the rig's compliance {id} would make them {um:.0} um less at {peak:.2} N (--compliance {LAST})"
+                "depths are raw; the rig's compliance {id} would make them {um:.0} um less at {peak:.2} N"
             )
         }
     }

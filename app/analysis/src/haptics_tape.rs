@@ -150,7 +150,7 @@ pub fn is_tape(folder: &Path) -> Result<bool, String> {
 pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Replayed, String> {
     if !is_tape(folder)? {
         return Err(format!(
-            "{} has no columns of a master and slave's recording; give a folder that the screen Haptics or 'palpate haptics run --record' made",
+            "{} has no columns of a master and slave's recording; give the folder of a recorded run",
             folder.display()
         ));
     }

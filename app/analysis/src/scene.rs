@@ -166,7 +166,7 @@ pub fn replay(folder: &Path, is_going: &mut dyn FnMut(f64) -> bool) -> Result<Re
     let columns = if is_sensed { SENSED_COLUMNS } else { COLUMNS };
     if !has_columns(folder, &columns.0, &columns.1)? {
         return Err(format!(
-            "{} has no columns of a scene's recording; give a folder that the screen Scene or 'palpate scene record' made",
+            "{} has no columns of a scene's recording; give the folder of a recorded scene",
             folder.display()
         ));
     }

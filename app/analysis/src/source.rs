@@ -131,9 +131,7 @@ pub enum SourceError {
     #[error(transparent)]
     Analysis(#[from] AnalysisError),
     /// Somebody, or the program, decided that the session is not to be used.
-    #[error(
-        "the session was rejected ({reason}) and is not used; --include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict"
-    )]
+    #[error("the session was rejected ({reason}) and is not used")]
     Rejected {
         /// Why.
         reason: String,
@@ -149,7 +147,7 @@ pub enum SourceError {
     Table(#[from] TableError),
     /// The session was made from another program's file.
     #[error(
-        "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report; 'palpate info' tells what it holds"
+        "the session was imported from {file}: it has no plan and no decisions, so there is nothing to report"
     )]
     Imported {
         /// The file it was made from.
@@ -170,7 +168,7 @@ pub enum SourceError {
     Empty,
     /// The session ended before there was anything to analyse.
     #[error(
-        "the session has no way in and no sine with known force and depth, so there are no cycles to analyse; 'palpate report' tells what happened in it"
+        "the session has no way in and no sine with known force and depth, so there are no cycles to analyse"
     )]
     NoCycles,
     /// A recorded decision is not what this version knows.

@@ -3,7 +3,7 @@
 use super::Failure;
 use super::output::Output;
 use clap::Args;
-use palpate_analysis::compliance::{Corrections, MeasureError, measured};
+use palpate_analysis::compliance::{Correction, Corrections, LAST, MeasureError, measured};
 use palpate_analysis::edited;
 use palpate_model::rig::RigCompliance;
 use palpate_model::units::Newtons;
@@ -154,4 +154,12 @@ pub(super) fn corrections(name: Option<&str>) -> Result<Corrections, Failure> {
     };
     let library = library.map_err(Failure::usage)?;
     Corrections::named(name, Some(&library)).map_err(|err| super::source_failure(err.into()))
+}
+
+/// What a compliance does to depths, and how to take it from them where it is not.
+pub(super) fn sentence(told: &Correction) -> String {
+    match told.is_applied {
+        true => told.sentence(),
+        false => format!("{} (--compliance {LAST})", told.sentence()),
+    }
 }

@@ -142,6 +142,9 @@ fn import_failure(err: ImportFailure) -> Failure {
         ImportFailure::Keep(KeepError::Times { .. }) => Failure::usage(err),
         ImportFailure::Keep(_) => Failure::failed(err),
         ImportFailure::Taken(_) => Failure::usage(format!("{err} with --into")),
+        ImportFailure::Foreign(_) => Failure::usage(format!(
+            "{err}; 'palpate import --help' tells how to say so"
+        )),
         _ => Failure::usage(err),
     }
 }

@@ -49,6 +49,7 @@ mod withdraw;
 use clap::error::ErrorKind;
 use clap::{Parser, Subcommand};
 use output::Output;
+use palpate_analysis::compliance::CorrectionError;
 use palpate_analysis::fit::KnownFitError;
 use palpate_analysis::opening::Windows;
 use palpate_analysis::source::SourceError;
@@ -237,7 +238,8 @@ fn tell(labels: &mut Labels, about: &[String]) -> Result<(), Failure> {
 /// A session that cannot be read: not being one, or being newer, is wrong use; damage is a failure.
 fn read_failure(err: ReadError) -> Failure {
     match err {
-        ReadError::Damaged { .. } | ReadError::Io { .. } => Failure::failed(err),
+        ReadError::Damaged { .. } => Failure::failed(format!("{err} with 'palpate recover'")),
+        ReadError::Io { .. } => Failure::failed(err),
         _ => Failure::usage(err),
     }
 }
@@ -273,19 +275,27 @@ fn known_fit_failure(err: KnownFitError) -> Failure {
 }
 
 fn source_failure(err: SourceError) -> Failure {
+    let with = |way_out: &str| Failure::Usage(format!("{err}; {way_out}"));
     match err {
+        SourceError::Rejected { .. } => with(
+            "--include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict",
+        ),
+        SourceError::Imported { .. } => with("'palpate info' tells what it holds"),
+        SourceError::NoCycles => {
+            Failure::Failed(format!("{err}; 'palpate report' tells what happened in it"))
+        }
+        SourceError::Correction(CorrectionError::NoneInForce { .. }) => {
+            with("'palpate compliance SESSION --save' does so")
+        }
         SourceError::Session(err) => read_failure(err),
         SourceError::Analysis(err) => recalibrate::failure(err),
         SourceError::Table(_)
         | SourceError::TableAnalysis { .. }
-        | SourceError::Rejected { .. }
         | SourceError::Correction(_)
-        | SourceError::NoSignal { .. }
-        | SourceError::Imported { .. } => Failure::usage(err),
+        | SourceError::NoSignal { .. } => Failure::usage(err),
         SourceError::Edits(_)
         | SourceError::Plan { .. }
         | SourceError::Empty
-        | SourceError::NoCycles
         | SourceError::Calibration { .. }
         | SourceError::Decision { .. } => Failure::failed(err),
     }

@@ -117,6 +117,9 @@ pub(super) fn deed_failure(err: DeedFailure) -> Failure {
 /// An analysis that cannot be had: names are the user's, files are not.
 pub(super) fn failure(err: AnalysisError) -> Failure {
     match err {
+        AnalysisError::None { .. } => {
+            Failure::usage(format!("{err}; 'palpate info' shows those there are"))
+        }
         AnalysisError::Chain(_) | AnalysisError::Input { .. } | AnalysisError::Lock(_) => {
             Failure::failed(err)
         }

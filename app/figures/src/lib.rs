@@ -3,10 +3,13 @@
 //! What a figure shows is decided above; here is how it looks. No window library is needed, so a
 //! computer without a display draws the same figures.
 //!
-//! Start reading at [`drawing`] for what a figure is made of, [`tokens`] for every colour.
+//! Start reading at [`figure`] for what a figure is, [`drawing`] for how one becomes a file, [`tokens`] for every
+//! colour.
 
 pub mod drawing;
+pub mod figure;
 pub mod page;
+pub mod panel;
 pub mod raster;
 pub mod thin;
 pub mod tokens;

@@ -140,7 +140,7 @@ fn a_refusal_is_one_sentence_and_leaves_nothing() {
     };
     check(
         &["import", "good.csv", "bad.csv", "--into", "in"],
-        "--decimal point",
+        "decimal sign",
     );
     check(
         &["import", "good.csv", "good.csv", "--into", "in"],

@@ -162,7 +162,7 @@ fn text_says_what_was_assumed_and_what_to_type() {
     let picture = std::fs::read_to_string(folder.path().join("plan.svg")).unwrap();
     assert!(picture.starts_with("<svg") && picture.ends_with("</svg>\n"));
     // Four speeds twice and one curve over the rate; every size readable.
-    assert_eq!(picture.matches("<polyline").count(), 9);
+    assert_eq!(picture.matches("stroke-width=\"2.5\"").count(), 9);
     assert!(!picture.contains("NaN") && !picture.contains("inf"));
     for size in picture.split("font-size=\"").skip(1) {
         let size: f64 = size.split('"').next().unwrap().parse().unwrap();

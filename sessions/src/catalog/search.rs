@@ -344,7 +344,7 @@ impl Catalog {
             };
             if there.is_empty() {
                 doubts.push(format!(
-                    "no session has a value called {name}; palpate find --json tells what they are called"
+                    "no session has a value called {name}; names are those of parameters, of what is told of sessions and of fits"
                 ));
             } else if !there.iter().any(is_fit) {
                 doubts.push(format!(

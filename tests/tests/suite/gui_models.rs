@@ -9,6 +9,7 @@ use palpate_tests::flow::{Flow, Window, screen};
 use palpate_window::screens::extremes::ExtremesScreen;
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::models::ModelsScreen;
+use palpate_window::screens::screen::Screen;
 use palpate_window::screens::trade::TradeScreen;
 use std::fmt::Write;
 use std::path::Path;

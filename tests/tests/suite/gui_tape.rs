@@ -5,6 +5,7 @@ use palpate_runner::TimeScale;
 use palpate_tests::flow::{Flow, Window, screen};
 use palpate_window::screens::haptics::HapticsScreen;
 use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::screen::Screen;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

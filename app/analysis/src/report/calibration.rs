@@ -89,10 +89,7 @@ impl Entry {
 #[must_use]
 pub fn list(entries: &[Entry], folder: &Path) -> String {
     if entries.is_empty() {
-        return format!(
-            "no calibration in {}; store one with 'palpate calibration import'",
-            folder.display()
-        );
+        return format!("no calibration in {}", folder.display());
     }
     let mut lines = vec![
         ["id", "name", "rig", "cell", "age", "state"]

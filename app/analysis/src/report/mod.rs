@@ -19,9 +19,10 @@ pub mod plan_picture;
 pub mod plan_plot;
 pub mod programme;
 pub mod said;
+pub mod scatter;
 pub mod scene;
 pub mod selection;
-mod selection_plot;
+pub mod selection_plot;
 pub mod session;
 pub mod text;
 

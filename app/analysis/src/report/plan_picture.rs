@@ -2,48 +2,114 @@
 //! plan that presses on nothing, what it does when.
 
 use super::picture::{LEFT, LINE, RIGHT, WIDTH, look, title};
-use palpate_figures::drawing::{Anchor, Ink, Look, Panel, Svg};
+use palpate_figures::drawing::{Anchor, Ink as TextInk, Look, Panel, Svg};
+use palpate_figures::figure::{Axis, AxisNames, Band, Ink, Level, Plot, Series};
 use palpate_figures::tokens::LIGHT;
+use palpate_model::units::{MmPerS, Newtons};
 use palpate_protocols::preview::{OutlinePoint, StepPreview};
 
 /// Longest time shown in seconds; more is shown in minutes.
 const SECONDS_MAX: f64 = 600.0;
 
-/// The picture as SVG. Steps of unknown length are drawn as long as they are expected to be.
+/// A limit is in the picture where the plan comes to half of it; a further one would flatten the curve.
+const LIMIT_IN_SIGHT: f64 = 0.5;
+
+/// What ends or bounds a run on this rig.
+#[derive(Clone, Copy, Debug)]
+pub struct CourseLimits {
+    /// Force above tare that ends a run, as tight as the plan has it.
+    pub force: Newtons,
+    /// Fastest speed of the rig.
+    pub speed: MmPerS,
+}
+
+/// Depth, speed and force over time as a plan is expected to go, before anything moves, with the limits that hold.
+/// Steps of unknown length are drawn as long as they are expected to be.
 #[must_use]
-pub fn of_plan(name: &str, points: &[OutlinePoint]) -> String {
-    let end = points.last().map_or(1.0, |point| point.t.0.max(1e-3));
+pub fn course(outline: &[OutlinePoint], limits: Option<CourseLimits>) -> [Plot; 3] {
+    let end = outline.last().map_or(1.0, |point| point.t.0.max(1e-3));
     let (unit, axis) = unit_of(end);
-    let series = |value: fn(&OutlinePoint) -> f64| -> Vec<[f64; 2]> {
+    let series = |value: &dyn Fn(&OutlinePoint) -> f64| -> Vec<[f64; 2]> {
+        let points = outline.iter();
         points
-            .iter()
             .map(|point| [point.t.0 / unit, value(point)])
             .collect()
     };
-    let (depth, force) = (series(|point| point.depth.0), series(|point| point.force.0));
+    let speed: Vec<[f64; 2]> = speeds(outline)
+        .into_iter()
+        .map(|[t, v]| [t / unit, v])
+        .collect();
+    let edges = [0, 1].map(|edge: usize| series(&|point| point.force_band()[edge].0));
+    let fastest = limits.and_then(|limits| in_sight(limits.speed.0, &speed));
+    let strongest = limits.and_then(|limits| in_sight(limits.force.0, &edges[1]));
+    let plot = |title: &str, y: &str, ink: Ink, points: Vec<[f64; 2]>, limit: Option<f64>| Plot {
+        levels: limit.map(level).into_iter().collect(),
+        ..Plot::new(
+            title,
+            Axis::linear(axis).over([0.0, end / unit]),
+            Axis::linear(y).seeing(&[0.0]),
+        )
+        .with([Series::line("", ink, 1.6, points)])
+    };
+    let depth = series(&|point| point.depth.0);
+    let force = series(&|point| point.force.0);
+    [
+        plot("Depth as planned", "depth (mm)", Ink::Series, depth, None),
+        plot(
+            "Speed as planned",
+            "speed (mm/s)",
+            Ink::Series,
+            speed,
+            fastest,
+        ),
+        Plot {
+            bands: vec![Band {
+                name: String::new(),
+                ink: Ink::Limit,
+                edges,
+            }],
+            ..plot(
+                "Force as expected",
+                "force (N)",
+                Ink::Limit,
+                force,
+                strongest,
+            )
+        },
+    ]
+}
+
+fn level(at: f64) -> Level {
+    Level {
+        name: "limit".to_owned(),
+        at,
+        ink: Ink::Alarm,
+        is_dashed: false,
+    }
+}
+
+/// For what a course is expected.
+pub const EXPECTED: &str = "expected for the pig stomach of the source thesis, the band for specimens from the softest to the stiffest; on a base for a rig that gives 30 µm/N";
+
+/// The same as SVG.
+#[must_use]
+pub fn of_plan(name: &str, outline: &[OutlinePoint]) -> String {
     let mut svg = Svg::new(WIDTH);
-    title(
-        &mut svg,
-        name,
-        "expected for the pig stomach of the source thesis, others differ by tens of percent; on a base for a rig that gives 30 µm/N",
-    );
-    let span = [0.0, end / unit];
-    let look: Look = look();
-    let upper = Panel::around([LEFT, 66.0, RIGHT, 260.0], span, &[&depth]);
-    upper.axes(&mut svg, ["", "depth (mm)"], look);
-    upper.line(&mut svg, &depth, LIGHT.series, 1.6);
-    let lower = Panel::around([LEFT, 296.0, RIGHT, 490.0], span, &[&force]);
-    lower.axes(&mut svg, [axis, "force (N)"], look);
-    lower.line(&mut svg, &force, LIGHT.limit, 1.6);
-    svg.finish(550.0, LIGHT.canvas, &format!("Plan of {name}"))
+    title(&mut svg, name, EXPECTED);
+    let [depth, speed, force] = course(outline, None);
+    let place = |top: f64| [LEFT, top, RIGHT, top + 194.0];
+    depth.draw(&mut svg, place(66.0), AxisNames::Upright);
+    speed.draw(&mut svg, place(296.0), AxisNames::Upright);
+    force.draw(&mut svg, place(526.0), AxisNames::Both);
+    svg.finish(780.0, LIGHT.canvas, &format!("Plan of {name}"))
 }
 
 /// Seconds or minutes for a time of so many seconds, and the name of the axis.
 fn unit_of(end: f64) -> (f64, &'static str) {
     if end > SECONDS_MAX {
-        (60.0, "time (min)")
+        (60.0, "expected time (min)")
     } else {
-        (1.0, "time (s)")
+        (1.0, "expected time (s)")
     }
 }
 
@@ -86,7 +152,7 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
     panel.time_axis(&mut svg, axis, look);
     for (row, phase) in phases.iter().enumerate() {
         let above = top + ROW * row as f64;
-        let name = Ink::plain(LIGHT.text).anchored(Anchor::End);
+        let name = TextInk::plain(LIGHT.text).anchored(Anchor::End);
         svg.text([BARS_LEFT - 10.0, above + 0.7 * ROW], name, phase.name());
         for (_, [from, to]) in bars.iter().filter(|(one, _)| one == phase) {
             let [left, right] = [from, to].map(|t| panel.at([t / unit, 0.0])[0]);
@@ -97,4 +163,56 @@ pub fn of_steps(name: &str, steps: &[StepPreview]) -> String {
         }
     }
     svg.finish(bottom + 60.0, LIGHT.canvas, &format!("Steps of {name}"))
+}
+
+/// A limit that belongs into the picture of a curve.
+fn in_sight(limit: f64, points: &[[f64; 2]]) -> Option<f64> {
+    let most = points
+        .iter()
+        .map(|point| point[1].abs())
+        .fold(0.0, f64::max);
+    (most > LIMIT_IN_SIGHT * limit).then_some(limit)
+}
+
+/// Time and speed into the tissue in mm/s, two points for each piece of the way; what happens at once has no speed.
+fn speeds(outline: &[OutlinePoint]) -> Vec<[f64; 2]> {
+    let mut points = Vec::with_capacity(2 * outline.len());
+    for pair in outline.windows(2) {
+        let [t, until] = [pair[0].t.0, pair[1].t.0];
+        if until > t {
+            let speed = (pair[1].depth.0 - pair[0].depth.0) / (until - t);
+            points.extend([[t, speed], [until, speed]]);
+        }
+    }
+    points
+}
+
+#[cfg(test)]
+mod tests {
+    use super::{in_sight, speeds};
+    use palpate_model::rig::Phase;
+    use palpate_model::units::{Depth, Newtons, Seconds};
+    use palpate_protocols::preview::OutlinePoint;
+
+    #[test]
+    fn a_ramp_has_its_speed_and_a_hold_has_none() {
+        let at = |t: f64, depth: f64| OutlinePoint {
+            t: Seconds(t),
+            depth: Depth(depth),
+            force: Newtons(0.0),
+            is_force_set: false,
+            phase: Phase::Ramp,
+        };
+        let outline = [at(0.0, 0.0), at(40.0, 30.0), at(40.0, 30.0), at(90.0, 30.0)];
+        assert_eq!(
+            speeds(&outline),
+            [[0.0, 0.75], [40.0, 0.75], [40.0, 0.0], [90.0, 0.0]]
+        );
+    }
+
+    #[test]
+    fn a_limit_far_above_is_not_drawn() {
+        assert_eq!(in_sight(20.0, &[[0.0, 0.75]]), None);
+        assert_eq!(in_sight(9.0, &[[0.0, 6.4]]), Some(9.0));
+    }
 }

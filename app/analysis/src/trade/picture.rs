@@ -1,8 +1,8 @@
 //! The trade as a picture: error over time, both by powers of ten, a panel for each table.
 
 use super::text::plain;
-use ecolor::Color32;
-use palpate_figures::drawing::{Anchor, FONT, Ink, Look, Panel, Svg};
+use palpate_figures::drawing::{Ink as TextInk, Svg};
+use palpate_figures::figure::{Axis, AxisNames, Ink, Labels, Plot, Series};
 use palpate_figures::tokens::LIGHT;
 use palpate_rheology::integrators::{Precision, Scheme};
 use palpate_rheology::trade::{FamilyRow, FitRow, TradeCurves};
@@ -19,14 +19,14 @@ const BELOW: f64 = 50.0;
 const LEAST: f64 = 1e-17;
 
 /// Points that belong together.
-struct Series {
+struct Group {
     name: String,
-    color: Color32,
+    ink: Ink,
     points: Vec<Point>,
 }
 
 struct Point {
-    /// Logarithms of cost and of error.
+    /// Cost and error.
     at: [f64; 2],
     front: bool,
 }
@@ -34,20 +34,41 @@ struct Point {
 impl Point {
     fn new(cost: f64, error: f64, front: bool) -> Self {
         Self {
-            at: [cost.log10(), error.max(LEAST).log10()],
+            at: [cost, error.max(LEAST)],
             front,
         }
     }
 }
 
-impl Series {
+impl Group {
     /// A front through points that have their names elsewhere.
     fn nameless(points: Vec<Point>) -> Self {
         Self {
             name: String::new(),
-            color: LIGHT.series,
+            ink: Ink::Series,
             points,
         }
+    }
+
+    /// Its name at the end of a thin line through all, a line through what nothing undercuts, and the points.
+    fn series(&self) -> [Series; 4] {
+        let points = |is_taken: &dyn Fn(&Point) -> bool| {
+            let taken = self.points.iter().filter(|one| is_taken(one));
+            let mut points: Vec<[f64; 2]> = taken.map(|one| one.at).collect();
+            points.sort_by(|a, b| a[0].total_cmp(&b[0]));
+            points
+        };
+        let front = points(&|one| one.front);
+        let labels = match self.name.is_empty() {
+            true => Labels::None,
+            false => Labels::AtEnd,
+        };
+        [
+            Series::line(&self.name, Ink::Line, 1.0, points(&|_| true)).labelled(labels),
+            Series::line("", self.ink, 2.0, front.clone()),
+            Series::dots("", self.ink, 4.0, front),
+            Series::dots("", self.ink, 2.5, points(&|one| !one.front)),
+        ]
     }
 }
 
@@ -55,14 +76,14 @@ impl Series {
 #[must_use]
 pub fn svg(curves: &TradeCurves) -> String {
     let mut svg = Svg::new(WIDTH);
-    let heading = Ink {
+    let heading = TextInk {
         size: 16.0,
-        ..Ink::plain(LIGHT.text)
+        ..TextInk::plain(LIGHT.text)
     };
     let title = format!("Error against time on {}", curves.machine.words());
     svg.text([LEFT, 28.0], heading, &title);
     let legend = "line: nothing is cheaper and more exact; blue: f64, orange: f32";
-    svg.text([LEFT, 48.0], Ink::plain(LIGHT.text_quiet), legend);
+    svg.text([LEFT, 48.0], TextInk::plain(LIGHT.text_quiet), legend);
     let force = "error of the peak force";
     let tables = [
         (
@@ -84,70 +105,16 @@ pub fn svg(curves: &TradeCurves) -> String {
     let mut top = 48.0 + ABOVE;
     for (title, axes, series) in tables {
         let place = [LEFT, top, WIDTH - RIGHT, top + PANEL_HEIGHT];
-        svg.text([LEFT, top - 10.0], Ink::plain(LIGHT.text), title);
-        panel(&mut svg, place, axes, &series);
+        svg.text([LEFT, top - 10.0], TextInk::plain(LIGHT.text), title);
+        let [x, y] = axes.map(Axis::logarithmic);
+        let plot = Plot::new(title, x, y).with(series.iter().flat_map(Group::series));
+        plot.draw(&mut svg, place, AxisNames::Both);
         top += PANEL_HEIGHT + BELOW + ABOVE;
     }
     svg.finish(top - ABOVE + 20.0, LIGHT.canvas, &title)
 }
 
-fn panel(svg: &mut Svg, place: [f64; 4], axes: [&str; 2], series: &[Series]) {
-    let all = || series.iter().flat_map(|one| &one.points);
-    let places: Vec<[f64; 2]> = all().map(|point| point.at).collect();
-    let panel = Panel::around_logarithms(place, &places);
-    let look = Look {
-        text: LIGHT.text_quiet,
-        grid: LIGHT.line,
-    };
-    panel.log_axes(svg, axes, look);
-    let mut names: Vec<([f64; 2], &str)> = Vec::new();
-    for one in series {
-        let mut points: Vec<[f64; 2]> = one.points.iter().map(|point| point.at).collect();
-        points.sort_by(|a, b| a[0].total_cmp(&b[0]));
-        panel.line(svg, &points, LIGHT.line, 1.0);
-        let mut front: Vec<&Point> = one.points.iter().filter(|point| point.front).collect();
-        front.sort_by(|a, b| a.at[0].total_cmp(&b.at[0]));
-        let front: Vec<[f64; 2]> = front.iter().map(|point| point.at).collect();
-        if front.len() > 1 {
-            panel.line(svg, &front, one.color, 2.0);
-        }
-        for point in &one.points {
-            svg.dot(
-                panel.at(point.at),
-                one.color,
-                if point.front { 4.0 } else { 2.5 },
-            );
-        }
-        if let Some(last) = points.last().filter(|_| !one.name.is_empty()) {
-            names.push((panel.at(*last), &one.name));
-        }
-    }
-    label(svg, place, names);
-}
-
-/// Names at the right, in the order of their curves' ends and none over another.
-fn label(svg: &mut Svg, [_, top, right, bottom]: [f64; 4], mut names: Vec<([f64; 2], &str)>) {
-    const HEIGHT: f64 = FONT + 2.0;
-    names.sort_by(|a, b| a.0[1].total_cmp(&b.0[1]));
-    let mut places: Vec<f64> = Vec::new();
-    let mut free = top;
-    for ([_, y], _) in &names {
-        places.push(y.max(free));
-        free = y.max(free) + HEIGHT;
-    }
-    let mut free = bottom;
-    for place in places.iter_mut().rev() {
-        *place = place.min(free);
-        free = *place - HEIGHT;
-    }
-    for (([x, y], name), at) in names.into_iter().zip(places) {
-        svg.line(&[[x, y], [right + 14.0, at]], LIGHT.line, 0.6);
-        let ink = Ink::plain(LIGHT.text).anchored(Anchor::Start);
-        svg.text([right + 18.0, at + 0.35 * FONT], ink, name);
-    }
-}
-
-fn integrators(curves: &TradeCurves) -> Vec<Series> {
+fn integrators(curves: &TradeCurves) -> Vec<Group> {
     let of = |scheme: Scheme, precision: Precision| {
         let rows = curves.integrators.iter();
         let rows = rows.filter(|row| (row.scheme, row.precision) == (scheme, precision));
@@ -155,11 +122,11 @@ fn integrators(curves: &TradeCurves) -> Vec<Series> {
             let error = row.error?.share_of(&curves.peak);
             Some(Point::new(row.second_ns, error, row.front))
         });
-        Series {
+        Group {
             name: format!("{}, {}", scheme.name(), precision.name()),
-            color: match precision {
-                Precision::F64 => LIGHT.series,
-                Precision::F32 => LIGHT.limit,
+            ink: match precision {
+                Precision::F64 => Ink::Series,
+                Precision::F32 => Ink::Limit,
             },
             points: points.collect(),
         }
@@ -170,9 +137,9 @@ fn integrators(curves: &TradeCurves) -> Vec<Series> {
 }
 
 /// A series for each family, so that each has its name, and the front of each target.
-fn families(curves: &TradeCurves) -> Vec<Series> {
+fn families(curves: &TradeCurves) -> Vec<Group> {
     let rows = || curves.families.iter();
-    let mut all: Vec<Series> = Vec::new();
+    let mut all: Vec<Group> = Vec::new();
     for row in rows() {
         let is_known = rows()
             .take_while(|other| !std::ptr::eq(*other, row))
@@ -181,24 +148,24 @@ fn families(curves: &TradeCurves) -> Vec<Series> {
             let best = rows().filter(|other| other.front && other.target == row.target);
             let error = |row: &FamilyRow| row.error_n / row.peak_n;
             let points = best.map(|row| Point::new(row.cost.ns, error(row), true));
-            all.push(Series::nameless(points.collect()));
+            all.push(Group::nameless(points.collect()));
         }
-        all.push(Series {
+        all.push(Group {
             name: row.family.clone(),
-            color: LIGHT.series,
+            ink: Ink::Series,
             points: vec![Point::new(row.cost.ns, row.error_n / row.peak_n, row.front)],
         });
     }
     all
 }
 
-fn fits(curves: &TradeCurves) -> Vec<Series> {
+fn fits(curves: &TradeCurves) -> Vec<Group> {
     let point = |row: &FitRow| Point::new(row.cost.ns, row.tau_error, row.front);
     let best = curves.fit.iter().filter(|row| row.front);
-    let front = Series::nameless(best.map(point).collect());
-    let named = curves.fit.iter().map(|row| Series {
+    let front = Group::nameless(best.map(point).collect());
+    let named = curves.fit.iter().map(|row| Group {
         name: format!("{} Hz", plain(row.rate_hz)),
-        color: LIGHT.series,
+        ink: Ink::Series,
         points: vec![point(row)],
     });
     std::iter::once(front).chain(named).collect()

@@ -94,7 +94,13 @@ fn list(output: &Output) -> Result<(), Failure> {
         unreadable,
     };
     output.answer("calibration list", &found, || {
-        report::list(&found.calibrations, &found.folder)
+        match found.calibrations.is_empty() {
+            true => format!(
+                "{}; store one with 'palpate calibration import'",
+                report::list(&found.calibrations, &found.folder)
+            ),
+            false => report::list(&found.calibrations, &found.folder),
+        }
     });
     Ok(())
 }

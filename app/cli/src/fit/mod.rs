@@ -11,7 +11,7 @@ use super::output::Output;
 use super::recalibrate::Who;
 use super::{compliance, new_file, source_failure, sources_failure};
 use clap::Args;
-use palpate_analysis::compliance::{Correction, Corrections};
+use palpate_analysis::compliance::Corrections;
 use palpate_analysis::fit::{Recipe, remember};
 use palpate_analysis::report::family;
 use palpate_analysis::report::fit_json::{FitObject, Overlay};
@@ -216,7 +216,7 @@ fn one(source: &Path, recipe: &Recipe, args: &FitArgs, output: &Output) -> Resul
             lines.push(format!("- {}", family::energy(&overlay)));
             lines.extend(family::limits(family).map(|sentence| format!("- {sentence}")));
         }
-        lines.extend(fitted.compliance.as_ref().map(Correction::sentence));
+        lines.extend(fitted.compliance.as_ref().map(compliance::sentence));
         lines.extend(intervals::lines(&intervals, report));
         let kept = args.save.iter();
         lines.extend(kept.map(|name| format!("kept as analysis '{name}'")));

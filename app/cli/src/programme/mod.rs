@@ -65,7 +65,10 @@ pub(super) fn run(
         output.note(&format!("{}, {note}", file.display()));
     }
     if let Some(first) = planned.to_acknowledge.first() {
-        return Err(refuse(file, first));
+        let Failure::Usage(sentence) = refuse(file, first) else {
+            return Err(refuse(file, first));
+        };
+        return Err(Failure::Usage(format!("{sentence}, or add --acknowledge")));
     }
     if how.preview {
         let report = Ahead::of(&programme, &planned);

@@ -2,9 +2,9 @@
 //! from what is left of their samples at the zoom at hand.
 
 pub mod course;
+pub mod figure;
 pub mod force_depth;
 pub mod force_time;
-pub mod log_scatter;
 pub mod margin;
 pub mod navigate;
 pub mod over_depth;

@@ -50,7 +50,7 @@ pub enum HoldOutError {
     },
     /// Nobody knows whose a record is.
     #[error(
-        "no specimen can be held out, because {record} does not say which it is of; name one for each source (--specimens A,A,B), or hold out 'auto'"
+        "no specimen can be held out, because {record} does not say which it is of; name one for each source, or hold out 'auto'"
     )]
     NoSpecimen {
         /// The record.

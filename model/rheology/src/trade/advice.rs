@@ -186,7 +186,7 @@ fn best(candidates: Vec<(Choice, bool)>, tolerance: Tolerance, pace: Option<(f64
         .min_by(|a, b| a.error_of_peak.total_cmp(&b.error_of_peak));
     match (cheapest, nearest, pace) {
         (None, None, Some((rate, _))) => Advice::None(format!(
-            "nothing was measured at {rate} updates a second; measure without --quick, or ask for a lower rate"
+            "nothing was measured at {rate} updates a second; measure all rows, or ask for a lower rate"
         )),
         (None, None, None) => Advice::None("nothing was measured".into()),
         (None, Some(nearest), _) => Advice::None(format!(

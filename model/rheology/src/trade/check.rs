@@ -8,14 +8,10 @@ use thiserror::Error;
 #[derive(Clone, Debug, PartialEq, Error)]
 pub enum CurveError {
     /// Another version of the stored form.
-    #[error(
-        "these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again with 'palpate trade'"
-    )]
+    #[error("these curves have format {0} and this palpate reads {TRADE_FORMAT}; measure again")]
     Format(u32),
     /// A number out of its range.
-    #[error(
-        "the curves say {what} = {value}, which nothing can be; measure again with 'palpate trade'"
-    )]
+    #[error("the curves say {what} = {value}, which nothing can be; measure again")]
     Number {
         /// Which.
         what: String,
@@ -24,12 +20,12 @@ pub enum CurveError {
     },
     /// Two numbers that contradict each other.
     #[error(
-        "the curves contradict themselves at {0}: they were changed after they were measured; measure again with 'palpate trade'"
+        "the curves contradict themselves at {0}: they were changed after they were measured; measure again"
     )]
     Contradiction(String),
     /// Errors that this program does not find.
     #[error(
-        "{what}: the curves say an error of {stored:e} and this palpate finds {found:e}; measure again with 'palpate trade'"
+        "{what}: the curves say an error of {stored:e} and this palpate finds {found:e}; measure again"
     )]
     Error {
         /// Which row.
@@ -40,7 +36,7 @@ pub enum CurveError {
         found: f64,
     },
     /// Other rows.
-    #[error("the curves have no row {0}; measure again with 'palpate trade'")]
+    #[error("the curves have no row {0}; measure again")]
     Missing(String),
 }
 

@@ -53,34 +53,33 @@ impl TradeCurves {
         let there = &self.machine;
         if (&there.cpu, &there.os, there.cores) != (&here.cpu, &here.os, here.cores) {
             doubts.push(format!(
-                "these curves are foreign: measured on {}, this is {}; measure here with 'palpate trade'",
+                "these curves are foreign: measured on {}, this is {}; measure here",
                 there.words(),
                 here.words()
             ));
         } else if there.profile != here.profile {
             doubts.push(format!(
-                "these curves are of a {} build and this is a {} build; measure again with 'palpate trade'",
+                "these curves are of a {} build and this is a {} build; measure again",
                 there.profile, here.profile
             ));
         }
         if self.version != version {
             doubts.push(format!(
-                "these curves are stale: measured by palpate {}, this is {version}; measure again with 'palpate trade'",
+                "these curves are stale: measured by palpate {}, this is {version}; measure again",
                 self.version
             ));
         } else if age_days > STALE_DAYS {
             doubts.push(format!(
-                "these curves are stale: measured {age_days:.0} days ago; measure again with 'palpate trade'"
+                "these curves are stale: measured {age_days:.0} days ago; measure again"
             ));
         } else if age_days < -1.0 {
             // A day allows for a clock that was set.
             doubts.push(
-                "these curves are dated in the future; check the clock and measure again with 'palpate trade'"
-                    .into(),
+                "these curves are dated in the future; check the clock and measure again".into(),
             );
         }
         if self.quick {
-            doubts.push("these curves were measured with --quick: few rows, rough times".into());
+            doubts.push("these curves were measured quickly: few rows, rough times".into());
         }
         doubts
     }

@@ -44,7 +44,7 @@ pub fn first_verdict(outcome: &Outcome, fidelity: &Fidelity) -> (Verdict, String
         count => {
             let mut text = reasons[..count.min(REASONS_MAX)].join("; ");
             if count > REASONS_MAX {
-                text += &format!("; and {} more, see 'palpate report'", count - REASONS_MAX);
+                text += &format!("; and {} more", count - REASONS_MAX);
             }
             (Verdict::Suspect, text)
         }

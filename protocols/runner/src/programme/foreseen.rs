@@ -70,10 +70,8 @@ pub fn foresee(
             notes.extend(plan.limits.unused(limits).iter().map(warned));
             if !programme.is_acknowledged {
                 to_acknowledge.extend(own.acknowledgements.iter().map(|reason| {
-                    let message = format!(
-                        "{}; write acknowledge = true into the file, or add --acknowledge",
-                        told(reason)
-                    );
+                    let message =
+                        format!("{}; write acknowledge = true into the file", told(reason));
                     Problem::warning(task.line, message)
                 }));
             }

@@ -130,7 +130,7 @@ pub fn parse_table(text: &str, columns: Option<&ColumnNames>) -> Result<Table, S
             return Err("the table names its columns in its first line already; leave out the names given beside it".into());
         }
         (false, None) => {
-            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or with --columns".into());
+            return Err("the table has no header; name its columns in the first line, as in t_s,depth_mm,force_N, or beside the file".into());
         }
     };
     let mut table = Table::default();

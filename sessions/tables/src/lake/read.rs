@@ -20,7 +20,7 @@ use walkdir::{DirEntry, WalkDir};
 #[non_exhaustive]
 pub enum LakeError {
     /// The folder is none.
-    #[error("{} is not a lake: it has no v1/samples and v1/sessions; make one with 'palpate export SESSION... --lake FOLDER'", path.display())]
+    #[error("{} is not a lake: it has no v1/samples and v1/sessions; export sessions to a lake first", path.display())]
     NoLake {
         /// The folder.
         path: PathBuf,

@@ -51,7 +51,7 @@ fn own_hash(page: &str) -> String {
 
 /// What a page says it describes, and whether the page itself is as it was made.
 pub fn claims(page: &str) -> Result<(Vec<Claim>, bool), String> {
-    let no_page = "this is not a page that 'palpate report --html' made; name that file";
+    let no_page = "this is not the page of a report; name one";
     let seal = page.rsplit_once(SEAL).ok_or(no_page)?.1;
     let told = seal.strip_suffix(SEAL_END).unwrap_or_default();
     let rows = page.split(ROW).skip(1).map(|row| {
@@ -157,7 +157,7 @@ mod tests {
         assert!(claims(&page.replace(">now<", ">then<")).unwrap().1);
         assert!(!claims(&page.replace("beef", "feed")).unwrap().1);
         for other in ["", "<html></html>", SEAL, &sealed("no rows\n")] {
-            assert!(claims(other).unwrap_err().contains("report --html"));
+            assert!(claims(other).unwrap_err().contains("page of a report"));
         }
     }
 }

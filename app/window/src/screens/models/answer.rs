@@ -1,12 +1,13 @@
 //! A comparison of models, drawn.
 
-use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
+use crate::plots::figure::{PlotLook, plot_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::remark::quiet_ui;
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
+use palpate_analysis::report::selection_plot::plot;
 use palpate_analysis::select::Selected;
 use palpate_figures::uncertain::plain;
 use palpate_rheology::select::{Candidate, Selection};
@@ -29,53 +30,13 @@ const COLUMNS: [(&str, f32); 11] = [
     ("dAICc", 78.0),
 ];
 
-/// The error that decides: of prediction where something was held out.
-fn error(selection: &Selection, one: &Candidate) -> Option<f64> {
-    if selection.is_predicted {
-        one.prediction.as_ref().map(|prediction| prediction.rms_n)
-    } else {
-        Some(one.rms_n)
-    }
-}
-
 /// Draws every family over its cost, and the table beneath.
 pub(super) fn families_ui(ui: &mut Ui, selection: &Selection) {
-    let title = if selection.is_predicted {
-        "Error of prediction over cost"
-    } else {
-        "Error of the fit over cost"
-    };
-    ui.label(RichText::new(title).heading().strong());
-    let drawn: Vec<(&Candidate, f64)> = selection
-        .candidates
-        .iter()
-        .filter_map(|one| Some((one, error(selection, one)?)))
-        .collect();
-    let marks: Vec<Mark> = drawn
-        .iter()
-        .map(|(one, error)| Mark {
-            at: [one.cost.operations as f64, 1e3 * error],
-            name: format!(
-                "{}\n{:.3} mN\n{} operations",
-                one.family,
-                1e3 * error,
-                one.cost.operations
-            ),
-        })
-        .collect();
-    let chosen = selection.verdict.family.as_ref();
-    let scatter = Scatter {
-        axes: ["operations an evaluation", "error, rms (mN)"],
-        marks: &marks,
-        has_front: true,
-        chosen: drawn
-            .iter()
-            .position(|(one, _)| Some(&one.family) == chosen),
-        level: selection.tolerance_n.map(|tolerance| 1e3 * tolerance),
-    };
+    let plot = plot(selection);
+    ui.label(RichText::new(&plot.title).heading().strong());
     let height = ui.available_height() * PLOT_SHARE;
     ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-        log_scatter_ui(ui, "families", &scatter);
+        plot_ui(ui, "families", &plot, PlotLook::default());
     });
     ui.add_space(4.0);
     ui.label(RichText::new("Families").heading().strong());

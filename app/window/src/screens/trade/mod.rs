@@ -5,7 +5,7 @@ mod shown;
 
 use super::screen::{Reply, Screen, ScreenEntry};
 use crate::command::{Command, Commands};
-use crate::plots::log_scatter::{Scatter, log_scatter_ui};
+use crate::plots::figure::{PlotLook, plot_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
@@ -17,6 +17,7 @@ use crate::widgets::tick_box::tick_box;
 use crate::workbench::Workbench;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, RichText, TextEdit, Ui, vec2};
+use palpate_analysis::report::scatter::Scatter;
 use palpate_analysis::report::text::capital;
 use palpate_analysis::trade::text::{advice, percent, terms};
 use palpate_analysis::trade::{self, Extent, SCENE_PEAK};
@@ -322,7 +323,7 @@ impl Screen for TradeScreen {
                 chosen: shown.chosen,
                 level,
             };
-            log_scatter_ui(ui, shown.axes[0], &scatter);
+            plot_ui(ui, shown.axes[0], &scatter.plot(), PlotLook::default());
         });
         table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
     }

@@ -1,7 +1,7 @@
 //! Tables of what was measured, as points and as rows.
 
-use crate::plots::log_scatter::Mark;
 use crate::widgets::table::{Column, Row, RowLook};
+use palpate_analysis::report::scatter::Mark;
 use palpate_analysis::trade::text::{digits, plain, time};
 use palpate_haptics::surface::{SceneCurves, ScenePlan};
 use palpate_rheology::trade::{TradeCurves, front};
@@ -42,7 +42,7 @@ impl Shown {
         if let [Some(cost), Some(error)] = at {
             self.marks.push(Mark {
                 at: [cost, error],
-                name: cells.join("\n"),
+                label: [String::new(), cells.join("\n")],
             });
         }
         let look = match (is_front, at[1]) {

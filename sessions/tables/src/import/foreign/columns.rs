@@ -211,7 +211,7 @@ fn missing(quantity: Quantity, header: &Header) -> String {
         .map(|name| format!("'{name}'"))
         .collect();
     format!(
-        "no column is known as the {0} ({1} has {2}); say which is with --column {0}=NAME, or with {0}=-NAME to turn its sign",
+        "no column is known as the {0} ({1} has {2}); say which is, as in {0}=NAME, or {0}=-NAME to turn its sign",
         quantity.name(),
         header.place,
         names.join(", ")
@@ -249,14 +249,14 @@ fn column(
         None if quantity == Quantity::Time => ("s", true),
         None => {
             return Err(format!(
-                "the {what} '{name}' has no unit; say it with --unit {what}=UNIT, one of {}",
+                "the {what} '{name}' has no unit; say it, as in {what}=UNIT, one of {}",
                 quantity.known_units()
             ));
         }
     };
     let scale = quantity.scale(unit).ok_or_else(|| {
         format!(
-            "the unit '{unit}' of the {what} '{name}' is not known; say one with --unit {what}=UNIT, known are {}",
+            "the unit '{unit}' of the {what} '{name}' is not known; say one, as in {what}=UNIT, known are {}",
             quantity.known_units()
         )
     })?;
@@ -342,7 +342,7 @@ fn named(quantity: Quantity, header: &Header, words: Words) -> Result<Option<usi
         [] => Ok(None),
         [index] => Ok(Some(index)),
         [first, second, ..] => Err(format!(
-            "columns '{}' and '{}' could both be the {what}; say which with --column {what}=NAME",
+            "columns '{}' and '{}' could both be the {what}; say which, as in {what}=NAME",
             header.names[first],
             header.names[second],
             what = quantity.name()

@@ -40,7 +40,7 @@ pub(super) fn decode(bytes: &[u8], told: Option<TextEncoding>) -> Result<(String
         .decode_without_bom_handling_and_without_replacement(body)
         .ok_or_else(|| {
             format!(
-                "it is not text in {}; say another with --encoding",
+                "it is not text in {}; say another encoding",
                 encoding.name()
             )
         })?;

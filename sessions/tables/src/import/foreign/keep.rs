@@ -145,14 +145,14 @@ fn ticks(samples: &[Sample]) -> Result<Vec<u64>, KeepError> {
         // Beyond 2^63 ticks, 106 days, differences of ticks would lose their sign.
         if !(0.0..9.2e18).contains(&tick) {
             return Err(refused(format!(
-                "the time {} s is more than 106 days after the first; say the unit with --unit time=UNIT, or cut the file",
+                "the time {} s is more than 106 days after the first; say the unit of time, or cut the file",
                 sample.t
             )));
         }
         let tick = tick as u64;
         if ticks.last().is_some_and(|last| tick <= *last) {
             return Err(refused(format!(
-                "the time {} s is less than a picosecond after the one before; say the unit with --unit time=UNIT",
+                "the time {} s is less than a picosecond after the one before; say the unit of time",
                 sample.t
             )));
         }

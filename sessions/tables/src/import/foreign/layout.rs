@@ -118,7 +118,7 @@ pub(super) fn find(
         ),
         None => {
             return Err(format!(
-                "no names of columns stand above the numbers that begin in {word} {}; name every column with --columns, as in --columns t_s,depth_mm,force_N, or say the {word} with --header-row",
+                "no names of columns stand above the numbers that begin in {word} {}; name every column, as in t_s,depth_mm,force_N, or say the {word} of the names",
                 rows.number(first)
             ));
         }
@@ -218,7 +218,7 @@ pub(super) fn decimal(
                 (Evidence::Only(decimal), None) => found = Some((decimal, here())),
                 (Evidence::Only(decimal), Some((before, place))) if decimal != *before => {
                     return Err(format!(
-                        "{place} has a decimal {}, {} a decimal {}; say which counts with --decimal, or mend the file",
+                        "{place} has a decimal {}, {} a decimal {}; say which counts, or mend the file",
                         before.name(),
                         here(),
                         decimal.name()
@@ -242,7 +242,7 @@ pub(super) fn decimal(
             Ok(decimal)
         }
         (None, Some(place)) => Err(format!(
-            "{place} could be in thousands or have a decimal sign, and no other number tells; say --decimal point or --decimal comma"
+            "{place} could be in thousands or have a decimal sign, and no other number tells; say which decimal sign counts, point or comma"
         )),
         (None, None) => {
             said.say("decimal sign", "none needed", false, option);

@@ -152,7 +152,7 @@ fn parse_text(file: &str, bytes: &[u8], told: &Told) -> Result<Understood, Strin
     let (text, how) = encoding::decode(bytes, told.encoding)?;
     let lines = formats::lines_of(&text);
     let delimiter = told.delimiter.or_else(|| Delimiter::detect(&lines));
-    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say so with --delimiter")?;
+    let delimiter = delimiter.ok_or("no line holds two numbers, so it is no table; if its columns are separated by something unusual, say by what")?;
     let detect = || Format::of_text(&lines, delimiter);
     let format = told.format.unwrap_or_else(detect);
     let Content::Text { cut, .. } = format.0.content else {
@@ -232,10 +232,7 @@ fn understand(cut: Vec<RawPart<'_>>, origin: &Imported, told: &Told) -> Result<U
             Err(Unknown::NoMeasurement(reason)) => left_out.push(named(reason)),
             Err(Unknown::Other(reason)) if is_whole => return Err(reason),
             Err(Unknown::Other(reason)) => {
-                return Err(format!(
-                    "{}; other parts can be chosen with --part",
-                    named(reason)
-                ));
+                return Err(format!("{}; other parts can be chosen", named(reason)));
             }
         }
     }

@@ -52,7 +52,7 @@ impl Reader<'_> {
             Some(Cell::Text(text)) if text.eq_ignore_ascii_case("nan") => return Ok(Value::Missing),
             Some(Cell::Text(text)) => parse(text, self.decimal).ok_or_else(|| {
                 format!(
-                    "{} {number}: the {} '{}' is not a number with a decimal {}; mend or remove the {0}, or say --decimal",
+                    "{} {number}: the {} '{}' is not a number with a decimal {}; mend or remove the {0}, or say the decimal sign",
                     self.rows.word(),
                     what.name(),
                     text.chars().take(40).collect::<String>(),
@@ -138,7 +138,7 @@ impl Reader<'_> {
     fn fault(&mut self, fault: Fault, number: usize, what: &str) -> Result<(), String> {
         if !self.skip.contains(&fault) {
             return Err(format!(
-                "{} {number}: {what}; mend the file, or leave such rows out with --skip {}",
+                "{} {number}: {what}; mend the file, or have such rows skipped: {}",
                 self.rows.word(),
                 fault.name()
             ));
@@ -277,6 +277,6 @@ fn turned(samples: &[Sample]) -> Option<String> {
     let (depth, force) = (mean(|one| one.0), mean(|one| one.1));
     let together: f64 = both.iter().map(|(x, f)| (x - depth) * (f - force)).sum();
     (together < 0.0).then(|| {
-        "the force falls where the depth grows; if the file counts one of them the other way round, turn it with --column force=-NAME or depth=-NAME".into()
+        "the force falls where the depth grows; if the file counts one of them the other way round, turn its sign, as in force=-NAME or depth=-NAME".into()
     })
 }

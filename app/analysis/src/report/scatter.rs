@@ -1,0 +1,99 @@
+//! Points over two logarithmic axes: what accuracy costs.
+
+use palpate_figures::figure::{Axis, Ink, Labels, Level, Plot, Series};
+use palpate_rheology::trade::front;
+
+/// One point.
+#[derive(Clone, Debug)]
+pub struct Mark {
+    /// Along both axes, above zero.
+    pub at: [f64; 2],
+    /// A short name beside it, and what is told of it on demand.
+    pub label: [String; 2],
+}
+
+/// What is drawn.
+#[derive(Clone, Copy, Debug)]
+pub struct Scatter<'a> {
+    /// Names of both axes with their units.
+    pub axes: [&'a str; 2],
+    /// All points.
+    pub marks: &'a [Mark],
+    /// Whether those that no other undercuts in both are joined: only where all stand for the same.
+    pub has_front: bool,
+    /// The one recommended.
+    pub chosen: Option<usize>,
+    /// A level not to exceed.
+    pub level: Option<f64>,
+}
+
+impl Scatter<'_> {
+    /// As a plot.
+    #[must_use]
+    pub fn plot(&self) -> Plot {
+        let best: Vec<usize> = match self.has_front {
+            true => front(&self.marks.iter().map(|mark| mark.at).collect::<Vec<_>>()),
+            false => Vec::new(),
+        };
+        // Where there is a front, a point beside it is hollow.
+        let is_hollow = |index: &usize| self.has_front && !best.contains(index);
+        let (hollow, full): (Vec<usize>, Vec<usize>) = (0..self.marks.len()).partition(is_hollow);
+        let points = |of: &[usize]| of.iter().map(|&index| self.marks[index].at).collect();
+        let labels = |of: &[usize]| {
+            let labels = of.iter().map(|&index| self.marks[index].label.clone());
+            Labels::Each(labels.collect())
+        };
+        let chosen: Vec<usize> = self.chosen.into_iter().collect();
+        let level = self.level.filter(|level| *level > 0.0).map(|at| Level {
+            name: "tolerance".to_owned(),
+            at,
+            ink: Ink::Limit,
+            is_dashed: false,
+        });
+        Plot {
+            levels: level.into_iter().collect(),
+            ..Plot::new(
+                "",
+                Axis::logarithmic(self.axes[0]),
+                Axis::logarithmic(self.axes[1]),
+            )
+            .with([
+                Series::line("", Ink::Quiet, 1.0, points(&best)),
+                Series::rings("", Ink::Text, 7.0, points(&chosen)),
+                Series::dots("", Ink::Series, 3.5, points(&full)).labelled(labels(&full)),
+                Series::rings("", Ink::Series, 3.5, points(&hollow)).labelled(labels(&hollow)),
+            ])
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_front_is_joined_and_what_lies_beside_it_is_hollow() {
+        let mark = |cost: f64, error: f64| Mark {
+            at: [cost, error],
+            label: [format!("{cost}"), String::new()],
+        };
+        let marks = [mark(1.0, 0.5), mark(5.0, 0.4), mark(4.0, 0.2)];
+        let scatter = Scatter {
+            axes: ["cost", "error"],
+            marks: &marks,
+            has_front: true,
+            chosen: Some(2),
+            level: Some(0.0),
+        };
+        let plot = scatter.plot();
+        assert!(plot.levels.is_empty());
+        let points: Vec<usize> = plot.series.iter().map(|one| one.points.len()).collect();
+        assert_eq!(points, [2, 1, 2, 1]);
+        assert_eq!(plot.series[3].points, [[5.0, 0.4]]);
+        let all = Scatter {
+            has_front: false,
+            ..scatter
+        };
+        assert_eq!(all.plot().series[2].points.len(), 3);
+    }
+}

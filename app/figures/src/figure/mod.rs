@@ -1,0 +1,360 @@
+//! A figure as data: plots with axes, lines, dots, bands and what is marked in them. Painters put it on a screen or
+//! into a file; none of them decides what it shows.
+
+mod labels;
+mod svg;
+
+pub use svg::{AxisNames, legend};
+
+use crate::tokens::Tokens;
+use ecolor::Color32;
+
+/// An ink by its use; each theme has its own colour for it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Ink {
+    /// What was measured.
+    Series,
+    /// What was fitted, and limits.
+    Limit,
+    /// What stands out.
+    Text,
+    /// What stands back.
+    Quiet,
+    /// Hairlines.
+    Line,
+    /// What waits for somebody.
+    Notice,
+    /// What is wrong.
+    Alarm,
+    /// Strong but grey.
+    Active,
+}
+
+impl Ink {
+    /// In a theme.
+    #[must_use]
+    pub fn of(self, tokens: &Tokens) -> Color32 {
+        match self {
+            Self::Series => tokens.series,
+            Self::Limit => tokens.limit,
+            Self::Text => tokens.text,
+            Self::Quiet => tokens.text_quiet,
+            Self::Line => tokens.line,
+            Self::Notice => tokens.notice_fill,
+            Self::Alarm => tokens.alarm_text,
+            Self::Active => tokens.active_fill,
+        }
+    }
+}
+
+/// How numbers lie along an axis.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Scale {
+    /// Evenly.
+    #[default]
+    Linear,
+    /// By their logarithm; a number that has none is drawn as the least there is.
+    Logarithmic,
+}
+
+/// A number at or below zero is drawn here on a logarithmic axis; nothing measured or computed is so small.
+const LEAST: f64 = 1e-18;
+
+impl Scale {
+    /// Where a number lies.
+    #[must_use]
+    pub fn place(self, value: f64) -> f64 {
+        match self {
+            Self::Linear => value,
+            Self::Logarithmic => value.max(LEAST).log10(),
+        }
+    }
+}
+
+/// One axis of a plot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Axis {
+    /// Its name with the unit.
+    pub name: String,
+    /// How numbers lie along it.
+    pub scale: Scale,
+    /// Lowest and highest number drawn; without it, all points are.
+    pub range: Option<[f64; 2]>,
+    /// Numbers that are seen in any case.
+    pub seen: Vec<f64>,
+}
+
+impl Axis {
+    /// An even axis of this name.
+    #[must_use]
+    pub fn linear(name: &str) -> Self {
+        Self {
+            name: name.to_owned(),
+            ..Self::default()
+        }
+    }
+
+    /// A logarithmic axis of this name.
+    #[must_use]
+    pub fn logarithmic(name: &str) -> Self {
+        Self {
+            scale: Scale::Logarithmic,
+            ..Self::linear(name)
+        }
+    }
+
+    /// From one number to another.
+    #[must_use]
+    pub fn over(self, range: [f64; 2]) -> Self {
+        Self {
+            range: Some(range),
+            ..self
+        }
+    }
+
+    /// With these numbers seen in any case.
+    #[must_use]
+    pub fn seeing(self, seen: &[f64]) -> Self {
+        Self {
+            seen: seen.to_vec(),
+            ..self
+        }
+    }
+}
+
+/// How points are drawn.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Shape {
+    /// A line of this width in px, whole or dashed.
+    Line {
+        /// Width in px.
+        width: f64,
+        /// Whether it is dashed.
+        is_dashed: bool,
+    },
+    /// A dot at each point, filled or hollow.
+    Dots {
+        /// Radius in px.
+        radius: f64,
+        /// Whether it is filled.
+        is_filled: bool,
+    },
+}
+
+/// What is written at points.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Labels {
+    /// Nothing; the legend has the name.
+    #[default]
+    None,
+    /// The name, beside the last point.
+    AtEnd,
+    /// At each point: a short name beside it, and what is told of it on demand.
+    Each(Vec<[String; 2]>),
+}
+
+/// Points that belong together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Series {
+    /// What they are; empty for what needs no name.
+    pub name: String,
+    /// Their ink.
+    pub ink: Ink,
+    /// How strong it is, 0 to 1.
+    pub opacity: f64,
+    /// How they are drawn.
+    pub shape: Shape,
+    /// In order along the line.
+    pub points: Vec<[f64; 2]>,
+    /// What is written at them.
+    pub labels: Labels,
+}
+
+impl Series {
+    /// A whole line.
+    #[must_use]
+    pub fn line(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
+        let shape = Shape::Line {
+            width,
+            is_dashed: false,
+        };
+        Self::new(name, ink, shape, points)
+    }
+
+    /// A dashed line.
+    #[must_use]
+    pub fn dashed(name: &str, ink: Ink, width: f64, points: Vec<[f64; 2]>) -> Self {
+        let shape = Shape::Line {
+            width,
+            is_dashed: true,
+        };
+        Self::new(name, ink, shape, points)
+    }
+
+    /// Filled dots.
+    #[must_use]
+    pub fn dots(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
+        let shape = Shape::Dots {
+            radius,
+            is_filled: true,
+        };
+        Self::new(name, ink, shape, points)
+    }
+
+    /// Rings.
+    #[must_use]
+    pub fn rings(name: &str, ink: Ink, radius: f64, points: Vec<[f64; 2]>) -> Self {
+        let shape = Shape::Dots {
+            radius,
+            is_filled: false,
+        };
+        Self::new(name, ink, shape, points)
+    }
+
+    fn new(name: &str, ink: Ink, shape: Shape, points: Vec<[f64; 2]>) -> Self {
+        Self {
+            name: name.to_owned(),
+            ink,
+            opacity: 1.0,
+            shape,
+            points,
+            labels: Labels::None,
+        }
+    }
+
+    /// With something written at its points.
+    #[must_use]
+    pub fn labelled(self, labels: Labels) -> Self {
+        Self { labels, ..self }
+    }
+}
+
+/// What lies between two lines over the same abscissas.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Band {
+    /// What it is.
+    pub name: String,
+    /// Its ink, drawn thinly.
+    pub ink: Ink,
+    /// Lower and upper edge.
+    pub edges: [Vec<[f64; 2]>; 2],
+}
+
+/// A shaded stretch of the abscissa.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Stretch {
+    /// What it is.
+    pub name: String,
+    /// From and to.
+    pub ends: [f64; 2],
+}
+
+/// A value that is marked across the whole plot.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Level {
+    /// What it is; empty for a zero.
+    pub name: String,
+    /// The value.
+    pub at: f64,
+    /// Its ink.
+    pub ink: Ink,
+    /// Whether it is dashed.
+    pub is_dashed: bool,
+}
+
+/// One plot.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Plot {
+    /// What it shows.
+    pub title: String,
+    /// Its axes.
+    pub x: Axis,
+    /// The upright one.
+    pub y: Axis,
+    /// Shaded stretches, behind everything.
+    pub stretches: Vec<Stretch>,
+    /// Bands, behind the lines.
+    pub bands: Vec<Band>,
+    /// Marked values.
+    pub levels: Vec<Level>,
+    /// Lines and dots, those in front last.
+    pub series: Vec<Series>,
+    /// A sentence in the plot, such as why there is nothing to see.
+    pub remark: Option<String>,
+}
+
+impl Plot {
+    /// An empty plot of two axes.
+    #[must_use]
+    pub fn new(title: &str, x: Axis, y: Axis) -> Self {
+        Self {
+            title: title.to_owned(),
+            x,
+            y,
+            ..Self::default()
+        }
+    }
+
+    /// With these lines and dots.
+    #[must_use]
+    pub fn with(self, series: impl IntoIterator<Item = Series>) -> Self {
+        Self {
+            series: series.into_iter().collect(),
+            ..self
+        }
+    }
+
+    /// Where a point lies on its axes.
+    #[must_use]
+    pub fn place(&self, [x, y]: [f64; 2]) -> [f64; 2] {
+        [self.x.scale.place(x), self.y.scale.place(y)]
+    }
+
+    /// Names and inks of what has no name beside it: series, then stretches, each name once.
+    #[must_use]
+    pub fn legend(&self) -> Vec<(&str, Ink)> {
+        let series = self.series.iter();
+        let series = series.filter(|one| one.labels == Labels::None);
+        let series = series.map(|one| (one.name.as_str(), one.ink));
+        let bands = self.bands.iter().map(|one| (one.name.as_str(), one.ink));
+        let shaded = self.stretches.iter();
+        let shaded = shaded.map(|one| (one.name.as_str(), Ink::Line));
+        let mut names: Vec<(&str, Ink)> = Vec::new();
+        for (name, ink) in series.chain(bands).chain(shaded) {
+            if !name.is_empty() && names.iter().all(|(known, _)| *known != name) {
+                names.push((name, ink));
+            }
+        }
+        names
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_legend_names_each_thing_once_and_nothing_that_has_its_name_beside_it() {
+        let line = |name: &str| Series::line(name, Ink::Series, 1.0, Vec::new());
+        let plot = Plot {
+            stretches: vec![Stretch {
+                name: "flat".into(),
+                ends: [0.0, 1.0],
+            }],
+            ..Plot::default().with([
+                line("one"),
+                line(""),
+                line("one"),
+                line("two").labelled(Labels::AtEnd),
+            ])
+        };
+        assert_eq!(plot.legend(), [("one", Ink::Series), ("flat", Ink::Line)]);
+    }
+
+    #[test]
+    fn what_has_no_logarithm_is_drawn_as_the_least() {
+        assert_eq!(Scale::Logarithmic.place(1000.0), 3.0);
+        assert_eq!(Scale::Logarithmic.place(0.0), -18.0);
+        assert_eq!(Scale::Linear.place(-2.0), -2.0);
+    }
+}

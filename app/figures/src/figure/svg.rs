@@ -1,0 +1,242 @@
+//! A plot drawn into a rectangle of a picture for a file.
+
+use super::labels::{beside, pushed_apart};
+use super::{Labels, Plot, Scale, Series, Shape};
+use crate::drawing::{Anchor, FONT, Ink as TextInk, Look, Panel, Svg};
+use crate::tokens::LIGHT;
+
+/// Length of dashes in px.
+const DASH: f64 = 5.0;
+/// Letters are about so wide, in px.
+const LETTER: f64 = 7.0;
+
+/// Which names of axes are written: of plots above each other only the lowest needs both.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum AxisNames {
+    /// Both.
+    Both,
+    /// The upright one's.
+    Upright,
+}
+
+impl Plot {
+    /// Draws it with its axes; the legend is drawn by itself, where there is room for it.
+    pub fn draw(&self, svg: &mut Svg, place: [f64; 4], names: AxisNames) {
+        let panel = self.panel(place);
+        for stretch in &self.stretches {
+            panel.shade(svg, stretch.ends.map(|x| self.x.scale.place(x)), LIGHT.line);
+        }
+        let x_name = match names {
+            AxisNames::Both => self.x.name.as_str(),
+            AxisNames::Upright => "",
+        };
+        let look = Look {
+            text: LIGHT.text_quiet,
+            grid: LIGHT.line,
+        };
+        let scales = [self.x.scale, self.y.scale].map(|scale| scale == Scale::Logarithmic);
+        panel.scaled_axes(svg, [x_name, &self.y.name], scales, look);
+        for band in &self.bands {
+            let [lower, upper] = band.edges.each_ref().map(|edge| self.placed(&panel, edge));
+            if !upper.is_empty() {
+                svg.band(&upper, &lower, band.ink.of(&LIGHT));
+            }
+        }
+        self.draw_levels(svg, &panel);
+        for one in &self.series {
+            self.draw_series(svg, &panel, one);
+        }
+        self.draw_names(svg, &panel);
+        if let Some(remark) = &self.remark {
+            let at = [place[0] + 12.0, place[1] + 24.0];
+            svg.text(at, TextInk::plain(LIGHT.text_quiet), remark);
+        }
+    }
+
+    fn panel(&self, place: [f64; 4]) -> Panel {
+        let points = self.series.iter().flat_map(|one| &one.points);
+        let edges = self
+            .bands
+            .iter()
+            .flat_map(|band| band.edges.iter().flatten());
+        let placed = points.chain(edges).map(|point| self.place(*point));
+        let placed: Vec<[f64; 2]> = placed
+            .filter(|point| point.iter().all(|value| value.is_finite()))
+            .collect();
+        let [left, right] = match (self.x.range, self.x.scale) {
+            (Some(range), scale) => range.map(|x| scale.place(x)),
+            (None, Scale::Logarithmic) => Panel::around_logarithms(place, &placed).x,
+            (None, Scale::Linear) => {
+                let ends = |start: f64, of: fn(f64, f64) -> f64| {
+                    placed.iter().map(|point| point[0]).fold(start, of)
+                };
+                let (low, high) = (
+                    ends(f64::INFINITY, f64::min),
+                    ends(f64::NEG_INFINITY, f64::max),
+                );
+                if low < high { [low, high] } else { [0.0, 1.0] }
+            }
+        };
+        let levels = self.levels.iter().map(|level| level.at);
+        let seen = self.y.seen.iter().copied().chain(levels);
+        let seen = seen.map(|y| [left, self.y.scale.place(y)]);
+        let all: Vec<[f64; 2]> = placed.iter().copied().chain(seen).collect();
+        let y = match (self.y.range, self.y.scale) {
+            (Some(range), scale) => range.map(|y| scale.place(y)),
+            (None, Scale::Linear) => Panel::around(place, [left, right], &[&all]).y,
+            (None, Scale::Logarithmic) => Panel::around_logarithms(place, &all).y,
+        };
+        Panel {
+            place,
+            x: [left, right],
+            y,
+        }
+    }
+
+    fn placed(&self, panel: &Panel, points: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        let places = points.iter().map(|point| panel.at(self.place(*point)));
+        places.collect()
+    }
+
+    fn draw_levels(&self, svg: &mut Svg, panel: &Panel) {
+        let [left, _, right, _] = panel.place;
+        for level in &self.levels {
+            let [_, y] = panel.at([panel.x[0], self.y.scale.place(level.at)]);
+            let ink = level.ink.of(&LIGHT);
+            let (width, dash) = match (level.is_dashed, level.name.is_empty()) {
+                (true, _) => (1.6, DASH),
+                (false, true) => (0.8, 0.0),
+                (false, false) => (1.6, 0.0),
+            };
+            svg.dashed_line(&[[left, y], [right, y]], ink, width, dash);
+            svg.text([left + 6.0, y - 5.0], TextInk::plain(ink), &level.name);
+        }
+    }
+
+    fn draw_series(&self, svg: &mut Svg, panel: &Panel, one: &Series) {
+        let ink = match one.opacity {
+            1.0.. => one.ink.of(&LIGHT),
+            faint => LIGHT.canvas.lerp_to_gamma(one.ink.of(&LIGHT), faint as f32),
+        };
+        let places = self.placed(panel, &one.points);
+        match one.shape {
+            Shape::Line { width, is_dashed } => {
+                let dash = if is_dashed { DASH } else { 0.0 };
+                svg.dashed_line(&places, ink, width, dash);
+            }
+            Shape::Dots { radius, is_filled } => {
+                for at in places {
+                    svg.dot(at, ink, radius);
+                    if !is_filled {
+                        svg.dot(at, LIGHT.canvas, radius - 1.6);
+                    }
+                }
+            }
+        }
+    }
+
+    fn draw_names(&self, svg: &mut Svg, panel: &Panel) {
+        let [_, top, right, bottom] = panel.place;
+        let text = TextInk::plain(LIGHT.text);
+        let named = self.series.iter().filter(|one| one.labels == Labels::AtEnd);
+        let ends: Vec<(&str, [f64; 2])> = named
+            .filter_map(|one| {
+                let last = one.points.last()?;
+                Some((one.name.as_str(), panel.at(self.place(*last))))
+            })
+            .collect();
+        let heights: Vec<f64> = ends.iter().map(|(_, [_, y])| *y).collect();
+        for ((name, end), y) in ends.iter().zip(pushed_apart(&heights, [top, bottom])) {
+            svg.line(&[*end, [right + 14.0, y]], LIGHT.line, 0.6);
+            let at = [right + 18.0, y + 0.35 * FONT];
+            svg.text(at, text.anchored(Anchor::Start), name);
+        }
+        let all = self.series.iter().flat_map(|one| &one.points).copied();
+        let points = self.placed(panel, &all.collect::<Vec<_>>());
+        let mut labels: Vec<[f64; 2]> = Vec::new();
+        for one in &self.series {
+            let Labels::Each(names) = &one.labels else {
+                continue;
+            };
+            for (place, [name, _]) in self.placed(panel, &one.points).into_iter().zip(names) {
+                let at = beside(place, [top, bottom], &points, &labels);
+                labels.push(at);
+                svg.text(at, text, name);
+            }
+        }
+    }
+}
+
+/// Names and their inks in one line that ends at the right.
+pub fn legend(svg: &mut Svg, [right, y]: [f64; 2], plot: &Plot) {
+    let mut x = right;
+    for (name, ink) in plot.legend().into_iter().rev() {
+        x -= LETTER * name.chars().count() as f64 + 12.0;
+        svg.text([x, y + 4.0], TextInk::plain(LIGHT.text), name);
+        svg.line(&[[x - 26.0, y], [x - 6.0, y]], ink.of(&LIGHT), 2.5);
+        x -= 34.0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Axis, Ink, Level};
+    use super::*;
+
+    fn drawn(plot: &Plot) -> String {
+        let mut svg = Svg::new(400.0);
+        plot.draw(&mut svg, [50.0, 10.0, 350.0, 210.0], AxisNames::Both);
+        svg.finish(260.0, LIGHT.canvas, "a plot")
+    }
+
+    #[test]
+    fn points_levels_and_names_stand_where_the_axes_say() {
+        let x = Axis::linear("x (mm)").over([0.0, 10.0]);
+        let y = Axis::linear("y (N)");
+        let line = Series::line("rises", Ink::Series, 1.0, vec![[0.0, 0.0], [10.0, 1.0]]);
+        let plot = Plot {
+            levels: vec![Level {
+                name: "most".into(),
+                at: 1.0,
+                ink: Ink::Limit,
+                is_dashed: true,
+            }],
+            ..Plot::new("", x, y).with([line.labelled(Labels::AtEnd)])
+        };
+        let text = drawn(&plot);
+        // A margin of a twentieth of the height lies above and below.
+        let low = 210.0 - 200.0 * 0.05 / 1.1;
+        let high = 10.0 + 200.0 * 0.05 / 1.1;
+        assert!(
+            text.contains(&format!("points=\"50.0,{low:.1} 350.0,{high:.1}\"")),
+            "{text}"
+        );
+        assert!(
+            text.contains("stroke-dasharray") && text.contains(">most<"),
+            "{text}"
+        );
+        assert!(
+            text.contains(">rises<") && text.contains(">x (mm)<"),
+            "{text}"
+        );
+    }
+
+    #[test]
+    fn a_logarithmic_axis_has_its_marks_at_powers_or_between_them() {
+        let axes = |range| {
+            let x = Axis::logarithmic("x").over(range);
+            let line = Series::line("", Ink::Series, 1.0, vec![[range[0], 1.0], [range[1], 2.0]]);
+            drawn(&Plot::new("", x, Axis::linear("y")).with([line]))
+        };
+        let wide = axes([0.01, 1000.0]);
+        assert!(
+            wide.contains(">0.01<") && wide.contains(">100<") && !wide.contains(">20<"),
+            "{wide}"
+        );
+        let narrow = axes([15.0, 60.0]);
+        assert!(
+            narrow.contains(">20<") && narrow.contains(">50<"),
+            "{narrow}"
+        );
+    }
+}
