@@ -31,7 +31,7 @@ pub type Window = Harness<'static, WorkbenchApp>;
 
 /// A screen of a window.
 #[must_use]
-pub fn screen<T: Screen>(window: &Window) -> &T {
+pub fn screen_of<T: Screen>(window: &Window) -> &T {
     window.state().screen().unwrap()
 }
 
@@ -39,7 +39,7 @@ pub fn screen<T: Screen>(window: &Window) -> &T {
 #[must_use]
 pub fn refit(window: &Window) -> Refit<'_> {
     let run = window.state().snapshot().run.as_ref();
-    screen::<RunScreen>(window).refit(run)
+    screen_of::<RunScreen>(window).refit(run)
 }
 
 /// Sleep between two frames of a wait.

@@ -12,7 +12,7 @@ use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
 use palpate_runner::TimeScale;
 use palpate_test_support::skip::{Need, skip};
-use palpate_tests::flow::screen;
+use palpate_tests::flow::screen_of;
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
 use palpate_window::screens::haptics::HapticsScreen;
@@ -140,7 +140,7 @@ fn show(window: &mut Window, session: &Path) {
 
 /// Checks the device of the guide's example on the haptics screen, unless that is done.
 fn check_buzz(window: &mut Window) {
-    if screen::<HapticsScreen>(window).looked().is_some() {
+    if screen_of::<HapticsScreen>(window).looked().is_some() {
         return;
     }
     window.get_by_label("current").click_accesskit();
@@ -154,7 +154,7 @@ fn check_buzz(window: &mut Window) {
     window.get_by_label("Check  F6").click_accesskit();
     for _ in 0..FRAMES_MAX {
         window.step();
-        if screen::<HapticsScreen>(window).looked().is_some() {
+        if screen_of::<HapticsScreen>(window).looked().is_some() {
             // A caret in a field would come and go.
             window.get_by_label("Check  F6").focus();
             window.run_steps(2);
@@ -169,7 +169,7 @@ fn check_buzz(window: &mut Window) {
 fn compute_poke(window: &mut Window) {
     for _ in 0..FRAMES_MAX {
         window.step();
-        if screen::<SceneScreen>(window).ahead().is_some() {
+        if screen_of::<SceneScreen>(window).ahead().is_some() {
             window.run_steps(2);
             return;
         }
