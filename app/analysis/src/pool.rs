@@ -1,16 +1,18 @@
 //! Many pieces of work on a few named threads, with answers in the order of the pieces.
 
+use rayon::ThreadPoolBuilder;
+use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::io;
-use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
-use std::thread::Builder;
 
 /// What happened to one piece of work.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum NoAnswer {
     /// It was not begun: the whole was asked to end.
     NotBegun,
-    /// Its thread ended without an answer.
+    /// It panicked.
     Died,
 }
 
@@ -34,61 +36,40 @@ pub fn in_order<T: Sync, R: Send>(
     work: impl Fn(&T) -> R + Sync,
     mut hear: impl FnMut(News<R>),
 ) -> io::Result<()> {
-    let next = AtomicUsize::new(0);
     let jobs = jobs.clamp(1, pieces.len().max(1));
+    let pool = ThreadPoolBuilder::new()
+        .num_threads(jobs)
+        .thread_name(|index| format!("fit-{}", index + 1))
+        .build()
+        .map_err(io::Error::other)?;
+    // Pieces leave the bridge one by one, in order.
+    let one = |piece: &T| match is_ending.load(Ordering::Relaxed) {
+        true => Err(NoAnswer::NotBegun),
+        false => catch_unwind(AssertUnwindSafe(|| work(piece))).map_err(|_| NoAnswer::Died),
+    };
     let (sender, receiver) = sync_channel(jobs);
-    let mut answers: Vec<Option<R>> = pieces.iter().map(|_| None).collect();
-    let mut told = 0;
-    std::thread::scope(|scope| {
-        let (next, work) = (&next, &work);
-        let mut threads = Vec::with_capacity(jobs);
-        for number in 1..=jobs {
-            let sender = sender.clone();
-            let one = move || {
-                while !is_ending.load(Ordering::Relaxed) {
-                    let index = next.fetch_add(1, Ordering::Relaxed);
-                    let Some(piece) = pieces.get(index) else {
-                        return;
-                    };
-                    if sender.send((index, work(piece))).is_err() {
-                        return;
-                    }
-                }
-            };
-            match Builder::new()
-                .name(format!("fit-{number}"))
-                .spawn_scoped(scope, one)
-            {
-                Ok(thread) => threads.push(thread),
-                // Fewer threads do the same work; none cannot.
-                Err(err) if threads.is_empty() => return Err(err),
-                Err(_) => break,
+    let mut answers: Vec<Option<Result<R, NoAnswer>>> = pieces.iter().map(|_| None).collect();
+    let (mut done, mut told) = (0, 0);
+    pool.in_place_scope(|scope| {
+        scope.spawn(|_| {
+            let pieces = pieces.iter().enumerate().par_bridge();
+            // Nobody listens any more only where `hear` itself panicked.
+            let _ = pieces.try_for_each_with(sender, |sender, (index, piece)| {
+                sender.send((index, one(piece))).ok()
+            });
+        });
+        for (index, answer) in receiver {
+            if answer.is_ok() {
+                done += 1;
+                hear(News::Done(done));
             }
-        }
-        drop(sender);
-        for (done, (index, answer)) in receiver.iter().enumerate() {
-            hear(News::Done(done + 1));
             answers[index] = Some(answer);
             while let Some(answer) = answers.get_mut(told).and_then(Option::take) {
-                hear(News::Next(Ok(answer)));
+                hear(News::Next(answer));
                 told += 1;
             }
         }
-        // Joined here, so that a thread that died is an answer that is missing and not a panic.
-        threads.into_iter().for_each(|thread| {
-            let _ = thread.join();
-        });
-        Ok(())
-    })?;
-    let begun = next.load(Ordering::Relaxed).min(pieces.len());
-    for (index, answer) in answers.iter_mut().enumerate().skip(told) {
-        let none = if index < begun {
-            NoAnswer::Died
-        } else {
-            NoAnswer::NotBegun
-        };
-        hear(News::Next(answer.take().ok_or(none)));
-    }
+    });
     Ok(())
 }
 
