@@ -1,15 +1,8 @@
 //! The inverse of a small orthogonal factorisation, or what its columns cannot tell apart.
 
 use super::information::{BODY, PARAMETER_NAMES};
+use crate::fit::{CONDITION_MAX, heaviest};
 use palpate_model::linalg::Triangle;
-
-/// A design with columns of unit length and a smallest singular value below the inverse of this
-/// does not separate its parameters; the limit that fits use. Useful protocols lie between 20 and
-/// 1e4, a single ramp above 1e10.
-const CONDITION_MAX: f64 = 1e6;
-
-/// Parameters with at least this share of the largest entry belong to the blind combination.
-const NAMED_SHARE: f64 = 0.2;
 
 /// The inverse; where columns of these lengths do not tell their parameters apart, which ones.
 pub fn inverse(
@@ -62,12 +55,9 @@ fn largest_singular(matrix: &[[f64; BODY]; BODY]) -> (f64, [f64; BODY]) {
 }
 
 fn named(blind: &[f64; BODY]) -> String {
-    let largest = blind.iter().fold(0.0f64, |max, value| max.max(value.abs()));
-    let names: Vec<&str> = PARAMETER_NAMES
+    let names: Vec<&str> = heaviest(blind)
         .into_iter()
-        .zip(blind)
-        .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
-        .map(|(name, _)| name)
+        .map(|place| PARAMETER_NAMES[place])
         .collect();
     match names.as_slice() {
         [one, other] => format!("{one} from {other}"),

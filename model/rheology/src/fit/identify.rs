@@ -12,12 +12,6 @@ use super::sample::FitError;
 use super::system::{System, Unknown};
 use super::triangle::Triangle;
 
-/// A scaled design worse than this does not separate its parameters. Real protocols lie between
-/// 20 and 1e4, a single ramp redrawn as one straight piece above 1e10.
-const CONDITION_MAX: f64 = 1e6;
-/// Parameters with at least this share of the largest entry belong to the blind combination.
-const NAMED_SHARE: f64 = 0.2;
-
 /// Whether the derivatives by the outer parameters belong to the design that is judged.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(super) enum Judged {
@@ -44,19 +38,13 @@ pub(super) fn check(system: &System<'_>, points: &[Point], judged: Judged) -> Re
     for (record, point) in points.iter().enumerate() {
         push_rows(system, record, point, &unknowns, &mut triangle)?;
     }
-    let (condition, blind) = triangle.finish().condition(width);
-    if condition < CONDITION_MAX {
+    let Some(blind) = triangle.finish().blind(width) else {
         return Ok(());
-    }
-    let largest = blind
-        .iter()
-        .fold(0.0, |max: f64, value| max.max(value.abs()));
-    let names: Vec<String> = unknowns
-        .iter()
-        .zip(&blind)
-        .filter(|(_, value)| value.abs() >= NAMED_SHARE * largest)
-        .map(|(unknown, _)| name(system, unknown))
-        .collect();
+    };
+    let names = blind
+        .into_iter()
+        .map(|place| name(system, &unknowns[place]));
+    let names: Vec<String> = names.collect();
     if names.is_empty() {
         return Err(FitError::Overflow);
     }

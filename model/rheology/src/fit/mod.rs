@@ -41,3 +41,4 @@ pub use solve::{Fitted, fit, fit_body, fit_coefficients, fit_joint};
 pub use systematic::{
     Systematic, SystematicError, TermError, Traced, systematic, systematic_joint,
 };
+pub(crate) use triangle::{CONDITION_MAX, heaviest};

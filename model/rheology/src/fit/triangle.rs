@@ -7,6 +7,20 @@
 use super::design::{LANES, Lane};
 use crate::vectors::wide;
 
+/// A scaled design worse than this does not separate its parameters. Useful protocols lie between 20 and 1e4, a single
+/// ramp drawn as one straight piece above 1e10.
+pub(crate) const CONDITION_MAX: f64 = 1e6;
+/// Parameters with at least this share of the largest entry belong to a combination that a design is blind to.
+const NAMED_SHARE: f64 = 0.2;
+
+/// Places of the parameters that make up a combination.
+pub(crate) fn heaviest(combination: &[f64]) -> Vec<usize> {
+    let sizes = || combination.iter().map(|value| value.abs());
+    let least = NAMED_SHARE * sizes().fold(0.0, f64::max);
+    let kept = sizes().enumerate().filter(|(_, size)| *size >= least);
+    kept.map(|(place, _)| place).collect()
+}
+
 /// The upper triangle of all rows so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Triangle {
@@ -167,12 +181,7 @@ impl Factor {
 
     /// Coefficients of the first `columns` columns that fit the last column best.
     pub fn solve(&self, columns: usize) -> Vec<f64> {
-        let mut solution = vec![0.0; columns];
-        for i in (0..columns).rev() {
-            let known: f64 = (i + 1..columns).map(|j| self.at(i, j) * solution[j]).sum();
-            solution[i] = (self.at(i, self.width - 1) - known) / self.at(i, i);
-        }
-        solution
+        self.solve_beside(columns, &[])
     }
 
     /// Whether all its numbers are.
@@ -245,6 +254,14 @@ impl Factor {
             y[i] = (combination[i] - known) / self.at(i, i);
         }
         y
+    }
+
+    /// Which of the first `columns` columns cannot be told apart; `None` where all can.
+    pub fn blind(&self, columns: usize) -> Option<Vec<usize>> {
+        let (condition, combination) = self.condition(columns);
+        // NaN tells nothing apart.
+        let is_told = condition < CONDITION_MAX;
+        (!is_told).then(|| heaviest(&combination))
     }
 
     /// Singular values of the first `columns` columns, each scaled to unit length, with the right

@@ -4,11 +4,6 @@ use super::super::design::{Columns, legendre_from_powers};
 use super::super::options::{LINEAR, LINEAR_COUNT, PARAMETER_NAMES, TAU};
 use super::super::triangle::Triangle;
 
-/// A scaled design worse than this does not separate its parameters. Real protocols lie between
-/// 20 and 1e4, a single straight ramp above 1e10.
-const CONDITION_MAX: f64 = 1e6;
-/// Parameters with at least this share of the largest entry belong to a blind combination.
-const NAMED_SHARE: f64 = 0.2;
 /// Rows of the design at most; at least [`ROWS_PIECE_MIN`] on each straight piece.
 const ROWS: usize = 768;
 const ROWS_PIECE_MIN: usize = 4;
@@ -40,15 +35,10 @@ impl Blind {
                 chosen[kept.len()] = 0.0;
                 triangle.push(&chosen[..=kept.len()], *weight);
             }
-            let (condition, blind) = triangle.finish().condition(kept.len());
-            if condition < CONDITION_MAX {
+            let Some(blind) = triangle.finish().blind(kept.len()) else {
                 break;
-            }
-            let largest = blind.iter().fold(0.0f64, |max, share| max.max(share.abs()));
-            let group: Vec<usize> = (0..kept.len())
-                .filter(|&place| blind[place].abs() >= NAMED_SHARE * largest)
-                .map(|place| kept[place])
-                .collect();
+            };
+            let group: Vec<usize> = blind.into_iter().map(|place| kept[place]).collect();
             // Without one of them the others may still be told apart; the viscous coefficient and
             // the levels go first, since a display can do without them.
             let Some(&dropped) = group
