@@ -12,8 +12,6 @@ use serde::{Deserialize, Serialize};
 pub const CALIBRATION_FORMAT: u32 = 1;
 /// Days for which a calibration is taken as valid: load cells are commonly calibrated once a year.
 pub const VALID_DAYS: u32 = 365;
-/// The same for a cell in heavy use.
-pub const VALID_DAYS_HEAVY_USE: u32 = 182;
 /// Masses this near, in g, are the same: no weight set of a laboratory has a finer one.
 const SAME_MASS: f64 = 1e-6;
 

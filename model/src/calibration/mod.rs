@@ -21,7 +21,7 @@ pub use choice::{Candidate, candidates, judge_kind};
 pub use curve::{Curve, DEGREE_MAX};
 pub use document::{
     CALIBRATION_FORMAT, Calibration, Direction, NamedWeight, Point, Reading, Series, SeriesStep,
-    VALID_DAYS, VALID_DAYS_HEAVY_USE,
+    VALID_DAYS,
 };
 pub use error::CalibrationError;
 pub use kind::CurveKind;

@@ -39,16 +39,6 @@ impl Linear {
         }
     }
 
-    /// `k_inf = c0 / tau` in N/mm: stiffness of fast motions.
-    #[must_use]
-    pub fn fast_stiffness(&self) -> f64 {
-        if self.tau > 0.0 {
-            self.damping / self.tau
-        } else {
-            self.stiffness
-        }
-    }
-
     /// Damping in N s/mm that the lag alone takes, at any tick: `k0 tau - c0`.
     #[must_use]
     pub fn lag(&self) -> f64 {

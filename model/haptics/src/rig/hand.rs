@@ -74,17 +74,6 @@ impl Hand {
         path: HandPath::Still { at: 0.0 },
     };
 
-    /// Two fingers that lead the handle loosely.
-    #[must_use]
-    pub fn loose(path: HandPath) -> Self {
-        Self {
-            mass_kg: 0.05,
-            stiffness: 0.2,
-            damping: 0.002,
-            path,
-        }
-    }
-
     /// A firm grip.
     #[must_use]
     pub fn firm(path: HandPath) -> Self {

@@ -222,11 +222,6 @@ impl FitOptions {
         self.is_at_rest
     }
 
-    /// The value a parameter is kept at, `None` if the fit finds it.
-    pub fn fixed_value(&self, name: &str) -> Result<Option<f64>, FitError> {
-        Ok(self.fixed[self.index_of(name)?])
-    }
-
     /// How many parameters the fit finds.
     #[must_use]
     pub fn free_count(&self) -> usize {
@@ -267,11 +262,11 @@ mod tests {
         let mut options = FitOptions::default();
         assert_eq!(options.names(), PARAMETER_NAMES);
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed_value("x_contact"), Ok(Some(0.0)));
+        assert_eq!(options.fixed()[7], Some(0.0));
         options.free("x_contact").unwrap();
         options.fix("tau_eps", 1.5).unwrap();
         assert_eq!(options.free_count(), 7);
-        assert_eq!(options.fixed_value("tau_eps"), Ok(Some(1.5)));
+        assert_eq!(options.fixed()[TAU], Some(1.5));
     }
 
     #[test]
