@@ -86,6 +86,55 @@ pub enum CheckError {
     },
 }
 
+impl KnownWeight {
+    /// Its limit in percent, if its numbers can be.
+    fn checked_limit(&self) -> Result<f64, CheckError> {
+        let limit_percent = self.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
+        let is_positive = |value: f64| value > 0.0 && value.is_finite();
+        for (what, value, is_right, advice) in [
+            (
+                "mass",
+                self.mass_g,
+                is_positive(self.mass_g),
+                "give grams above 0",
+            ),
+            (
+                "limit",
+                limit_percent,
+                is_positive(limit_percent),
+                "give percent above 0",
+            ),
+            (
+                "signal",
+                self.volts.0,
+                self.volts.is_finite(),
+                "read it again",
+            ),
+            (
+                "tolerance",
+                self.tolerance_g.unwrap_or(0.0),
+                self.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
+                "give grams, 0 or more",
+            ),
+            (
+                "tare",
+                self.tare.0,
+                self.tare.is_finite(),
+                "read the empty cell again",
+            ),
+        ] {
+            if !is_right {
+                return Err(CheckError::Number {
+                    what,
+                    value,
+                    advice,
+                });
+            }
+        }
+        Ok(limit_percent)
+    }
+}
+
 impl Calibration {
     /// Why this calibration may not be right for that use, one sentence each; none if nothing speaks
     /// against it.
@@ -200,48 +249,7 @@ impl Calibration {
 
     /// Whether a known weight reads what it weighs.
     pub fn check(&self, weight: &KnownWeight) -> Result<CheckResult, CheckError> {
-        let limit_percent = weight.limit_percent.unwrap_or(CHECK_LIMIT_PERCENT);
-        let is_positive = |value: f64| value > 0.0 && value.is_finite();
-        for (what, value, is_right, advice) in [
-            (
-                "mass",
-                weight.mass_g,
-                is_positive(weight.mass_g),
-                "give grams above 0",
-            ),
-            (
-                "limit",
-                limit_percent,
-                is_positive(limit_percent),
-                "give percent above 0",
-            ),
-            (
-                "signal",
-                weight.volts.0,
-                weight.volts.is_finite(),
-                "read it again",
-            ),
-            (
-                "tolerance",
-                weight.tolerance_g.unwrap_or(0.0),
-                weight.tolerance_g.is_none_or(|g| g >= 0.0 && g.is_finite()),
-                "give grams, 0 or more",
-            ),
-            (
-                "tare",
-                weight.tare.0,
-                weight.tare.is_finite(),
-                "read the empty cell again",
-            ),
-        ] {
-            if !is_right {
-                return Err(CheckError::Number {
-                    what,
-                    value,
-                    advice,
-                });
-            }
-        }
+        let limit_percent = weight.checked_limit()?;
         let curve = self.curve()?;
         let uncertainty = ForceUncertainty::of(self)?;
         let true_force = newtons_of(weight.mass_g);

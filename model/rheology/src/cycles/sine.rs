@@ -123,28 +123,7 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
     if !(frequency > 0.0 && frequency.is_finite()) {
         return Err(SinusoidError::Frequency { frequency });
     }
-    let (from, last) = match samples {
-        [first, .., last] => (first.t.0, last.t.0),
-        _ => (0.0, 0.0),
-    };
-    // A sample's own interval counts to the record.
-    let interval = (last - from) / (samples.len() as f64 - 1.0).max(1.0);
-    let cycles = (last - from + interval) * frequency;
-    let per_cycle = samples.len() as f64 / cycles;
-    // A millionth forgives the rounding of times.
-    if cycles + 1e-6 < 1.0 || samples.len() < 2 {
-        return Err(SinusoidError::TooShort { cycles, frequency });
-    }
-    if per_cycle < PER_CYCLE_MIN {
-        return Err(SinusoidError::TooSparse { per_cycle });
-    }
-    let settling = if cycles + 1e-6 >= 2.0 * SETTLING + 1.0 {
-        SETTLING
-    } else {
-        0.0
-    };
-    let whole = (cycles - settling + 1e-6).floor();
-    let start = last + 0.5 * interval - whole / frequency;
+    let (start, whole) = whole_cycles(samples, frequency)?;
     let used = || samples.iter().filter(move |one| one.t.0 >= start);
     let span = whole / frequency;
     let fitted = |value: fn(&CycleSample) -> f64| {
@@ -199,6 +178,32 @@ pub fn sinusoid(samples: &[CycleSample], frequency: f64) -> Result<Sinusoid, Sin
         distortion_percent: 100.0 * harmonics.sqrt() / force_amplitude,
         zero_share: zero_share(used().map(|one| one.force.0), force_amplitude, force.noise),
     })
+}
+
+/// When the whole cycles begin that are evaluated, in s, and how many they are.
+fn whole_cycles(samples: &[CycleSample], frequency: f64) -> Result<(f64, f64), SinusoidError> {
+    let (from, last) = match samples {
+        [first, .., last] => (first.t.0, last.t.0),
+        _ => (0.0, 0.0),
+    };
+    // A sample's own interval counts to the record.
+    let interval = (last - from) / (samples.len() as f64 - 1.0).max(1.0);
+    let cycles = (last - from + interval) * frequency;
+    let per_cycle = samples.len() as f64 / cycles;
+    // A millionth forgives the rounding of times.
+    if cycles + 1e-6 < 1.0 || samples.len() < 2 {
+        return Err(SinusoidError::TooShort { cycles, frequency });
+    }
+    if per_cycle < PER_CYCLE_MIN {
+        return Err(SinusoidError::TooSparse { per_cycle });
+    }
+    let settling = if cycles + 1e-6 >= 2.0 * SETTLING + 1.0 {
+        SETTLING
+    } else {
+        0.0
+    };
+    let whole = (cycles - settling + 1e-6).floor();
+    Ok((last + 0.5 * interval - whole / frequency, whole))
 }
 
 fn zero_share(forces: impl Iterator<Item = f64>, amplitude: f64, noise: f64) -> f64 {

@@ -3,7 +3,7 @@
 use super::cost::Cost;
 use super::criteria::criteria;
 use super::facts::{RecordFacts, peak};
-use super::hold_out::{HoldOut, HoldOutError, Prediction, folds, predict_fold};
+use super::hold_out::{Fold, HoldOut, HoldOutError, Prediction, folds, predict_fold};
 use super::ladder::{Step, steps};
 use super::verdict::{Counts, Verdict, verdict};
 use crate::families::{Family, Model, all};
@@ -208,50 +208,7 @@ pub fn select(
     }
     let samples: Vec<&[FitSample]> = records.iter().map(|record| record.1).collect();
     let folds = folds(options.hold_out, &facts, &samples)?;
-    let total = options.families.len() * (1 + folds.len());
-    let mut done = 0;
-    let mut begin = |family: &dyn Family| {
-        let news = Progress {
-            done,
-            total,
-            family: family.key(),
-        };
-        done += 1;
-        match progress(&news) {
-            ControlFlow::Continue(()) => Ok(()),
-            ControlFlow::Break(()) => Err(SelectError::Ended),
-        }
-    };
-    let mut fitted = Vec::new();
-    let mut refused = Vec::new();
-    for family in &options.families {
-        begin(&**family)?;
-        // An initial force that fades is not defined for families of several relaxation times, and would make the
-        // others look costlier.
-        let own = FitOptions::of(Arc::clone(family)).at_rest();
-        let fit = match fit_joint(records, &own, &own.body_names()) {
-            Ok(fit) => fit,
-            Err(reason) => {
-                refused.push((family.key(), reason));
-                // Its folds are not fitted either, but were counted.
-                for _ in &folds {
-                    begin(&**family)?;
-                }
-                continue;
-            }
-        };
-        let mut predicted = Ok(Vec::new());
-        for fold in &folds {
-            begin(&**family)?;
-            if let Ok(known) = &mut predicted {
-                match predict_fold(&own, records, &facts, fold) {
-                    Ok(more) => known.extend(more),
-                    Err(reason) => predicted = Err(reason.to_string()),
-                }
-            }
-        }
-        fitted.push((family, fit, predicted));
-    }
+    let (fitted, refused) = fit_families(records, options, (&facts, &folds), progress)?;
     if fitted.is_empty()
         && let Some((_, reason)) = refused.first()
     {
@@ -270,25 +227,12 @@ pub fn select(
     }
     let mut candidates: Vec<Candidate> = fitted
         .into_iter()
-        .map(|(family, fit, predicted)| candidate(&**family, records, fit, predicted, effective))
+        .map(|(family, fit, predicted)| candidate(family, records, fit, predicted, effective))
         .collect::<Result<_, FitError>>()?;
-    let lowest =
-        |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
-    let (bic, aicc) = (
-        lowest(|one| one.bic),
-        lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)),
-    );
     let peak = facts.iter().fold(0.0f64, |all, one| all.max(one.peak_n));
     let tolerance_n = options.tolerance.map(|one| one.in_newtons(Newtons(peak)).0);
     let is_predicted = candidates.iter().any(|one| one.prediction.is_some());
-    for one in &mut candidates {
-        one.bic_above = one.bic - bic;
-        one.aicc_above = one.aicc_above.map(|value| value - aicc);
-        one.is_within = tolerance_n.map(|tolerance| {
-            one.error(is_predicted)
-                .is_some_and(|error| error <= tolerance)
-        });
-    }
+    compare(&mut candidates, tolerance_n, is_predicted);
     let counts = Counts {
         records: records.len(),
         samples,
@@ -312,6 +256,77 @@ pub fn select(
             })
             .collect(),
     })
+}
+
+/// A family with its fit to all records, and its predictions of what was held out or why there are none.
+type FamilyFit<'a> = (
+    &'a dyn Family,
+    JointReport,
+    Result<Vec<super::PredictionOf>, String>,
+);
+/// Families that the records do not hold, by key.
+type Refusals = Vec<(String, FitError)>;
+
+/// Fits every family, and again without each fold to predict it.
+fn fit_families<'a>(
+    records: &[(&str, &[FitSample])],
+    options: &'a SelectOptions,
+    (facts, folds): (&[RecordFacts], &[Fold]),
+    progress: &dyn Fn(&Progress) -> ControlFlow<()>,
+) -> Result<(Vec<FamilyFit<'a>>, Refusals), SelectError> {
+    let per_family = 1 + folds.len();
+    let begin = |done: usize, family: &dyn Family| {
+        let news = Progress {
+            done,
+            total: options.families.len() * per_family,
+            family: family.key(),
+        };
+        match progress(&news) {
+            ControlFlow::Continue(()) => Ok(()),
+            ControlFlow::Break(()) => Err(SelectError::Ended),
+        }
+    };
+    let (mut fitted, mut refused) = (Vec::new(), Vec::new());
+    for (index, family) in options.families.iter().enumerate() {
+        begin(index * per_family, &**family)?;
+        // An initial force that fades is not defined for families of several relaxation times, and would make the
+        // others look costlier.
+        let own = FitOptions::of(Arc::clone(family)).at_rest();
+        let fit = fit_joint(records, &own, &own.body_names());
+        let mut predicted = Ok(Vec::new());
+        for (number, fold) in folds.iter().enumerate() {
+            begin(index * per_family + 1 + number, &**family)?;
+            if let (Ok(_), Ok(known)) = (&fit, &mut predicted) {
+                match predict_fold(&own, records, facts, fold) {
+                    Ok(more) => known.extend(more),
+                    Err(reason) => predicted = Err(reason.to_string()),
+                }
+            }
+        }
+        match fit {
+            Ok(fit) => fitted.push((&**family, fit, predicted)),
+            Err(reason) => refused.push((family.key(), reason)),
+        }
+    }
+    Ok((fitted, refused))
+}
+
+/// Criteria above the lowest, and errors against the tolerance.
+fn compare(candidates: &mut [Candidate], tolerance_n: Option<f64>, is_predicted: bool) {
+    let lowest =
+        |value: fn(&Candidate) -> f64| candidates.iter().map(value).fold(f64::INFINITY, f64::min);
+    let (bic, aicc) = (
+        lowest(|one| one.bic),
+        lowest(|one| one.aicc_above.unwrap_or(f64::INFINITY)),
+    );
+    for one in candidates {
+        one.bic_above = one.bic - bic;
+        one.aicc_above = one.aicc_above.map(|value| value - aicc);
+        one.is_within = tolerance_n.map(|tolerance| {
+            one.error(is_predicted)
+                .is_some_and(|error| error <= tolerance)
+        });
+    }
 }
 
 /// Refuses records that no family could be fitted to, before anything is measured on them.

@@ -122,22 +122,6 @@ impl TradeCurves {
 
     /// Whether the errors are those of `now`, computed afresh for the same rows.
     pub fn agrees_with(&self, now: &Self) -> Result<(), CurveError> {
-        let within = |share: f64, what: &str, stored: f64, found: f64, rounding: f64| {
-            let allowed = share * stored.max(found) + rounding;
-            let what = what.to_owned();
-            ((stored - found).abs() <= allowed)
-                .then_some(())
-                .ok_or(CurveError::Error {
-                    what,
-                    stored,
-                    found,
-                })
-        };
-        let same =
-            |what: &str, stored, found, rounding| within(AGREE, what, stored, found, rounding);
-        let alike = |what: &str, stored, found, size| {
-            within(AGREE_FITTED, what, stored, found, LAST_DIGITS * size)
-        };
         let peak = self.peak;
         same(
             "the ramp and hold",
@@ -146,33 +130,7 @@ impl TradeCurves {
             LAST_DIGITS,
         )?;
         same("the poke", peak.poke_n, now.peak.poke_n, LAST_DIGITS)?;
-        for row in &now.integrators {
-            let name = format!(
-                "{} at {} s in {}",
-                row.scheme.name(),
-                row.step_s,
-                row.precision.name()
-            );
-            let stored = self.integrators.iter().find(|stored| {
-                (stored.scheme, stored.precision, stored.step_s)
-                    == (row.scheme, row.precision, row.step_s)
-            });
-            match (stored.map(|stored| stored.error), row.error) {
-                (None, _) => return Err(CurveError::Missing(name)),
-                (Some(None), None) => {}
-                (Some(Some(stored)), Some(found)) => {
-                    let share = last_digits(row.precision);
-                    same(
-                        &name,
-                        stored.ramp_hold_n,
-                        found.ramp_hold_n,
-                        share * peak.ramp_hold_n,
-                    )?;
-                    same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
-                }
-                (Some(_), _) => return Err(CurveError::Contradiction(name)),
-            }
-        }
+        self.integrators_agree(now)?;
         for row in &now.families {
             let stored = self
                 .families
@@ -202,4 +160,62 @@ impl TradeCurves {
         }
         Ok(())
     }
+
+    fn integrators_agree(&self, now: &Self) -> Result<(), CurveError> {
+        let peak = self.peak;
+        for row in &now.integrators {
+            let name = format!(
+                "{} at {} s in {}",
+                row.scheme.name(),
+                row.step_s,
+                row.precision.name()
+            );
+            let stored = self.integrators.iter().find(|stored| {
+                (stored.scheme, stored.precision, stored.step_s)
+                    == (row.scheme, row.precision, row.step_s)
+            });
+            match (stored.map(|stored| stored.error), row.error) {
+                (None, _) => return Err(CurveError::Missing(name)),
+                (Some(None), None) => {}
+                (Some(Some(stored)), Some(found)) => {
+                    let share = last_digits(row.precision);
+                    same(
+                        &name,
+                        stored.ramp_hold_n,
+                        found.ramp_hold_n,
+                        share * peak.ramp_hold_n,
+                    )?;
+                    same(&name, stored.poke_n, found.poke_n, share * peak.poke_n)?;
+                }
+                (Some(_), _) => return Err(CurveError::Contradiction(name)),
+            }
+        }
+        Ok(())
+    }
+}
+
+fn within(
+    share: f64,
+    what: &str,
+    [stored, found]: [f64; 2],
+    rounding: f64,
+) -> Result<(), CurveError> {
+    if (stored - found).abs() <= share * stored.max(found) + rounding {
+        return Ok(());
+    }
+    Err(CurveError::Error {
+        what: what.to_owned(),
+        stored,
+        found,
+    })
+}
+
+/// Whether computed errors are the same.
+fn same(what: &str, stored: f64, found: f64, rounding: f64) -> Result<(), CurveError> {
+    within(AGREE, what, [stored, found], rounding)
+}
+
+/// The same of what was fitted, for forces of this size.
+fn alike(what: &str, stored: f64, found: f64, size: f64) -> Result<(), CurveError> {
+    within(AGREE_FITTED, what, [stored, found], LAST_DIGITS * size)
 }
