@@ -1,8 +1,7 @@
 //! Device, hand and loop together: rows L1 to L7, L10 and L11. Figures are printed; run with `--nocapture` to read them.
 
-use palpate_haptics::closed_loop::{
-    Command, Plant, PlantSettings, Rendered, Renderer, RunTick, run,
-};
+use crate::renderer::{Rendered, Renderer, RunTick, run};
+use palpate_haptics::closed_loop::{Command, Plant, PlantSettings};
 use palpate_haptics::margin::{Device, Watch};
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_haptics::{

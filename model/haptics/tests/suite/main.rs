@@ -6,6 +6,7 @@ mod haptics_loop;
 mod haptics_margin;
 mod haptics_model;
 mod haptics_system;
+mod renderer;
 mod scene;
 mod surface_plan;
 mod surface_shape;
