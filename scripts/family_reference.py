@@ -127,6 +127,8 @@ FAMILIES = {
     "fractional": ([2, 0.5], [0.1, 0.3], lambda t, o, l: hereditary(
         t, lambda s: l[0] + l[1] * mittag_leffler(o[1], (s / o[0]) ** o[1]), lambda x: mpf(1))),
     "fung": ([0.1, 300, 0.15], [0.15, 0.06], lambda t, o, l: fung(t, *o, *l)),
+    "stretched": ([2, 0.5], [0.1, 0.3], lambda t, o, l: hereditary(
+        t, lambda s: l[0] + l[1] * exp(-(s / o[0]) ** o[1]), lambda x: mpf(1))),
 }
 
 

@@ -2,7 +2,7 @@
 
 use super::family::{Family, Outer, OuterRange};
 use super::model::ModelParameter;
-use super::relaxation::{Drive, Relaxation};
+use super::relaxation::Relaxation;
 use super::table::Kind;
 use std::f64::consts::PI;
 use std::sync::Arc;
@@ -119,12 +119,7 @@ impl Family for FractionalZener {
     }
 
     fn columns(&self, outer: &[f64]) -> Vec<Vec<Relaxation>> {
-        let (tau, spring) = (outer[0], Drive::power(1, 1.0));
-        let relaxing = self
-            .spectrum(outer[1])
-            .into_iter()
-            .map(|(u, weight)| Relaxation::maxwell(spring, tau * (-u).exp()).scaled(weight));
-        vec![vec![Relaxation::spring(spring)], relaxing.collect()]
+        Relaxation::spread(outer[0], self.spectrum(outer[1]))
     }
 
     fn coarse(&self) -> Option<Arc<dyn Family>> {

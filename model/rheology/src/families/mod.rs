@@ -22,6 +22,7 @@ mod quadrature;
 mod quasi_linear;
 mod relaxation;
 mod response;
+mod stretched;
 mod table;
 mod unloading;
 mod voigt;

@@ -238,6 +238,16 @@ impl Relaxation {
         Self::driven(spring.scaled(tau), tau)
     }
 
+    /// Columns of a straight spring, and of one beside it whose modulus relaxes by
+    /// `sum weight exp(-e^u t / tau)`.
+    pub(super) fn spread(tau: f64, spectrum: Vec<(f64, f64)>) -> Vec<Vec<Self>> {
+        let spring = Drive::power(1, 1.0);
+        let relaxing = spectrum
+            .into_iter()
+            .map(|(u, weight)| Self::maxwell(spring, tau * (-u).exp()).scaled(weight));
+        vec![vec![Self::spring(spring)], relaxing.collect()]
+    }
+
     /// The term times a number.
     #[must_use]
     pub fn scaled(self, by: f64) -> Self {

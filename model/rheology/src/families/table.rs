@@ -14,6 +14,7 @@ const TABLE: &[Kind] = &[
     super::exponential::KIND,
     super::prony::KIND,
     super::fractional::KIND,
+    super::stretched::KIND,
     super::quasi_linear::KIND,
     super::unloading::KIND,
 ];

@@ -35,6 +35,7 @@ fn bodies() -> Vec<Model> {
         model("exponential", &[1.5, 0.15], &[0.3, 0.9]),
         model("prony-2", &[0.5, 9.0], &[0.1, 0.15, 0.1]),
         model("fractional", &[2.0, 0.5], &[0.1, 0.3]),
+        model("stretched", &[2.0, 0.45], &[0.1, 0.3]),
         model("fung", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
     ]
 }
@@ -45,6 +46,7 @@ fn quick_bodies() -> impl Iterator<Item = Model> {
         family: match model.family.as_str() {
             "fung" => "fung-6".to_owned(),
             "fractional" => "fractional-2".to_owned(),
+            "stretched" => "stretched-3".to_owned(),
             _ => model.family,
         },
         ..model

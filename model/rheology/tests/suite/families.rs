@@ -69,6 +69,7 @@ fn bodies() -> Vec<Model> {
         model("prony-2", &[0.5, 9.0], &[0.1, 0.15, 0.1]),
         model("prony-3", &[0.2, 2.0, 20.0], &[0.1, 0.1, 0.08, 0.06]),
         model("fractional", &[2.0, 0.5], &[0.1, 0.3]),
+        model("stretched", &[2.0, 0.5], &[0.1, 0.3]),
         model("fung", &[0.1, 300.0, 0.15], &[0.15, 0.06]),
     ]
 }
@@ -272,6 +273,12 @@ fn responses_agree_with_quadrature_in_many_digits() {
                 check("fractional-6", 8e-6);
                 check("fractional-12", 8e-12);
             }
+            // The same; by the mean of a random number in place of its function.
+            "stretched" => {
+                check("stretched", 8e-4);
+                check("stretched-6", 8e-6);
+                check("stretched-10", 8e-10);
+            }
             // Over its 2.5 decades of relaxation times: the quadrature converges geometrically until
             // only rounding is left.
             "fung" => {
@@ -282,5 +289,5 @@ fn responses_agree_with_quadrature_in_many_digits() {
             other => panic!("no family {other}"),
         }
     }
-    assert_eq!(seen.len(), 18, "{seen:?}");
+    assert_eq!(seen.len(), 21, "{seen:?}");
 }
