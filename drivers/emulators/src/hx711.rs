@@ -52,6 +52,7 @@ impl Default for EmulatedHx711Settings {
 }
 
 /// The board.
+#[derive(Default)]
 pub struct EmulatedHx711 {
     settings: EmulatedHx711Settings,
     /// When the sketch began, and what its clock said then.
@@ -80,24 +81,12 @@ impl EmulatedHx711 {
     /// A board that has been on for a while.
     #[must_use]
     pub fn new(settings: EmulatedHx711Settings) -> Self {
-        let micros = settings.micros;
         let mut board = Self {
+            started: Some((Nanos::ZERO, settings.micros)),
             settings,
-            started: Some((Nanos::ZERO, micros)),
-            boot_end: Nanos::ZERO,
             conversions: SETTLING,
             has_begun: true,
-            next: Nanos::ZERO,
-            sum: 0.0,
-            steps: 0,
-            newest: [0.0; SETTLING as usize],
-            count: 0,
-            missing_since: None,
-            is_chip_lost: false,
-            is_stuck: false,
-            is_saturated: false,
-            is_other: false,
-            output: Vec::new(),
+            ..Self::default()
         };
         board.next = board.period();
         board

@@ -1,5 +1,6 @@
 //! What a Galil controller says when it refuses a command, with what to do about it.
 
+use super::codes::ErrorCode;
 use std::fmt;
 
 /// The answer to `TC1`.
@@ -14,29 +15,43 @@ pub struct GalilError {
 impl GalilError {
     /// What to do about it (DMC-40x0 command reference, `TC`); empty where only the controller's own words help.
     #[must_use]
-    pub const fn remedy(&self) -> &'static str {
-        match self.code {
-            1..=3 => {
+    pub fn remedy(&self) -> &'static str {
+        use ErrorCode as E;
+        let Ok(code) = u8::try_from(self.code) else {
+            return "";
+        };
+        match ErrorCode(code) {
+            E::UNRECOGNIZED | E::PROGRAM_ONLY | E::NOT_IN_PROGRAM => {
                 "this firmware does not know the command; update it or choose another controller"
             }
-            4 | 50 => "check the axis letter in the rig file",
-            5 => "the line is slower than the commands; check the baud rate",
-            6 => "a setting of the rig file is beyond what this controller makes; lower it",
-            7 | 8 | 21 | 29 => "wait until the axis rests",
-            14 | 15 => "the controller's memory has failed; have it serviced",
-            17 | 19 => "a program runs on the controller; halt it with HX",
-            18 => "end the contour mode with ST",
-            20 => "the motor is off; energise it and check the amplifier",
-            22 => "a limit switch is closed; move the other way and check the switch",
-            66 | 67 => "free the controller's arrays and variables (DA*[],*)",
-            80 => "end the recording with RC 0",
-            119 => {
+            E::OPERAND | E::FEW_FIELDS => "check the axis letter in the rig file",
+            E::BUFFER_FULL => "the line is slower than the commands; check the baud rate",
+            E::OUT_OF_RANGE => {
+                "a setting of the rig file is beyond what this controller makes; lower it"
+            }
+            E::RUNNING | E::NOT_RUNNING | E::BEGIN_RUNNING | ErrorCode(29) => {
+                "wait until the axis rests"
+            }
+            ErrorCode(14 | 15) => "the controller's memory has failed; have it serviced",
+            E::PROGRAM_RUNNING | E::STRAND_BUSY => {
+                "a program runs on the controller; halt it with HX"
+            }
+            E::CONTOURING => "end the contour mode with ST",
+            E::MOTOR_OFF => "the motor is off; energise it and check the amplifier",
+            E::LIMIT_SWITCH => "a limit switch is closed; move the other way and check the switch",
+            E::ARRAY_SPACE | E::TOO_MANY_NAMES => {
+                "free the controller's arrays and variables (DA*[],*)"
+            }
+            E::RECORDING => "end the recording with RC 0",
+            E::NOT_FOR_STEPPER => {
                 "set the axis up as a stepper: check the motor_type of the rig file and the SM jumper"
             }
-            132 => "this controller has no analog inputs; read the cell with another device",
-            134 | 135 => "switch the motor off first (MO)",
-            136..=138 => "the controller is locked; enter its password",
-            141 => "this model does not have the feature",
+            E::NO_ANALOG => {
+                "this controller has no analog inputs; read the cell with another device"
+            }
+            ErrorCode(134 | 135) => "switch the motor off first (MO)",
+            ErrorCode(136..=138) => "the controller is locked; enter its password",
+            E::NOT_SUPPORTED => "this model does not have the feature",
             _ => "",
         }
     }

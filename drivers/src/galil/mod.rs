@@ -5,6 +5,7 @@
 //! controller is opened. [`GalilRig`] puts a session on a link.
 
 mod capture;
+mod codes;
 mod connect;
 mod console;
 mod error;
@@ -22,6 +23,7 @@ mod watchdog;
 
 use crate::devices::{DeviceKind, Role, first};
 
+pub use codes::ErrorCode;
 pub use connect::{Connected, connect};
 pub use error::GalilError;
 pub use model::{GalilBoard, GalilOpenError};

@@ -1,6 +1,6 @@
 //! Analog inputs: ranges, converter, and which of them the load cell is on.
 
-use super::errors::ErrorCode;
+use palpate_drivers::galil::ErrorCode;
 
 /// Analog inputs of a controller that has them.
 pub const INPUTS: usize = 8;

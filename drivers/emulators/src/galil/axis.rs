@@ -1,8 +1,8 @@
 //! One axis: motion at the sample clock, the smoothing filter of the pulses, switches and stop codes.
 
-use super::errors::ErrorCode;
 use super::profile::Profile;
 use super::settings::{NO_LIMIT, Setting, Settings, speed_taken};
+use palpate_drivers::galil::ErrorCode;
 
 /// Counts of a position register: 32 bits.
 pub const COUNTS_MAX: f64 = 2_147_483_647.0;

@@ -1,11 +1,11 @@
 //! From a statement to what it does: assignments, then two letters and their arguments.
 
-use super::errors::ErrorCode;
 use super::expression::{Cursor, evaluate};
 use super::memory::is_name;
 use super::scope::axis_of;
 use super::settings::{STEPPER_SPEED_MAX, Setting};
 use super::{Answer, GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 
 /// Words whose arguments are numbers of axes, beside the [`Setting`]s.
 const AXIS_WORDS: [&str; 6] = ["PA", "PR", "JG", "DP", "DE", "CD"];

@@ -2,7 +2,7 @@
 //!
 //! DMC-40x0 command reference, `CM`, `CD`, `DT`: a buffer of 511 segments, `_CM` tells the free ones.
 
-use super::errors::ErrorCode;
+use palpate_drivers::galil::ErrorCode;
 use std::collections::VecDeque;
 
 /// Segments of the buffer.

@@ -2,8 +2,8 @@
 //!
 //! DMC-40x0 user manual, chapter 7: parentheses come first, all operators have equal rank.
 
-use super::errors::ErrorCode;
 use super::format::held;
+use palpate_drivers::galil::ErrorCode;
 
 /// Characters of a name (DMC-40x0 user manual: "up to eight").
 pub const NAME_MAX: usize = 8;

@@ -4,8 +4,7 @@
 //! answered once, also the one of an empty statement: a client is told to send its carriage return
 //! "without a preceding ;" (github.com/baileyji/M2FS-Control, `m2fscontrol/galil.py`, a DMC-4183).
 
-/// Characters of a line, all statements that `;` joins counted (gclib.h, `G_LINE_BUFFER`).
-pub const LINE_MAX: usize = 80;
+pub use palpate_drivers::galil::protocol::LINE_MAX;
 
 /// What a byte completed.
 #[derive(Clone, Debug, PartialEq, Eq)]

@@ -1,9 +1,9 @@
 //! What becomes of a byte: echo, statement, line of a download; and what is answered.
 
 use super::client::Mode;
-use super::errors::ErrorCode;
 use super::input::Statement;
 use super::{Answer, GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
     /// Takes one byte of a client, or keeps it while the controller is busy with that client.

@@ -1,8 +1,8 @@
 //! Variables and arrays.
 
-use super::errors::ErrorCode;
 use super::expression::NAME_MAX;
 use super::model::GalilModel;
+use palpate_drivers::galil::ErrorCode;
 use std::collections::BTreeMap;
 
 /// Arrays at once (DMC-40x0 user manual: "up to 30 arrays").

@@ -1,9 +1,9 @@
 //! `MG`: texts and numbers, each in a form of its own.
 
-use super::errors::ErrorCode;
 use super::expression::{Cursor, unpacked};
 use super::format::Format;
 use super::{Answer, GalilEmulator};
+use palpate_drivers::galil::ErrorCode;
 
 /// What braces ask for.
 enum Brace {

@@ -2,11 +2,11 @@
 
 use super::axis::{COUNTS_MAX, Motion, Prepared};
 use super::commands::{Argument, listed};
-use super::errors::ErrorCode;
 use super::format::Format;
 use super::program::Thread;
 use super::settings::{STEPPER_SPEED_MAX, Setting};
 use super::{Answer, GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 
 impl GalilEmulator {
     /// A command about axes; `None` when it is another one.

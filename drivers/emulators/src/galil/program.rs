@@ -1,8 +1,8 @@
 //! Application programs: lines, labels and threads.
 
-use super::errors::ErrorCode;
 use super::input::LINE_MAX;
 use super::model::GalilModel;
+use palpate_drivers::galil::ErrorCode;
 
 /// Subroutines within each other (`TC` 12).
 const STACK_MAX: usize = 16;

@@ -1,6 +1,6 @@
 //! Record arrays: `RA`, `RD`, `RC`.
 
-use super::errors::ErrorCode;
+use palpate_drivers::galil::ErrorCode;
 
 /// Arrays recorded at once (DMC-1700/1800 user manual, page 159).
 const ARRAYS_MAX: usize = 8;

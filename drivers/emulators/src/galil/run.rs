@@ -1,9 +1,9 @@
 //! Threads of the application program at a sample.
 
-use super::errors::ErrorCode;
 use super::expression::evaluate;
 use super::program::{Thread, Wait};
 use super::{GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 
 /// `WT n` is in ms of which 1024 are a second, as samples at TM 1000 are; `WT n,1` in samples
 /// (DMC-40x0 command reference, `WT`).

@@ -3,9 +3,9 @@
 use super::GalilEmulator;
 use super::analog::INPUTS;
 use super::axis::Prepared;
-use super::errors::ErrorCode;
 use super::expression::Scope;
 use super::settings::Setting;
+use palpate_drivers::galil::ErrorCode;
 
 /// The axis that a letter stands for.
 pub fn axis_of(letter: char) -> Option<usize> {

@@ -1,7 +1,7 @@
 //! The numbers that a command sets for an axis and gives back: their ranges, roundings and first values.
 
-use super::errors::ErrorCode;
 use super::model::GalilModel;
+use palpate_drivers::galil::ErrorCode;
 
 macro_rules! settings {
     ($($name:ident = $word:literal, $first:expr, $min:expr, $max:expr, $decimals:literal;)*) => {

@@ -2,10 +2,10 @@
 
 use super::analog::Analog;
 use super::data_record::lengths;
-use super::errors::ErrorCode;
 use super::expression::evaluate;
 use super::format::Format;
 use super::{Answer, GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 use palpate_model::Nanos;
 
 /// A write to flash "takes seconds" (TMT galil-io raises its time limit for it).

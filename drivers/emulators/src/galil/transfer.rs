@@ -2,12 +2,12 @@
 
 use super::client::Mode;
 use super::commands::fields;
-use super::errors::ErrorCode;
 use super::expression::evaluate;
 use super::program::{Program, check_line};
 use super::record::Source;
 use super::scope::axis_of;
 use super::{Answer, GalilEmulator, Origin};
+use palpate_drivers::galil::ErrorCode;
 
 /// Ends an upload (DMC-1700/1800 user manual, `QU`).
 const END: u8 = 0x1a;

@@ -15,7 +15,7 @@ macro_rules! codes {
                 pub const $name: Self = Self($number);
             )*
 
-            /// What `TC1` says after the number; empty for numbers this emulator never gives.
+            /// What `TC1` says after the number; empty for numbers that have no name here.
             #[must_use]
             pub fn text(self) -> &'static str {
                 match self.0 {
