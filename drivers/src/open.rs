@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
-use crate::wire::{HostClock, LinkStats};
+use crate::wire::{HaltHandle, HostClock, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription};
 use std::io::Read;
@@ -98,6 +98,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn take_raw(&mut self) -> Vec<RawBytes> {
         (**self).take_raw()
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        (**self).halt_handle()
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {

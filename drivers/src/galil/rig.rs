@@ -5,7 +5,7 @@ use super::model::{GalilBoard, GalilOpenError};
 use super::session::Session;
 use super::settings::GalilSettings;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
-use crate::wire::{CallerTime, HostClock, Line, LineSettings, LinkStats, Place};
+use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LineSettings, LinkStats, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -144,6 +144,10 @@ impl Rig for GalilRig {
 
     fn is_virtual(&self) -> bool {
         false
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        self.line.as_ref()?.halt_handle()
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {

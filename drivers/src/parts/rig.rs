@@ -4,7 +4,7 @@ use super::cell_line::{CellLine, TICK};
 use super::track::Track;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::OpenedCell;
-use crate::wire::{CallerTime, HostClock, Line, LineSettings, Link, LinkStats};
+use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LineSettings, Link, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{Ack, AxisStatus, Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -255,6 +255,10 @@ impl Rig for PartsRig {
 
     fn newtons_per_volt(&self) -> Option<f64> {
         self.newtons_per_volt
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        self.axis.as_ref()?.halt_handle()
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {

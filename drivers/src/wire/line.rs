@@ -2,6 +2,7 @@
 
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
+use super::halt::{HaltHandle, Standing, farewell_said, owns_link};
 use super::link::Link;
 use crate::priority::{self, Granted};
 use crate::rig::{RigEvent, RigEventBody};
@@ -36,7 +37,7 @@ pub struct LineSettings {
 }
 
 /// A command with the number of stops that were sent before it.
-type Numbered = (u64, RigCommand);
+pub(super) type Numbered = (u64, RigCommand);
 
 #[derive(Default)]
 struct Reports {
@@ -73,7 +74,8 @@ pub struct Line {
     /// Stops: looked at before anything that waits.
     stops: SyncSender<Numbered>,
     commands: SyncSender<Numbered>,
-    stop_count: u64,
+    /// Stops sent and stops written, shared with those who may have to send one when nobody else can.
+    standing: Arc<Standing>,
     reports: Shared,
     is_closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -91,6 +93,7 @@ impl Line {
         let (commands, queued) = sync_channel(COMMANDS_MAX);
         let reports = Shared::default();
         let is_closing = Arc::new(AtomicBool::new(false));
+        let standing = Arc::new(Standing::default());
         let name = settings.device.to_string();
         let mut owner = Owner {
             link,
@@ -101,19 +104,24 @@ impl Line {
             queued,
             arrived: VecDeque::new(),
             is_real_time: false,
+            standing: Arc::clone(&standing),
+            stops_taken: 0,
             events: Vec::new(),
             raw: Vec::new(),
             reports: Arc::clone(&reports),
         };
         let closing = Arc::clone(&is_closing);
         let thread = std::thread::Builder::new().name(name).spawn(move || {
+            owns_link();
+            let _in = tracing::info_span!("device", name = &*owner.settings.device).entered();
+            tracing::info!("connected");
             owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
             owner.run(&closing);
         })?;
         Ok(Self {
             stops,
             commands,
-            stop_count: 0,
+            standing,
             reports,
             is_closing,
             thread: Some(thread),
@@ -122,16 +130,27 @@ impl Line {
 
     /// Hands over a command without waiting. One that finds no room is given back.
     pub fn send(&mut self, command: RigCommand) -> Result<(), RigCommand> {
-        let way = if command.is_stopping() {
-            self.stop_count += 1;
-            &self.stops
+        let (way, number) = if command.is_stopping() {
+            let before = self.standing.sent.fetch_add(1, Ordering::AcqRel);
+            (&self.stops, before + 1)
         } else {
-            &self.commands
+            (&self.commands, self.standing.sent.load(Ordering::Acquire))
         };
-        way.try_send((self.stop_count, command)).map_err(|err| {
+        way.try_send((number, command)).map_err(|err| {
             let (TrySendError::Full((_, command)) | TrySendError::Disconnected((_, command))) = err;
             command
         })
+    }
+
+    /// What sends the immediate stop when the rig's owner cannot any more.
+    #[must_use]
+    pub fn halt_handle(&self) -> Option<HaltHandle> {
+        let thread = self.thread.as_ref()?.thread().id();
+        Some(HaltHandle::new(
+            self.stops.clone(),
+            Arc::clone(&self.standing),
+            thread,
+        ))
     }
 
     /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
@@ -189,6 +208,9 @@ struct Owner<D> {
     /// Taken out of `queued`, not looked at.
     arrived: VecDeque<Numbered>,
     is_real_time: bool,
+    standing: Arc<Standing>,
+    /// The number of the newest stop that the dialogue has.
+    stops_taken: u64,
     /// To be handed over.
     events: Vec<RigEvent>,
     /// The same of bytes.
@@ -197,9 +219,12 @@ struct Owner<D> {
 }
 
 impl<D> Drop for Owner<D> {
-    /// However the thread ends, nobody waits for it.
+    /// However the thread ends, nobody waits for it. If it panics the farewell stops what moves, since nobody else has
+    /// the link; what was to be said of the panic is said after that.
     fn drop(&mut self) {
         if std::thread::panicking() {
+            let _ = self.link.write(&self.settings.farewell);
+            farewell_said();
             let failed = lost("the driver has failed; open the rig again");
             self.events.push(RigEvent::new((self.clock)(), failed));
         }
@@ -237,6 +262,7 @@ impl<D: Dialogue> Owner<D> {
                 let farewell = self.settings.farewell.clone();
                 // Nobody is left who could be told.
                 let _ = self.write(farewell);
+                tracing::info!("closed");
                 return;
             }
             if let Err(err) = self.turn() {
@@ -246,6 +272,7 @@ impl<D: Dialogue> Owner<D> {
                 break why;
             }
         };
+        tracing::warn!("link lost: {ending}");
         self.events
             .push(RigEvent::new((self.clock)(), lost(ending)));
     }
@@ -266,6 +293,9 @@ impl<D: Dialogue> Owner<D> {
             };
             self.write(line)?;
         }
+        self.standing
+            .written
+            .store(self.stops_taken, Ordering::Release);
         let now = (self.clock)();
         let wait = self.dialogue.next_at(now).since(now).min(READ_MAX);
         let mut buffer = [0_u8; CHUNK];
@@ -303,6 +333,7 @@ impl<D: Dialogue> Owner<D> {
                 self.dialogue.overtaken((self.clock)(), command);
             }
             self.dialogue.command((self.clock)(), stop);
+            self.stops_taken = number;
         }
     }
 

@@ -6,7 +6,7 @@ use super::protocol::STOP;
 use super::session::StandSession;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{CallerTime, HostClock, Line, LineSettings, Link, LinkStats, Place};
+use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LineSettings, Link, LinkStats, Place};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -138,6 +138,10 @@ impl Rig for StandRig {
             piece.at = self.time.of(piece.at);
         }
         raw
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        self.line.as_ref()?.halt_handle()
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {
