@@ -45,6 +45,8 @@ pub fn in_order<T: Sync, R: Send>(
         for number in 1..=jobs {
             let sender = sender.clone();
             let one = move || {
+                let _in = tracing::info_span!("worker", number).entered();
+                tracing::debug!("started");
                 while !is_ending.load(Ordering::Relaxed) {
                     let index = next.fetch_add(1, Ordering::Relaxed);
                     let Some(piece) = pieces.get(index) else {

@@ -11,17 +11,21 @@ mod catalog;
 mod compliance;
 mod daily_check;
 mod doctor;
+#[cfg(feature = "emulators")]
 mod emulate;
 mod export;
+#[cfg(feature = "extremes")]
 mod extremes;
 mod find;
 mod fit;
+#[cfg(feature = "haptics")]
 mod haptics;
 mod history;
 mod import;
 mod info;
 mod lake;
 mod last_fit;
+mod log;
 mod new_file;
 mod output;
 mod plan;
@@ -32,10 +36,13 @@ mod report;
 mod review;
 mod rig;
 mod run;
+#[cfg(feature = "haptics")]
 mod scene;
 mod select;
 mod shell;
+#[cfg(feature = "haptics")]
 mod slave;
+mod support_bundle;
 mod trade;
 mod verdict;
 mod wired;
@@ -55,6 +62,9 @@ use std::sync::Arc;
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version, propagate_version = true)]
 struct Cli {
+    /// Show on standard error what is logged; RUST_LOG says what that is
+    #[arg(long, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Option<Command>,
 }
@@ -83,6 +93,7 @@ enum Command {
     Trade(trade::TradeArgs),
     /// Feed recorded sessions to the engine again and compare
     Replay(replay::ReplayArgs),
+    #[cfg(feature = "extremes")]
     /// Test numerical stability at the extremes, every family, integrator and fit
     Extremes(extremes::ExtremesArgs),
     /// Keep, show and check load-cell calibrations
@@ -92,6 +103,8 @@ enum Command {
     Doctor(doctor::DoctorArgs),
     /// Keep what is whole of interrupted or damaged sessions, beside the originals
     Recover(doctor::RecoverArgs),
+    /// Make one file for whoever helps: log, versions, settings, state of the sessions; nothing measured unless asked
+    SupportBundle(support_bundle::SupportBundleArgs),
     /// Find how far a rig gives way, from a session of stiff-surface
     Compliance(compliance::ComplianceArgs),
     /// Make sessions of other programs' files: tables, Mach-1, testXpert, rheometers
@@ -128,12 +141,15 @@ enum Command {
     /// Look at rigs on wires: which are there, whether one is as its file says, what it reports
     #[command(subcommand)]
     Rig(wired::RigCommand),
+    #[cfg(feature = "haptics")]
     /// Feel a fitted body through a master-slave device: check it, run it, time its loop
     #[command(subcommand)]
     Haptics(haptics::HapticsCommand),
+    #[cfg(feature = "haptics")]
     /// See and feel a piece of tissue: run a scene, record it, compute a recording again
     #[command(subcommand)]
     Scene(scene::SceneCommand),
+    #[cfg(feature = "emulators")]
     /// Answer like a controller on a wire, with the simulated bench behind it
     #[command(subcommand)]
     Emulate(emulate::EmulateCommand),
@@ -218,7 +234,28 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
         Ok(cli) => cli,
         Err(code) => return code,
     };
-    let (output, result) = match cli.command {
+    let log = log::begin(cli.verbose);
+    log::stop_rigs_on_panic(log.clone());
+    let (output, result) = run(cli.command, windows);
+    let code = match result {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            if let Failure::Failed(sentence) = &failure {
+                tracing::error!("{sentence}");
+            }
+            output.error(failure.sentence(), failure.code());
+            ExitCode::from(failure.code())
+        }
+    };
+    if let Some(log) = log {
+        log.flush();
+    }
+    code
+}
+
+/// Does what a command asks, and says where its results go.
+fn run(command: Option<Command>, windows: Option<&dyn Windows>) -> (Output, Result<(), Failure>) {
+    match command {
         None => (
             Output::text(),
             rig::window(&rig::RigArgs::default(), windows),
@@ -239,12 +276,16 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
         Some(Command::Plan(args)) => with(args.json, |out| plan::run(&args, out)),
         Some(Command::Trade(args)) => with(args.json, |out| trade::run(&args, out)),
         Some(Command::Replay(args)) => with(args.json, |out| replay::run(&args, windows, out)),
+        #[cfg(feature = "extremes")]
         Some(Command::Extremes(args)) => with(args.json, |out| extremes::run(&args, out)),
         Some(Command::Calibration(command)) => {
             with(command.is_json(), |out| calibration::run(&command, out))
         }
         Some(Command::Doctor(args)) => with(args.json, |out| doctor::doctor(&args, out)),
         Some(Command::Recover(args)) => with(args.json, |out| doctor::run_recover(&args, out)),
+        Some(Command::SupportBundle(args)) => with(args.json, |out| {
+            support_bundle::run(&args, windows.is_some(), out)
+        }),
         Some(Command::Compliance(args)) => with(args.json, |out| compliance::run(&args, out)),
         Some(Command::Import(args)) => with(args.json, |out| import::run(&args, out)),
         Some(Command::Export(args)) => with(args.json, |out| export::run(&args, out)),
@@ -266,10 +307,13 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
         Some(Command::Mask(args)) => with(args.json, |out| analysis::mask(&args, out)),
         Some(Command::Withdraw(args)) => with(args.json, |out| analysis::withdraw(&args, out)),
         Some(Command::Rig(command)) => with(command.is_json(), |out| wired::run(&command, out)),
+        #[cfg(feature = "haptics")]
         Some(Command::Haptics(command)) => {
             with(command.is_json(), |out| haptics::run(&command, out))
         }
+        #[cfg(feature = "haptics")]
         Some(Command::Scene(command)) => with(command.is_json(), |out| scene::run(&command, out)),
+        #[cfg(feature = "emulators")]
         Some(Command::Emulate(command)) => {
             with(command.is_json(), |out| emulate::run(&command, out))
         }
@@ -278,13 +322,6 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
             Ok(())
         }),
         Some(Command::Man(args)) => with(args.json, |out| shell::man(&args, out)),
-    };
-    match result {
-        Ok(()) => ExitCode::SUCCESS,
-        Err(failure) => {
-            output.error(failure.sentence(), failure.code());
-            ExitCode::from(failure.code())
-        }
     }
 }
 

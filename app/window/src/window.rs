@@ -15,7 +15,6 @@ use crate::screens::rig::Facts as RigFacts;
 use crate::screens::rig_panel::rig_ui;
 use crate::screens::run_middle::{Middle, expected_ui, views_ui};
 use crate::screens::weighing::weighing_ui;
-use crate::settings::SETTINGS_FILE;
 use crate::shell::activity::{Activity, run_in_progress};
 use crate::shell::rail::{self, Screen, rail_ui};
 use crate::shell::run_strip::{is_controllable, run_strip_ui};
@@ -28,6 +27,7 @@ use eframe::egui::{
     CentralPanel, Context, Frame, Margin, Panel, RichText, ScrollArea, Stroke, Ui, ViewportBuilder,
     ViewportCommand, vec2,
 };
+use palpate_analysis::opening::SETTINGS_FILE;
 use palpate_analysis::opening::WorkbenchRequest;
 use palpate_drivers::Rig;
 use palpate_drivers::serial::list_ports;

@@ -9,6 +9,7 @@
 
 pub mod cycles;
 pub mod expected;
+#[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod families;
 pub mod fit;

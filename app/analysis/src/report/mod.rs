@@ -7,10 +7,12 @@ pub mod calibration_plot;
 pub mod catalog;
 pub mod cycles;
 pub mod dossier;
+#[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod family;
 pub mod figures;
 pub mod fit_json;
+#[cfg(feature = "haptics")]
 pub mod haptics;
 pub(super) mod imported;
 pub mod kept;
@@ -18,6 +20,7 @@ pub mod picture;
 pub mod plan_picture;
 pub mod programme;
 pub mod said;
+#[cfg(feature = "haptics")]
 pub mod scene;
 pub mod selection;
 mod selection_plot;
