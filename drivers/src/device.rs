@@ -4,7 +4,7 @@ use crate::galil::GalilOpenError;
 use crate::grbl::GrblOpenError;
 use crate::rig::{Rig, RigError, RigEvent, RigEventBody};
 use crate::text::DeviceError;
-use crate::wire::{CallerTime, HostClock, Line, LinkStats, WireError};
+use crate::wire::{CallerTime, HaltHandle, HostClock, Line, LinkStats, WireError};
 use palpate_model::Nanos;
 use palpate_model::rig::{Fault, RawBytes, RigCommand, RigDescription};
 use std::collections::VecDeque;
@@ -152,6 +152,10 @@ impl<D: RigDevice> DeviceRig<D> {
 impl<D: RigDevice> Rig for DeviceRig<D> {
     fn description(&self) -> &RigDescription {
         &self.opened.description
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        self.opened.lines.first()?.halt_handle()
     }
 
     fn send(&mut self, command: RigCommand) {

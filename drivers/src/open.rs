@@ -3,7 +3,7 @@
 use crate::rig::{Rig, RigError, RigEvent};
 use crate::rig_file::{self, RigFile};
 use crate::sim::{SimRig, SimSettings};
-use crate::wire::{HostClock, LinkStats};
+use crate::wire::{HaltHandle, HostClock, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{HandAction, RawBytes, RigCommand, RigDescription, SensorReading};
 use std::io::Read;
@@ -102,6 +102,10 @@ impl<R: Rig + ?Sized> Rig for Box<R> {
 
     fn take_sensors(&mut self) -> Vec<SensorReading> {
         (**self).take_sensors()
+    }
+
+    fn halt_handle(&self) -> Option<HaltHandle> {
+        (**self).halt_handle()
     }
 
     fn links(&self) -> Vec<(String, LinkStats)> {

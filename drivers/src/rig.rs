@@ -2,7 +2,7 @@
 
 use crate::device::OpenError;
 use crate::rig_file::RigFileError;
-use crate::wire::LinkStats;
+use crate::wire::{HaltHandle, LinkStats};
 use palpate_model::Nanos;
 use palpate_model::rig::{
     Ack, Fault, HandAction, RawBytes, Reading, RigCommand, RigDescription, SensorReading,
@@ -122,6 +122,12 @@ pub trait Rig: Send {
 
     /// Newtons of a volt of its signal, where the load cell itself is calibrated as a force gauge is.
     fn newtons_per_volt(&self) -> Option<f64> {
+        None
+    }
+
+    /// What stops its axis at once when whoever holds the rig cannot any more. A rig without wires moves only while it
+    /// is asked, and has none.
+    fn halt_handle(&self) -> Option<HaltHandle> {
         None
     }
 

@@ -10,6 +10,7 @@
 
 pub mod about;
 pub mod calibration;
+pub mod contained;
 pub mod estimate;
 pub mod linalg;
 pub mod quantity;

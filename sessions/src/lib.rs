@@ -31,6 +31,7 @@ mod packed;
 pub mod raw;
 pub mod record;
 pub mod recover;
+pub mod rotating;
 pub mod schema;
 pub mod shelf;
 pub mod text;

@@ -7,6 +7,9 @@ use palpate_model::units::Newtons;
 use palpate_runner::TimeScale;
 use palpate_runner::replay::Player;
 
+/// Name of the file in the library that holds what the window remembers of its user.
+pub const SETTINGS_FILE: &str = "window.json";
+
 /// A rig to work on.
 pub struct WorkbenchRequest {
     /// The rig, opened.

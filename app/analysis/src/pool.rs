@@ -1,9 +1,9 @@
 //! Many pieces of work on a few named threads, with answers in the order of the pieces.
 
+use palpate_model::contained::contained;
 use rayon::ThreadPoolBuilder;
 use rayon::iter::{ParallelBridge, ParallelIterator};
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::mpsc::sync_channel;
 
@@ -45,7 +45,10 @@ pub fn in_order<T: Sync, R: Send>(
     // Pieces leave the bridge one by one, in order.
     let one = |piece: &T| match is_ending.load(Ordering::Relaxed) {
         true => Err(NoAnswer::NotBegun),
-        false => catch_unwind(AssertUnwindSafe(|| work(piece))).map_err(|_| NoAnswer::Died),
+        false => {
+            let _in = tracing::info_span!("worker").entered();
+            contained(|| work(piece)).map_err(|_| NoAnswer::Died)
+        }
     };
     let (sender, receiver) = sync_channel(jobs);
     let mut answers: Vec<Option<Result<R, NoAnswer>>> = pieces.iter().map(|_| None).collect();

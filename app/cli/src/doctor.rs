@@ -38,21 +38,41 @@ pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
         let places = args.sessions.iter().map(|path| (path.clone(), usize::MAX));
         (args.sessions.clone(), places.collect())
     };
-    let sessions = each(&paths, output, examine);
+    let visit = visit(&paths, &places, output);
+    output.answer("doctor", &visit, || visit.text());
+    if visit.unwell > 0 {
+        return Err(Failure::failed(format!(
+            "{} of {} cannot be used as they are",
+            visit.unwell,
+            visit.sessions.len()
+        )));
+    }
+    Ok(())
+}
+
+/// What a visit to every session of a library finds, in words.
+pub(super) fn findings(library: &Path, output: &Output) -> Result<String, Failure> {
+    let places = [(library.to_owned(), usize::MAX)];
+    Ok(visit(&all_sessions(library)?, &places, output).text() + "\n")
+}
+
+fn visit(paths: &[PathBuf], places: &[(PathBuf, usize)], output: &Output) -> Visit {
+    let sessions = each(paths, output, examine);
     let left = places
         .iter()
         .flat_map(|(place, depth)| leftovers(place, *depth));
-    let leftovers: Vec<PathBuf> = left.collect();
-    let unwell = sessions.iter().filter(|one| is_unwell(one)).count();
-    let visit = Visit {
+    Visit {
+        unwell: sessions.iter().filter(|one| is_unwell(one)).count(),
         sessions,
-        unwell,
-        leftovers,
-    };
-    output.answer("doctor", &visit, || {
-        let count = visit.sessions.len();
-        let mut lines: Vec<String> = visit.sessions.iter().map(patient_text).collect();
-        lines.extend(visit.leftovers.iter().map(|path| {
+        leftovers: left.collect(),
+    }
+}
+
+impl Visit {
+    fn text(&self) -> String {
+        let (count, unwell) = (self.sessions.len(), self.unwell);
+        let mut lines: Vec<String> = self.sessions.iter().map(patient_text).collect();
+        lines.extend(self.leftovers.iter().map(|path| {
             format!(
                 "{}: left by a program that was ended while it wrote; delete it, or the next export there does",
                 path.display()
@@ -63,14 +83,7 @@ pub(super) fn run(args: &DoctorArgs, output: &Output) -> Result<(), Failure> {
             _ => format!("{count} looked at, {unwell} cannot be used as they are"),
         });
         lines.join("\n")
-    });
-    if unwell > 0 {
-        return Err(Failure::failed(format!(
-            "{unwell} of {} cannot be used as they are",
-            visit.sessions.len()
-        )));
     }
-    Ok(())
 }
 
 /// One session after the other, with progress.

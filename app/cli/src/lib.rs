@@ -12,15 +12,19 @@ mod compliance;
 mod correct_contact;
 mod daily_check;
 mod doctor;
+#[cfg(feature = "emulators")]
 mod emulate;
 mod export;
+#[cfg(feature = "extremes")]
 mod extremes;
 mod find;
 mod fit;
+#[cfg(feature = "haptics")]
 mod haptics;
 mod history;
 mod import;
 mod info;
+mod log;
 mod man;
 mod mask;
 mod new_file;
@@ -36,9 +40,12 @@ mod report;
 mod review;
 mod rig;
 mod run;
+#[cfg(feature = "haptics")]
 mod scene;
 mod select;
+#[cfg(feature = "haptics")]
 mod slave;
+mod support_bundle;
 mod tag;
 mod trade;
 mod verdict;
@@ -63,6 +70,9 @@ use std::sync::Arc;
 #[derive(Debug, Parser)]
 #[command(name = "palpate", version, propagate_version = true)]
 struct Cli {
+    /// Show on standard error what is logged; RUST_LOG says what that is
+    #[arg(long, global = true)]
+    verbose: bool,
     #[command(subcommand)]
     command: Option<Command>,
     /// Print one JSON object, or one a line where there are several answers
@@ -72,16 +82,16 @@ struct Cli {
 
 /// Makes the commands of a table: each its arguments, which hold its help, and what carries it out.
 macro_rules! commands {
-    ($windows:ident; $($(#[$attribute:meta])* $name:ident($args:ty) => $run:path $([$more:ident])?;)*) => {
+    ($windows:ident; $($(#[cfg($($part:tt)*)])? $(#[command($($clap:tt)*)])? $name:ident($args:ty) => $run:path $([$more:ident])?;)*) => {
         #[derive(Debug, Subcommand)]
         enum Command {
-            $($(#[$attribute])* $name(Box<$args>),)*
+            $($(#[cfg($($part)*)])? $(#[command($($clap)*)])? $name(Box<$args>),)*
         }
 
         impl Command {
             fn run(&self, $windows: Option<&dyn Windows>, output: &Output) -> Result<(), Failure> {
                 match self {
-                    $(Self::$name(args) => $run(args, $($more,)? output),)*
+                    $($(#[cfg($($part)*)])? Self::$name(args) => $run(args, $($more,)? output),)*
                 }
             }
         }
@@ -99,10 +109,11 @@ commands! { windows;
     Plan(plan::PlanArgs) => plan::run;
     Trade(trade::TradeArgs) => trade::run;
     Replay(replay::ReplayArgs) => replay::run [windows];
-    Extremes(extremes::ExtremesArgs) => extremes::run;
+    #[cfg(feature = "extremes")] Extremes(extremes::ExtremesArgs) => extremes::run;
     #[command(subcommand)] Calibration(calibration::CalibrationCommand) => calibration::run;
     Doctor(doctor::DoctorArgs) => doctor::run;
     Recover(recover::RecoverArgs) => recover::run;
+    SupportBundle(support_bundle::SupportBundleArgs) => support_bundle::run [windows];
     Compliance(compliance::ComplianceArgs) => compliance::run;
     Import(import::ImportArgs) => import::run;
     Export(export::ExportArgs) => export::run;
@@ -120,9 +131,9 @@ commands! { windows;
     Mask(mask::MaskArgs) => mask::run;
     Withdraw(withdraw::WithdrawArgs) => withdraw::run;
     #[command(subcommand)] Rig(wired::RigCommand) => wired::run;
-    #[command(subcommand)] Haptics(haptics::HapticsCommand) => haptics::run;
-    #[command(subcommand)] Scene(scene::SceneCommand) => scene::run;
-    #[command(subcommand)] Emulate(emulate::EmulateCommand) => emulate::run;
+    #[cfg(feature = "haptics")] #[command(subcommand)] Haptics(haptics::HapticsCommand) => haptics::run;
+    #[cfg(feature = "haptics")] #[command(subcommand)] Scene(scene::SceneCommand) => scene::run;
+    #[cfg(feature = "emulators")] #[command(subcommand)] Emulate(emulate::EmulateCommand) => emulate::run;
     Completions(completions::CompletionsArgs) => completions::run;
     Man(man::ManArgs) => man::run;
 }
@@ -212,17 +223,26 @@ pub fn main(windows: Option<&dyn Windows>) -> ExitCode {
         Err(code) => return code,
     };
     let output = Output::new(cli.json || asks_for_json());
+    let log = log::begin(cli.verbose);
+    log::stop_rigs_on_panic(log.clone());
     let result = match cli.command {
         None => window::run(&window::WindowArgs::default(), windows, &output),
         Some(command) => command.run(windows, &output),
     };
-    match result {
+    let code = match result {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
+            if let Failure::Failed(sentence) = &failure {
+                tracing::error!("{sentence}");
+            }
             output.error(failure.sentence(), failure.code());
             ExitCode::from(failure.code())
         }
+    };
+    if let Some(log) = log {
+        log.flush();
     }
+    code
 }
 
 /// Adds what `--about` tells and checks that all of it can stand together.

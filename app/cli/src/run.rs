@@ -8,7 +8,6 @@ use super::protocol::ValueArgs;
 use super::rig::{OpenRig, RigArgs};
 use clap::Args;
 use palpate_analysis::daily::{DAILY_CHECK, Gate, HOW};
-use palpate_analysis::report::haptics::slave_text;
 use palpate_drivers::Rig;
 use palpate_model::about::About;
 use palpate_model::about::Labels;
@@ -16,7 +15,6 @@ use palpate_protocols::engine::{EndingKind, Operator};
 use palpate_protocols::plans::Plan;
 use palpate_protocols::preview::{Preview, preview};
 use palpate_runner::base::FoundBase;
-use palpate_runner::haptics::slave::{SlaveLeader, Slaved};
 use palpate_runner::{
     AfterStop, Answers, Leader, Request, RunRequest, RunView, Runner, Snapshot, StartError,
     TimeScale, wall_now,
@@ -26,9 +24,9 @@ use palpate_sessions::{Verdict, library_folder};
 use serde::Serialize;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{Receiver, sync_channel};
-use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
 /// Probe that is written down where nobody says which.
@@ -157,7 +155,10 @@ struct RunReport {
     late_given_up_s: Option<f64>,
     live: Option<palpate_model::estimate::LiveEstimate>,
     #[serde(skip_serializing_if = "Option::is_none")]
-    slave: Option<Slaved>,
+    slave: Option<serde_json::Value>,
+    /// The same in words.
+    #[serde(skip)]
+    slave_text: Option<String>,
 }
 
 /// Runs a built-in protocol or a file with chosen values, once everything it asks for is told; or a programme.
@@ -192,15 +193,22 @@ pub(super) fn run(args: &RunArgs, output: &Output) -> Result<(), Failure> {
     carry_out(written.plan, bench, how, labels, None, output)
 }
 
-/// What leads the slave of a run, if it has one.
-pub(super) type Slave = Arc<Mutex<SlaveLeader>>;
+/// What leads the step of a run that follows.
+pub(super) struct Led {
+    /// The command that leads.
+    pub command: &'static str,
+    /// Asked for a lead with every sample.
+    pub leader: Leader,
+    /// What is to be reported of it once the run is over, as an object and in words.
+    pub told: Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>,
+}
 
 pub(super) fn carry_out(
     plan: Plan,
     bench: OpenRig,
     how: &HowArgs,
     labels: Labels,
-    slave: Option<Slave>,
+    led: Option<Led>,
     output: &Output,
 ) -> Result<(), Failure> {
     let gate = gate(&plan, &bench)?;
@@ -219,7 +227,7 @@ pub(super) fn carry_out(
         to_acknowledge: gate.to_acknowledge(),
         after_stop,
         answers,
-        leader: slave.clone().map(|slave| slave as Leader),
+        leader: led.as_ref().map(|led| led.leader.clone()),
     };
     let curve = request.calibration.curve().map_err(Failure::usage)?;
     let preview = preview(
@@ -258,7 +266,7 @@ pub(super) fn carry_out(
     let Some(view) = &snapshot.run else {
         return Err(Failure::failed("the runner ended without a run"));
     };
-    report(view, slave.as_ref(), output)
+    report(view, led.as_ref(), output)
 }
 
 /// What today's daily check of the rig says to a plan.
@@ -381,13 +389,15 @@ fn progress_text(view: &RunView) -> String {
     )
 }
 
-fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), Failure> {
+fn report(view: &RunView, led: Option<&Led>, output: &Output) -> Result<(), Failure> {
     let Some(outcome) = &view.outcome else {
         return Err(Failure::failed("the run did not end"));
     };
     // What a failed disk, or another program, left is only known from what can be read.
     let left = view.log_error.as_ref().map(|_| examine(&view.folder));
     let kept = left.as_ref().map_or(view.samples, |left| left.samples);
+    let told = led.and_then(|led| (led.told)(output));
+    let (slave, slave_text) = told.unzip();
     let report = RunReport {
         plan: view.plan_name.clone(),
         session: view.folder.clone(),
@@ -405,21 +415,15 @@ fn report(view: &RunView, slave: Option<&Slave>, output: &Output) -> Result<(), 
         late_worst_s: view.lateness.map(|late| late.worst.0),
         late_given_up_s: view.lateness.map(|late| late.given_up.0),
         live: view.live.clone(),
-        slave: slave.and_then(|slave| {
-            let leader = slave.lock().unwrap_or_else(PoisonError::into_inner);
-            leader
-                .failure()
-                .iter()
-                .for_each(|reason| output.note(&format!("nothing led the slave: {reason}")));
-            leader.slaved()
-        }),
+        slave,
+        slave_text,
     };
     if let Some(late) = report.late_given_up_s.filter(|late| *late > 0.0) {
         output.note(&format!(
             "the computer did not keep up: the run took {late:.1} s longer than its session time"
         ));
     }
-    output.answer(slave.map_or("run", |_| "haptics-slave"), &report, || {
+    output.answer(led.map_or("run", |led| led.command), &report, || {
         run_text(&report)
     });
     if let (Some(reason), Some(left)) = (&view.log_error, &left) {
@@ -478,7 +482,7 @@ fn run_text(report: &RunReport) -> String {
     if let Some(peak) = report.force_peak_n {
         lines.push(format!("peak force {peak:.3} N"));
     }
-    lines.extend(report.slave.iter().map(slave_text));
+    lines.extend(report.slave_text.clone());
     if let (Some(verdict), Some(reason)) = (report.verdict, &report.verdict_reason) {
         lines.push(format!("{verdict}: {reason}"));
     }

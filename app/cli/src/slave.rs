@@ -2,10 +2,11 @@
 
 use super::haptics::body;
 use super::output::Output;
-use super::run::{HowArgs, carry_out, labels, number};
+use super::run::{HowArgs, Led, carry_out, labels, number};
 use super::{Failure, recover, rig};
 use clap::Args;
 use palpate_analysis::haptics::Setting;
+use palpate_analysis::report::haptics::slave_text;
 use palpate_haptics::Period;
 use palpate_haptics::rig::{Hand, HandPath};
 use palpate_model::units::{Depth, MmPerS, Seconds};
@@ -13,7 +14,7 @@ use palpate_protocols::plans::Follow;
 use palpate_runner::haptics::slave::{SlaveLeader, SlaveSettings};
 use palpate_sessions::library_folder;
 use std::path::PathBuf;
-use std::sync::{Arc, Mutex};
+use std::sync::{Arc, Mutex, PoisonError};
 
 /// Longest time that a slave follows, in s: an hour.
 const SECONDS_MAX: f64 = 3600.0;
@@ -88,5 +89,18 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     });
     let slave = Arc::new(Mutex::new(leader.map_err(Failure::usage)?));
     let labels = labels(&args.how)?;
-    carry_out(follow.plan(), bench, &args.how, labels, Some(slave), output)
+    let leading = Arc::clone(&slave);
+    let led = Led {
+        command: "haptics-slave",
+        leader: slave,
+        told: Box::new(move |output| {
+            let leader = leading.lock().unwrap_or_else(PoisonError::into_inner);
+            if let Some(reason) = leader.failure() {
+                output.note(&format!("nothing led the slave: {reason}"));
+            }
+            let slaved = leader.slaved()?;
+            Some((serde_json::to_value(&slaved).ok()?, slave_text(&slaved)))
+        }),
+    };
+    carry_out(follow.plan(), bench, &args.how, labels, Some(led), output)
 }

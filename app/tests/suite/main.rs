@@ -23,6 +23,7 @@ mod report;
 mod scene;
 mod select;
 mod support;
+mod support_bundle;
 mod trade;
 mod whole_commands;
 mod window;

@@ -5,9 +5,6 @@ use serde::{Deserialize, Serialize};
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// Name of the file in the library.
-pub const SETTINGS_FILE: &str = "window.json";
-
 /// A longer file is something else.
 const BYTES_MAX: usize = 64 * 1024;
 
@@ -151,6 +148,7 @@ impl Kept {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use palpate_analysis::opening::SETTINGS_FILE;
 
     #[test]
     fn what_was_stored_is_read_and_what_is_broken_is_left_alone() {

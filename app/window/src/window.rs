@@ -1,9 +1,9 @@
 //! The window: its options, and how it opens.
 
 use crate::app::WorkbenchApp;
-use crate::settings::SETTINGS_FILE;
 use crate::workers::ports::ListPorts;
 use eframe::egui::{Context, ViewportBuilder, ViewportCommand, vec2};
+use palpate_analysis::opening::SETTINGS_FILE;
 use palpate_analysis::opening::WorkbenchRequest;
 use palpate_drivers::Rig;
 use palpate_drivers::serial::list_ports;

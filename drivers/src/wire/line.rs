@@ -2,6 +2,7 @@
 
 use super::HostClock;
 use super::dialogue::{Dialogue, LinkStats};
+use super::halt::{HaltHandle, Standing, farewell_said, owns_link};
 use super::link::Link;
 use crate::device::OpenError;
 use crate::priority::{self, Granted};
@@ -37,7 +38,7 @@ pub struct LineSettings {
 }
 
 /// A command with the number of stops that were sent before it.
-type Numbered = (u64, RigCommand);
+pub(super) type Numbered = (u64, RigCommand);
 
 #[derive(Default)]
 struct Reports {
@@ -75,7 +76,8 @@ pub struct Line {
     /// Stops: looked at before anything that waits.
     stops: SyncSender<Numbered>,
     commands: SyncSender<Numbered>,
-    stop_count: u64,
+    /// Stops sent and stops written, shared with those who may have to send one when nobody else can.
+    standing: Arc<Standing>,
     reports: Shared,
     is_closing: Arc<AtomicBool>,
     thread: Option<JoinHandle<()>>,
@@ -101,6 +103,7 @@ impl Line {
         ));
         let is_closing = Arc::new(AtomicBool::new(false));
         let device = Arc::clone(&settings.device);
+        let standing = Arc::new(Standing::default());
         let mut owner = Owner {
             link,
             dialogue,
@@ -110,6 +113,8 @@ impl Line {
             queued,
             arrived: VecDeque::new(),
             is_real_time: false,
+            standing: Arc::clone(&standing),
+            stops_taken: 0,
             events: Vec::new(),
             raw: Vec::new(),
             reports: Arc::clone(&reports),
@@ -118,6 +123,9 @@ impl Line {
         let thread = std::thread::Builder::new()
             .name(device.to_string())
             .spawn(move || {
+                owns_link();
+                let _in = tracing::info_span!("device", name = &*owner.settings.device).entered();
+                tracing::info!("connected");
                 owner.is_real_time = matches!(priority::ask(), Granted::RealTime(_));
                 owner.run(&closing);
             })
@@ -126,7 +134,7 @@ impl Line {
             device,
             stops,
             commands,
-            stop_count: 0,
+            standing,
             reports,
             is_closing,
             thread: Some(thread),
@@ -141,16 +149,27 @@ impl Line {
 
     /// Hands over a command without waiting. One that finds no room is given back.
     pub fn send(&mut self, command: RigCommand) -> Result<(), RigCommand> {
-        let way = if command.is_stopping() {
-            self.stop_count += 1;
-            &self.stops
+        let (way, number) = if command.is_stopping() {
+            let before = self.standing.sent.fetch_add(1, Ordering::AcqRel);
+            (&self.stops, before + 1)
         } else {
-            &self.commands
+            (&self.commands, self.standing.sent.load(Ordering::Acquire))
         };
-        way.try_send((self.stop_count, command)).map_err(|err| {
+        way.try_send((number, command)).map_err(|err| {
             let (TrySendError::Full((_, command)) | TrySendError::Disconnected((_, command))) = err;
             command
         })
+    }
+
+    /// What sends the immediate stop when the rig's owner cannot any more.
+    #[must_use]
+    pub fn halt_handle(&self) -> Option<HaltHandle> {
+        let thread = self.thread.as_ref()?.thread().id();
+        Some(HaltHandle::new(
+            self.stops.clone(),
+            Arc::clone(&self.standing),
+            thread,
+        ))
     }
 
     /// The oldest report that arrived at or before `until` on the host's clock. Without one it waits so long.
@@ -221,6 +240,9 @@ struct Owner<D> {
     /// Taken out of `queued`, not looked at.
     arrived: VecDeque<Numbered>,
     is_real_time: bool,
+    standing: Arc<Standing>,
+    /// The number of the newest stop that the dialogue has.
+    stops_taken: u64,
     /// To be handed over.
     events: Vec<RigEvent>,
     /// The same of bytes.
@@ -229,9 +251,12 @@ struct Owner<D> {
 }
 
 impl<D> Drop for Owner<D> {
-    /// However the thread ends, nobody waits for it.
+    /// However the thread ends, nobody waits for it. If it panics the farewell stops what moves, since nobody else has
+    /// the link; what was to be said of the panic is said after that.
     fn drop(&mut self) {
         if std::thread::panicking() {
+            let _ = self.link.write(&self.settings.farewell);
+            farewell_said();
             let failed = lost("the driver has failed; open the rig again");
             self.events.push(RigEvent::new((self.clock)(), failed));
         }
@@ -269,6 +294,7 @@ impl<D: Dialogue> Owner<D> {
                 let farewell = self.settings.farewell.clone();
                 // Nobody is left who could be told.
                 let _ = self.write(farewell);
+                tracing::info!("closed");
                 return;
             }
             if let Err(err) = self.turn() {
@@ -278,6 +304,7 @@ impl<D: Dialogue> Owner<D> {
                 break why;
             }
         };
+        tracing::warn!("link lost: {ending}");
         self.events
             .push(RigEvent::new((self.clock)(), lost(ending)));
     }
@@ -298,6 +325,9 @@ impl<D: Dialogue> Owner<D> {
             };
             self.write(line)?;
         }
+        self.standing
+            .written
+            .store(self.stops_taken, Ordering::Release);
         let now = (self.clock)();
         let wait = self.dialogue.next_at(now).since(now).min(READ_MAX);
         let mut buffer = [0_u8; CHUNK];
@@ -335,6 +365,7 @@ impl<D: Dialogue> Owner<D> {
                 self.dialogue.overtaken((self.clock)(), command);
             }
             self.dialogue.command((self.clock)(), stop);
+            self.stops_taken = number;
         }
     }
 

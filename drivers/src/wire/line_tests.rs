@@ -3,12 +3,25 @@ use std::sync::atomic::AtomicU64;
 use std::sync::mpsc::Receiver;
 
 /// Notes what it is told, writes a line for each command and reports every byte as an acknowledgement of a stop.
-#[derive(Default)]
 struct Notes {
     heard: Arc<Mutex<Vec<String>>>,
     lines: VecDeque<Vec<u8>>,
     events: VecDeque<(Nanos, RigEventBody)>,
     fails_at: Option<u8>,
+    /// Done just before it fails.
+    fails: Box<dyn Fn() + Send>,
+}
+
+impl Default for Notes {
+    fn default() -> Self {
+        Self {
+            heard: Arc::default(),
+            lines: VecDeque::new(),
+            events: VecDeque::new(),
+            fails_at: None,
+            fails: Box::new(|| ()),
+        }
+    }
 }
 
 impl Notes {
@@ -31,7 +44,10 @@ impl Dialogue for Notes {
 
     fn received(&mut self, now: Nanos, bytes: &[u8]) {
         for byte in bytes {
-            assert!(Some(*byte) != self.fails_at, "a driver that fails");
+            if Some(*byte) == self.fails_at {
+                (self.fails)();
+                panic!("a driver that fails");
+            }
             let ack = palpate_model::rig::Ack {
                 command: RigCommand::Stop,
             };
@@ -199,4 +215,54 @@ fn a_driver_that_fails_is_a_lost_link() {
         last.body,
         RigEventBody::Fault(Fault::LinkLost { .. })
     ));
+    // Nobody else has the link: its farewell stops what moves.
+    assert_eq!(read(&mut there, 3), b"bye");
+}
+
+#[test]
+fn a_halt_around_the_owner_is_on_the_wire_when_it_says_so() {
+    let (here, mut there) = super::super::pair();
+    let mut line = Line::start(Box::new(here), Notes::default(), &clock(), settings()).unwrap();
+    let handle = line.halt_handle().unwrap();
+    assert!(handle.halt(WAIT) && handle.written() == 1);
+    assert_eq!(read(&mut there, 5), b"Halt\r");
+    // Stops of the owner count on from there.
+    line.send(RigCommand::Stop).unwrap();
+    assert!(handle.is_written(2, WAIT));
+    assert_eq!(read(&mut there, 5), b"Stop\r");
+    drop(there);
+    let late = Nanos(u64::MAX);
+    assert!(line.next_event(late, WAIT).is_some());
+    drop(line);
+    assert!(!handle.halt(WAIT));
+}
+
+#[test]
+fn what_waits_for_a_farewell_comes_after_it() {
+    let (here, mut there) = super::super::pair();
+    let (told, order) = sync_channel(2);
+    let said = told.clone();
+    let notes = Notes {
+        fails_at: Some(b'!'),
+        fails: Box::new(move || {
+            let said = said.clone();
+            super::super::after_farewell(move || said.send("deferred").unwrap());
+        }),
+        ..Notes::default()
+    };
+    struct Told(super::super::MemoryLink, SyncSender<&'static str>);
+    impl Link for Told {
+        fn read(&mut self, buffer: &mut [u8], wait: Duration) -> io::Result<usize> {
+            self.0.read(buffer, wait)
+        }
+
+        fn write(&mut self, bytes: &[u8]) -> io::Result<()> {
+            self.1.send("written").unwrap();
+            self.0.write(bytes)
+        }
+    }
+    let _line = Line::start(Box::new(Told(here, told)), notes, &clock(), settings()).unwrap();
+    there.write(b"!").unwrap();
+    assert_eq!(order.recv_timeout(WAIT).unwrap(), "written");
+    assert_eq!(order.recv_timeout(WAIT).unwrap(), "deferred");
 }

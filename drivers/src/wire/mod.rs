@@ -6,6 +6,7 @@
 mod answers;
 mod caller_time;
 mod dialogue;
+mod halt;
 mod line;
 mod link;
 mod memory;
@@ -15,6 +16,7 @@ mod tapped;
 pub use answers::Answers;
 pub use caller_time::CallerTime;
 pub use dialogue::{Dialogue, LinkStats};
+pub use halt::{HaltHandle, after_farewell};
 pub use line::{Line, LineSettings};
 pub use link::{Link, SerialLink, TcpLink};
 pub use memory::{MemoryLink, pair};

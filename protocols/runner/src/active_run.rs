@@ -4,6 +4,7 @@ use super::board::{Board, LogState};
 use super::clock::wall_now;
 use super::leading::{LeadFeed, Leader};
 use super::live_feed::LiveFeed;
+use super::run_log::RunLog;
 use super::snapshot::{Lateness, RunView};
 use super::start::{AfterStop, Answers};
 use super::watch::HostWatch;
@@ -32,6 +33,7 @@ pub(super) struct ActiveRun {
     folder: PathBuf,
     session_id: String,
     board: Board,
+    run_log: RunLog,
     fidelity: FidelityMeter,
     verdict: Option<(Verdict, String)>,
     origin: Nanos,
@@ -67,6 +69,7 @@ impl ActiveRun {
         let (after_stop, answers) = unattended;
         let live = LiveFeed::new(&config);
         let fidelity = FidelityMeter::new(&config.plan, &config.rig);
+        let run_log = RunLog::new(&session_id, &folder, &config.plan);
         let board = Board::new(&config, preview.steps, folder.clone());
         let begin = watch.as_ref().map(HostWatch::begin);
         let mut run = Self {
@@ -75,6 +78,7 @@ impl ActiveRun {
             folder,
             session_id,
             board,
+            run_log,
             fidelity,
             verdict: None,
             origin,
@@ -130,6 +134,7 @@ impl ActiveRun {
                 "the computer does not keep up: the run is {:.1} s behind the clock and goes on from there; close other programs",
                 given_up.0
             );
+            self.run_log.trouble(&text);
             self.board.note(text, true);
         }
     }
@@ -146,6 +151,8 @@ impl ActiveRun {
             Input::Reading(reading) => (Some(*reading), None),
             other => (None, Some((kind_of(other), to_json(other)))),
         };
+        let is_told = matches!(input, Input::Fault(_) | Input::Operator { .. });
+        let told = is_told.then(|| input.clone());
         let (state, effects) = engine::step(state, now, input);
         let commands: Vec<ToRig> = effects.iter().filter_map(to_rig).collect();
         let is_urgent = commands.iter().any(ToRig::is_stopping);
@@ -155,6 +162,9 @@ impl ActiveRun {
         effects
             .iter()
             .for_each(|effect| self.fidelity.effect(effect));
+        if let Some(input) = &told {
+            self.run_log.input(input);
+        }
         if let Some((kind, body)) = logged {
             self.log(now, kind, body);
         }
@@ -164,6 +174,7 @@ impl ActiveRun {
         let estimate = reading.and_then(|reading| self.live.push(&reading, &state));
         let lead = reading.and_then(|reading| self.lead.push(now, &reading, &state));
         if let Some(text) = self.live.take_failure() {
+            self.run_log.trouble(&text);
             self.board.note(text.clone(), true);
             let told = Told::Event { text };
             self.log_health(Health { now, told });
@@ -173,7 +184,10 @@ impl ActiveRun {
             self.log(now, EntryKind::Decision, to_json(&effect));
             match effect {
                 Effect::Command(_) | Effect::ByHand(_) => {}
-                Effect::Record(record) => self.board.record(&record),
+                Effect::Record(record) => {
+                    self.run_log.record(&record);
+                    self.board.record(&record);
+                }
                 Effect::Finished(outcome) => self.close(outcome),
             }
         }
@@ -225,6 +239,7 @@ impl ActiveRun {
         let notices = self.writer.as_mut().map(SessionWriter::take_notices);
         for notice in notices.into_iter().flatten() {
             let text = notice.to_string();
+            self.run_log.trouble(&text);
             self.board.note(text.clone(), true);
             if notice.ends_the_run() {
                 let fault = Fault::LogAtRisk { detail: text };
@@ -361,6 +376,7 @@ impl ActiveRun {
         {
             self.log_error = Some(err.to_string());
         }
+        self.run_log.closed(&outcome, self.log_error.as_deref());
         let (mut verdict, mut reason) = first_verdict(&outcome, self.fidelity.found());
         if let Some(err) = &self.log_error {
             // Who measured well and kept it badly has nothing that is valid.

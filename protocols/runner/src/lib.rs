@@ -9,12 +9,15 @@ pub mod base;
 mod board;
 mod clock;
 pub mod fidelity;
+#[cfg(feature = "haptics")]
 pub mod haptics;
 mod leading;
 mod live_feed;
 mod main_loop;
+pub mod panic_stop;
 pub mod programme;
 pub mod replay;
+mod run_log;
 mod snapshot;
 mod start;
 #[cfg(test)]

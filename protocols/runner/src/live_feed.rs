@@ -1,12 +1,12 @@
 //! The live fit of a run, fed sample by sample. Should it ever panic, it is off, and nothing else is.
 
+use palpate_model::contained::contained;
 use palpate_model::estimate::LiveEstimate;
 use palpate_model::rig::{Phase, Reading};
 use palpate_model::units::{Depth, Newtons, Seconds};
 use palpate_protocols::engine::{Config, State};
 use palpate_rheology::fit::LiveFit;
 use std::any::Any;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 
 /// Milliseconds between two answers of the live fit.
 const LIVE_FIT_MS: u64 = 500;
@@ -86,10 +86,10 @@ impl LiveFeed {
         self.samples += 1;
         let is_due = self.samples.is_multiple_of(self.every);
         let fit = self.fit.as_mut()?;
-        let fed = catch_unwind(AssertUnwindSafe(|| {
+        let fed = contained(|| {
             fit.push(t, depth, force, sigma);
             is_due.then(|| fit.estimate()).flatten()
-        }));
+        });
         fed.unwrap_or_else(|panic| {
             // What is left of it may be half changed: it is not used again.
             self.fit = None;

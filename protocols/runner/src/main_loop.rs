@@ -7,6 +7,8 @@
 
 use super::active_run::{ActiveRun, ToRig};
 use super::clock::{HostClock, Pacer, Throttle, TimeScale, Wake, host_times};
+use super::panic_stop::Registered;
+use super::run_log::FaultLog;
 use super::snapshot::{RigView, Snapshot};
 use super::start::{Bench, RunRequest, StartError, start};
 use super::watch::HostWatch;
@@ -75,12 +77,17 @@ impl Runner {
         wake: impl Fn() + Send + 'static,
     ) -> std::io::Result<Self> {
         let (requests, receiver) = sync_channel(REQUESTS_MAX);
-        let main_loop = MainLoop::new(rig, scale, Arc::new(host_times));
+        let mut main_loop = MainLoop::new(rig, scale, Arc::new(host_times));
         let snapshot = Arc::new(ArcSwap::from_pointee(main_loop.snapshot(0)));
         let shared = Arc::clone(&snapshot);
+        let to_stop = requests.clone();
         let thread = std::thread::Builder::new()
             .name("runner".into())
-            .spawn(move || main_loop.run(first, &receiver, &shared, &wake))?;
+            .spawn(move || {
+                let link = main_loop.rig.halt_handle();
+                main_loop.registered = Some(Registered::new(to_stop, link));
+                main_loop.run(first, &receiver, &shared, &wake);
+            })?;
         Ok(Self {
             requests,
             snapshot,
@@ -149,6 +156,9 @@ pub(super) struct MainLoop {
     link_error: Option<String>,
     pub(super) run: Option<ActiveRun>,
     refusal: Option<String>,
+    faults: FaultLog,
+    /// What a panic stops; none outside a [`Runner`].
+    registered: Option<Registered>,
 }
 
 impl MainLoop {
@@ -167,6 +177,8 @@ impl MainLoop {
             link_error: None,
             run: None,
             refusal: None,
+            faults: FaultLog::default(),
+            registered: None,
         }
     }
 
@@ -316,6 +328,9 @@ impl MainLoop {
             }
             RigEventBody::Ack(ack) => self.feed(Input::Ack(ack)),
             RigEventBody::Fault(fault) => {
+                if !self.is_running() {
+                    self.faults.fault(&fault);
+                }
                 if matches!(fault, Fault::LinkLost { .. } | Fault::ControllerReset) {
                     self.is_homed = false;
                 }
@@ -383,6 +398,12 @@ impl MainLoop {
                 self.is_homed = false;
                 self.link_error = self.rig.reconnect().err().map(|err| err.to_string());
                 self.description = Arc::new(self.rig.description().clone());
+                let link = self.rig.halt_handle();
+                self.registered = self.registered.take().map(|one| one.relinked(link));
+                match &self.link_error {
+                    Some(err) => tracing::warn!("not connected again: {err}"),
+                    None => tracing::info!("connected again"),
+                }
             }
             Request::Shutdown => return true,
         }
@@ -467,14 +488,5 @@ fn act(rig: &mut dyn Rig, asked: ToRig) {
     match asked {
         ToRig::Command(command) => rig.send(command),
         ToRig::Hand(action) => rig.by_hand(action),
-    }
-}
-
-impl Drop for MainLoop {
-    /// If anything here ever panics, the axis still stops.
-    fn drop(&mut self) {
-        if std::thread::panicking() {
-            self.rig.send(RigCommand::Stop);
-        }
     }
 }

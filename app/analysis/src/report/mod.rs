@@ -7,10 +7,12 @@ pub mod calibration_plot;
 pub mod catalog;
 pub mod cycles;
 pub mod dossier;
+#[cfg(feature = "extremes")]
 pub mod extremes;
 pub mod family;
 pub mod figures;
 pub mod fit_json;
+#[cfg(feature = "haptics")]
 pub mod haptics;
 pub(super) mod imported;
 pub mod kept;
@@ -20,6 +22,7 @@ pub mod plan_plot;
 pub mod programme;
 pub mod said;
 pub mod scatter;
+#[cfg(feature = "haptics")]
 pub mod scene;
 pub mod selection;
 pub mod selection_plot;

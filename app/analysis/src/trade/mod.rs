@@ -10,12 +10,14 @@ mod live;
 mod machine;
 mod paths;
 mod picture;
+#[cfg(feature = "haptics")]
 mod scene;
 pub mod text;
 mod timing;
 
 pub use machine::{age_days, this_machine, version};
 pub use picture::svg;
+#[cfg(feature = "haptics")]
 pub use scene::{SCENE_PEAK, SCENE_SIDE_MM, SCENE_SLOPE, measure_scene};
 pub use text::text;
 

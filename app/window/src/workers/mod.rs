@@ -44,11 +44,15 @@ impl<T: Send + 'static> Job<T> {
             return Ok(());
         }
         let (sender, receiver) = sync_channel(1);
+        let span = tracing::info_span!("worker", name);
         std::thread::Builder::new()
             .name(name.into())
             .spawn(move || {
+                let _in = span.entered();
+                tracing::debug!("started");
                 // Nobody may wait any more when the window has closed.
                 let _ = sender.try_send(work());
+                tracing::debug!("ended");
                 done();
             })?;
         self.answer = Some(receiver);

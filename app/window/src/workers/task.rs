@@ -53,7 +53,7 @@ impl<T: Send + 'static> Task<T> {
         let (progress, wake) = (Arc::clone(&self.progress), ctx.clone());
         let started = self.job.start(
             name,
-            move || work(&progress),
+            move || logged(|| work(&progress)),
             move || wake.request_repaint(),
         );
         match started {
@@ -114,6 +114,17 @@ impl<T: Send + 'static> Task<T> {
             seconds_left: (done > 0.0).then(|| seconds * (of - done).max(0.0) / done),
         })
     }
+}
+
+/// Work with its beginning and its end in the program's log.
+fn logged<T>(work: impl FnOnce() -> Result<T, String>) -> Result<T, String> {
+    tracing::info!("started");
+    let answer = work();
+    match &answer {
+        Ok(_) => tracing::info!("ended"),
+        Err(err) => tracing::warn!("ended without an answer: {err}"),
+    }
+    answer
 }
 
 #[cfg(test)]

@@ -44,7 +44,7 @@ fn sheets(bytes: &[u8]) -> Result<Vec<Sheet>, String> {
     } else if bytes.starts_with(COMPOUND) {
         legacy::check(bytes)?;
         // The reader of old cells trusts lengths that damage can change, and stops with a panic.
-        std::panic::catch_unwind(|| old(bytes))
+        palpate_model::contained::contained(|| old(bytes))
             .unwrap_or_else(|_| Err(damaged("its records contradict each other")))
     } else {
         Err("it is no workbook: it begins neither like an .xlsx nor like an .xls".into())

@@ -1,0 +1,33 @@
+//! A panic stops every open rig before anything is said about it.
+
+use super::Queue;
+use palpate_drivers::wire::after_farewell;
+use palpate_model::contained::is_contained;
+use palpate_runner::panic_stop::halt_open_rigs;
+use std::backtrace::Backtrace;
+use std::panic::{set_hook, take_hook};
+
+/// From now on a panic of any thread, unless it is contained, first stops the rigs, then is logged with where it
+/// happened, then is told as before.
+pub fn stop_rigs_on_panic(log: Option<Queue>) {
+    let before = take_hook();
+    set_hook(Box::new(move |panic| {
+        let thread = std::thread::current();
+        let name = thread.name().unwrap_or("without a name").to_owned();
+        if is_contained() {
+            tracing::warn!("contained: thread {name} {panic}");
+            return;
+        }
+        halt_open_rigs();
+        let trace = Backtrace::force_capture();
+        let report = format!("thread {name} {panic}\n{trace}");
+        let log = log.clone();
+        after_farewell(move || {
+            tracing::error!("{report}");
+            if let Some(log) = log {
+                log.flush();
+            }
+        });
+        before(panic);
+    }));
+}

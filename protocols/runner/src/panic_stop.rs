@@ -1,0 +1,84 @@
+//! What is stopped when the program panics: every rig that a runner holds.
+//!
+//! The runner is asked for the immediate stop, so that the session says how it ended. A runner that does not
+//! answer, or that panics itself, is gone round: the link's own thread is told.
+
+use super::main_loop::Request;
+use arc_swap::ArcSwap;
+use palpate_drivers::wire::HaltHandle;
+use palpate_protocols::engine::Operator;
+use std::sync::mpsc::SyncSender;
+use std::sync::{Arc, LazyLock};
+use std::thread::ThreadId;
+use std::time::Duration;
+
+/// How long a runner has to get its stop onto the wire: ten turns of its loop.
+const RUNNER_PATIENCE: Duration = Duration::from_millis(20);
+/// How long a link's thread has: a hundred of its reads.
+const LINK_PATIENCE: Duration = Duration::from_millis(50);
+
+/// One runner's rig.
+struct OpenRig {
+    runner: ThreadId,
+    requests: SyncSender<Request>,
+    link: Option<HaltHandle>,
+}
+
+/// A list that is replaced and never locked: whoever panics may hold anything.
+static OPEN: LazyLock<ArcSwap<Vec<Arc<OpenRig>>>> = LazyLock::new(ArcSwap::default);
+
+/// Keeps a rig among those that a panic stops. Made on the runner's thread.
+pub(super) struct Registered(Arc<OpenRig>);
+
+impl Registered {
+    pub fn new(requests: SyncSender<Request>, link: Option<HaltHandle>) -> Self {
+        let rig = Arc::new(OpenRig {
+            runner: std::thread::current().id(),
+            requests,
+            link,
+        });
+        OPEN.rcu(|open| [open.as_slice(), &[Arc::clone(&rig)]].concat());
+        Self(rig)
+    }
+
+    /// The same runner with another link to its rig.
+    pub fn relinked(self, link: Option<HaltHandle>) -> Self {
+        Self::new(self.0.requests.clone(), link)
+    }
+}
+
+impl Drop for Registered {
+    fn drop(&mut self) {
+        OPEN.rcu(|open| {
+            let others = open.iter().filter(|rig| !Arc::ptr_eq(rig, &self.0));
+            others.cloned().collect::<Vec<_>>()
+        });
+    }
+}
+
+/// Sends every open rig the immediate stop and waits a moment until it is on the wire. Takes no lock.
+///
+/// For a panic hook. Should this thread own a link itself, that link's farewell is the stop, which comes with
+/// unwinding: what may wait for it goes through [`palpate_drivers::wire::after_farewell`].
+pub fn halt_open_rigs() {
+    for rig in OPEN.load().iter() {
+        rig.halt();
+    }
+}
+
+impl OpenRig {
+    fn halt(&self) {
+        let written = self.link.as_ref().map_or(0, HaltHandle::written);
+        let choice = Operator::Halt;
+        let is_asked = std::thread::current().id() != self.runner
+            && self.requests.try_send(Request::Operator(choice)).is_ok();
+        let Some(link) = &self.link else {
+            // A rig without wires moves only while its runner asks it.
+            return;
+        };
+        if !(is_asked && link.is_written(written + 1, RUNNER_PATIENCE)) {
+            // Where the link is dead as well nobody is left to ask.
+            let _ = link.halt(LINK_PATIENCE);
+        }
+    }
+}
