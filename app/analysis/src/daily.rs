@@ -50,7 +50,7 @@ pub fn past_checks(
     library: &Path,
     rig: &str,
     most: usize,
-    progress: &Progress,
+    progress: &dyn Progress,
 ) -> Result<Vec<PastCheck>, String> {
     let mut checks = read_checks(library, rig).map_err(|err| err.to_string())?;
     if checks.is_empty() {

@@ -102,7 +102,7 @@ pub fn update(library: &std::path::Path, progress: &dyn Progress) -> Result<Chan
 /// Folder below the library of every session in it, by the session's identifier.
 pub fn session_folders(
     library: &std::path::Path,
-    progress: &Progress,
+    progress: &dyn Progress,
 ) -> Result<BTreeMap<String, String>, String> {
     update(library, progress)?;
     let all = with(library, &mut Vec::new(), |catalog| catalog.all())?;
