@@ -18,6 +18,8 @@ use palpate_rheology::fit::{FitOptions, FitReport};
 use palpate_runner::{LogLine, RunView, TimeScale};
 use palpate_test_support::wait::Deadline;
 use palpate_window::app::WorkbenchApp;
+use palpate_window::screens::run::RunScreen;
+use palpate_window::screens::screen::Screen;
 use palpate_window::window::WindowOptions;
 use palpate_window::workers::fit::Refit;
 use std::path::PathBuf;
@@ -26,6 +28,19 @@ use tempfile::TempDir;
 
 /// The window under test.
 pub type Window = Harness<'static, WorkbenchApp>;
+
+/// A screen of a window.
+#[must_use]
+pub fn screen_of<T: Screen>(window: &Window) -> &T {
+    window.state().screen().unwrap()
+}
+
+/// Where the exact fit of the run on the screen stands.
+#[must_use]
+pub fn refit(window: &Window) -> Refit<'_> {
+    let run = window.state().snapshot().run.as_ref();
+    screen_of::<RunScreen>(window).refit(run)
+}
 
 /// Sleep between two frames of a wait.
 pub const FRAME: Duration = Duration::from_millis(5);
@@ -163,7 +178,7 @@ impl Flow {
     /// `palpate fit` prints, be it a report or a refusal. Returns the report.
     pub fn same_words_as_the_command_line(&mut self) -> Option<FitReport> {
         self.wait("the exact fit", |window| {
-            matches!(window.state().refit(), Refit::Done(_) | Refit::Refused(_))
+            matches!(refit(window), Refit::Done(_) | Refit::Refused(_))
         });
         self.window.run_steps(2);
         let session = self.sessions().pop().unwrap();

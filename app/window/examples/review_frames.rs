@@ -16,7 +16,6 @@ use palpate_model::{MmPerS, MmPerS2, Nanos, Position, Seconds, Volts};
 use palpate_sessions::{
     EndRecord, Manifest, Pace, RECORD_VERSION, Row, SessionFolder, SessionWriter, new_session_id,
 };
-use palpate_window::command::Commands;
 use palpate_window::screens::review::{ReviewScreen, View};
 use palpate_window::shell::frame_meter::thread_cpu_s;
 use std::path::{Path, PathBuf};
@@ -205,8 +204,8 @@ fn case(name: &str, sessions: &[PathBuf], samples: u64) -> Result<(), Failed> {
     let mut screen = ReviewScreen::new(Err("no library".into()));
     let start = Instant::now();
     let draw = |screen: &mut ReviewScreen, ui: &mut Ui| {
-        screen.poll(&ui.ctx().clone());
-        screen.middle_ui(ui, &mut Commands::default());
+        screen.fetch(&ui.ctx().clone());
+        screen.draw_middle(ui);
     };
     screen.open(sessions.to_vec(), &bench.ctx);
     let (mut first, mut worst) = (None, 0.0f64);

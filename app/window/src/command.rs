@@ -1,7 +1,6 @@
 //! Everything a user can ask for, one enum. Drawing code pushes; only the app acts.
 
 use crate::screens::run_middle::Middle;
-use crate::shell::rail::Screen;
 use crate::shell::run_strip::Wish;
 use crate::shell::sizes::Edge;
 use crate::workers::path_dialog::Ask;
@@ -83,8 +82,16 @@ pub enum Command {
     TourNext,
     /// End it.
     TourEnd,
-    /// Show a screen. What goes on goes on, and the stop control stays.
-    Show(Screen),
+    /// Show the screen of this name. What goes on goes on, and the stop control stays.
+    Show(&'static str),
+    /// Take what was chosen in a dialog, or dropped on the window.
+    Chosen(Ask, PathBuf),
+    /// Import tables of other programs.
+    Import(Vec<PathBuf>),
+    /// Compute a recording of the haptic loop again.
+    ReplayLoop(PathBuf),
+    /// Compute a recording of a scene again.
+    ReplayScene(PathBuf),
 }
 
 impl Command {

@@ -3,7 +3,7 @@
 //! This crate draws snapshots and sends requests. It never touches hardware except through the
 //! runner, holds no experiment logic and makes no analysis of its own.
 //!
-//! Start reading at [`app`] for what a frame does, [`screens`] for what it shows.
+//! Start reading at [`app`] for what a frame does, [`screens::screen`] for what a screen is.
 
 pub mod app;
 pub mod command;
@@ -16,4 +16,5 @@ pub mod shell;
 pub mod theme;
 pub mod widgets;
 pub mod window;
+pub mod workbench;
 pub mod workers;

@@ -10,7 +10,7 @@ use palpate_protocols::engine::EndingKind;
 use palpate_rheology::fit::{FitReport, Parameter};
 use palpate_runner::TimeScale;
 use palpate_sessions::log::Session;
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::{Flow, Window, refit};
 use palpate_tests::workspace;
 use palpate_window::screens::exact_fit::exact_ui;
 use palpate_window::shell::activity::{is_motion_possible, run_in_progress};
@@ -66,7 +66,7 @@ fn after_a_run_the_window_shows_the_fit_of_the_command_line() {
     flow.wait_for_end();
     let report = flow.same_words_as_the_command_line().unwrap();
     assert!(flow.says("Exact fit") && !flow.says("Live parameters"));
-    let Refit::Done(exact) = flow.window.state().refit() else {
+    let Refit::Done(exact) = refit(&flow.window) else {
         panic!("the fit is gone");
     };
     // The curve stands where the force stands: as late as the ramp, as high as the peak.

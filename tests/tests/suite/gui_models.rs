@@ -5,7 +5,12 @@ use palpate_haptics::Flags;
 use palpate_model::{Depth, Seconds};
 use palpate_rheology::families::by_key;
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_window::screens::extremes::ExtremesScreen;
+use palpate_window::screens::haptics::HapticsScreen;
+use palpate_window::screens::models::ModelsScreen;
+use palpate_window::screens::screen::Screen;
+use palpate_window::screens::trade::TradeScreen;
 use std::fmt::Write;
 use std::path::Path;
 
@@ -52,10 +57,10 @@ fn models_are_compared_in_the_window() {
     flow.type_into("tolerance", "1%");
     flow.window.check_accessibility();
     flow.click("Compare models  F6");
-    let has_answer = |window: &Window| window.state().comparison().is_some();
+    let has_answer = |window: &Window| screen_of::<ModelsScreen>(window).answer().is_some();
     flow.wait("the comparison", has_answer);
     flow.window.run_steps(3);
-    let answer = flow.window.state().comparison().unwrap();
+    let answer = screen_of::<ModelsScreen>(&flow.window).answer().unwrap();
     let selection = &answer.as_ref().unwrap().selection;
     assert_eq!(selection.verdict.family.as_deref(), Some("kelvin"));
     for sentence in &selection.verdict.sentences {
@@ -75,7 +80,9 @@ fn models_are_compared_in_the_window() {
     flow.click("Add");
     flow.click("Compare models  F6");
     flow.wait("the refusal", |window| {
-        window.state().comparison().is_some_and(Result::is_err)
+        screen_of::<ModelsScreen>(window)
+            .answer()
+            .is_some_and(Result::is_err)
     });
     flow.window.run_steps(2);
     assert!(flow.says("/nowhere/at-all"));
@@ -105,7 +112,7 @@ fn the_trade_is_measured_in_the_window() {
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
-        window.state().trade_curves().is_some()
+        screen_of::<TradeScreen>(window).curves().is_some()
     });
     flow.window.run_steps(3);
     assert!(flow.says("What to use") && flow.says("of the peak force"));
@@ -125,14 +132,20 @@ fn the_extremes_are_tested_in_the_window() {
     screen(&mut flow, Key::Num8);
     flow.click("Test the extremes  F6");
     flow.wait("progress", |window| {
-        window.state().extremes_rows().is_none()
+        screen_of::<ExtremesScreen>(window).rows().is_none()
     });
     flow.wait("the rows", |window| {
-        window.state().extremes_rows().is_some()
+        screen_of::<ExtremesScreen>(window).rows().is_some()
     });
     flow.window.run_steps(3);
     assert!(flow.says("every case is right or refused with its reason"));
-    assert!(flow.window.state().extremes_rows().unwrap().len() > 100);
+    assert!(
+        screen_of::<ExtremesScreen>(&flow.window)
+            .rows()
+            .unwrap()
+            .len()
+            > 100
+    );
     flow.window.check_accessibility();
 }
 
@@ -147,7 +160,7 @@ fn type_buzz(flow: &mut Flow) {
 fn check_haptics(flow: &mut Flow) {
     flow.click("Check  F6");
     flow.wait("the check", |window| {
-        let haptics = window.state().haptics();
+        let haptics = screen_of::<HapticsScreen>(window);
         haptics.looked().is_some() && !haptics.is_busy()
     });
     flow.window.run_steps(3);
@@ -166,7 +179,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
     flow.type_into("rate", "1000");
     type_buzz(&mut flow);
     check_haptics(&mut flow);
-    let looked = flow.window.state().haptics().looked().unwrap();
+    let looked = screen_of::<HapticsScreen>(&flow.window).looked().unwrap();
     let checked = &looked.as_ref().unwrap().checked;
     // The source thesis's body: the model itself returns energy below 0.712 mm.
     assert!((checked.margin.cycles[0].to.0 - 0.712).abs() < 1e-3);
@@ -200,7 +213,7 @@ fn a_device_is_checked_before_play_and_every_change_asks_for_it_again() {
 
 /// Depth of the slave and force commanded, as the screen has them.
 fn felt(window: &Window) -> [f64; 2] {
-    let feel = window.state().haptics().feel();
+    let feel = screen_of::<HapticsScreen>(window).feel();
     feel.map_or([0.0; 2], |feel| {
         let seen = &feel.last().snapshot;
         [seen.depth.0, seen.force.0]
@@ -214,16 +227,18 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     check_haptics(&mut flow);
     flow.click("Start the loop");
     flow.wait("the loop", |window| {
-        let feel = window.state().haptics().feel();
+        let feel = screen_of::<HapticsScreen>(window).feel();
         feel.is_some_and(|feel| feel.kept().work.count > 0)
     });
     // Above the surface there is none, and the screen says so.
     flow.click("Lift off");
     flow.wait("the words", |window| {
-        window.state().haptics().feel().is_some_and(|feel| {
-            let flags = feel.flags();
-            flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
-        })
+        screen_of::<HapticsScreen>(window)
+            .feel()
+            .is_some_and(|feel| {
+                let flags = feel.flags();
+                flags.has_any(Flags::NO_CONTACT | Flags::ABOVE_SURFACE)
+            })
     });
     flow.window.run_steps(2);
     assert!(flow.says("Why no force?") && flow.says("the force is zero"));
@@ -244,7 +259,12 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     flow.click("Lift off");
     flow.wait("none", |window| felt(window)[1] == 0.0);
     // The slider leads the hand as the buttons do.
-    let at_hand = |flow: &Flow| flow.window.state().haptics().feel().unwrap().place();
+    let at_hand = |flow: &Flow| {
+        screen_of::<HapticsScreen>(&flow.window)
+            .feel()
+            .unwrap()
+            .place()
+    };
     let before = at_hand(&flow);
     flow.window.get_all_by_label("hand").next().unwrap().focus();
     flow.window.run_steps(2);
@@ -256,7 +276,7 @@ fn a_body_is_felt_through_the_loop_and_the_screen_says_why_there_is_no_force() {
     // The key that stops a rig stops this too, and what was seen stays.
     flow.window.key_press(Key::F12);
     flow.window.run_steps(2);
-    assert!(!flow.window.state().haptics().is_running());
+    assert!(!screen_of::<HapticsScreen>(&flow.window).is_running());
     assert!(flow.says("the loop does not run") && flow.says("force commanded"));
 }
 
@@ -272,7 +292,7 @@ fn a_scene_is_measured_and_planned_in_the_window() {
     flow.type_into("budget", "100000");
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
-        window.state().scene_curves().is_some()
+        screen_of::<TradeScreen>(window).scene_curves().is_some()
     });
     flow.window.run_steps(3);
     // So much is tolerated that the coarsest mesh does, and what that leaves out is told.
@@ -315,9 +335,9 @@ fn a_hand_led_from_the_window_is_recorded_and_computed_again_bit_by_bit() {
     });
     flow.click("Replay it");
     flow.wait("the replay", |window| {
-        window.state().haptics().replayed().is_some()
+        screen_of::<HapticsScreen>(window).replayed().is_some()
     });
-    let replayed = flow.window.state().haptics().replayed().unwrap();
+    let replayed = screen_of::<HapticsScreen>(&flow.window).replayed().unwrap();
     let replayed = replayed.as_ref().unwrap();
     assert!(
         replayed.is_identical && replayed.ticks > 100,

@@ -12,9 +12,12 @@ use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_model::units::Volts;
 use palpate_runner::TimeScale;
 use palpate_test_support::skip::{Need, skip};
+use palpate_tests::flow::screen_of;
 use palpate_tests::workspace;
 use palpate_window::app::WorkbenchApp;
-use palpate_window::shell::rail::Screen;
+use palpate_window::screens::haptics::HapticsScreen;
+use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::table::SCREENS;
 use palpate_window::window::WindowOptions;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -137,7 +140,7 @@ fn show(window: &mut Window, session: &Path) {
 
 /// Checks the device of the guide's example on the haptics screen, unless that is done.
 fn check_buzz(window: &mut Window) {
-    if window.state().haptics().looked().is_some() {
+    if screen_of::<HapticsScreen>(window).looked().is_some() {
         return;
     }
     window.get_by_label("current").click_accesskit();
@@ -151,7 +154,7 @@ fn check_buzz(window: &mut Window) {
     window.get_by_label("Check  F6").click_accesskit();
     for _ in 0..FRAMES_MAX {
         window.step();
-        if window.state().haptics().looked().is_some() {
+        if screen_of::<HapticsScreen>(window).looked().is_some() {
             // A caret in a field would come and go.
             window.get_by_label("Check  F6").focus();
             window.run_steps(2);
@@ -166,7 +169,7 @@ fn check_buzz(window: &mut Window) {
 fn compute_poke(window: &mut Window) {
     for _ in 0..FRAMES_MAX {
         window.step();
-        if window.state().scene().ahead().is_some() {
+        if screen_of::<SceneScreen>(window).ahead().is_some() {
             window.run_steps(2);
             return;
         }
@@ -193,16 +196,16 @@ fn every_screen_looks_as_it_did() {
         .max_failed_pixels(40);
     settle(&mut window);
     for theme in ["light", "dark"] {
-        for screen in Screen::ALL {
-            window.key_press_modifiers(Modifiers::COMMAND, screen.key());
+        for screen in SCREENS {
+            window.key_press_modifiers(Modifiers::COMMAND, screen.key);
             window.run_steps(3);
-            if screen == Screen::Review {
+            if screen.name == "Review" {
                 show(&mut window, &library.join("ramp-hold-lab"));
             }
-            if screen == Screen::Haptics {
+            if screen.name == "Haptics" {
                 check_buzz(&mut window);
             }
-            if screen == Screen::Scene {
+            if screen.name == "Scene" {
                 compute_poke(&mut window);
             }
             settle(&mut window);
@@ -210,7 +213,7 @@ fn every_screen_looks_as_it_did() {
             for _ in 0..FRAMES_MAX {
                 // All of them: before they are read there are none.
                 let mut found = window.query_all_by_label_contains(&found);
-                if screen != Screen::Library || found.next().is_some() {
+                if screen.name != "Library" || found.next().is_some() {
                     break;
                 }
                 drop(found);
@@ -224,11 +227,11 @@ fn every_screen_looks_as_it_did() {
                 window.get_by_label("by").set_text_value_accesskit("Ada");
                 window.run_steps(2);
             }
-            let options = match screen {
-                Screen::Library => options.clone().max_failed_pixels(200),
+            let options = match screen.name {
+                "Library" => options.clone().max_failed_pixels(200),
                 _ => options.clone(),
             };
-            let name = format!("{}-{theme}", screen.name().to_lowercase());
+            let name = format!("{}-{theme}", screen.name.to_lowercase());
             results.add(window.try_snapshot_options(name, &options));
         }
         window.key_press(Key::F1);

@@ -4,7 +4,9 @@ use eframe::egui::{Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_haptics::scene::WhyNoForce;
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::trade::TradeScreen;
 use std::path::Path;
 
 fn open() -> Flow {
@@ -24,7 +26,7 @@ fn read(flow: &mut Flow, path: &Path, text: &str, name: &str) {
 
 /// The newest depth in mm and force in N.
 fn felt(window: &Window) -> Option<(f64, f64)> {
-    let tick = window.state().scene().touch()?.moment().tick;
+    let tick = screen_of::<SceneScreen>(window).touch()?.moment().tick;
     let [x, y, z] = tick.force;
     Some((tick.depth, x.hypot(y).hypot(z)))
 }
@@ -33,10 +35,10 @@ fn felt(window: &Window) -> Option<(f64, f64)> {
 fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     let mut flow = open();
     flow.wait("the path", |window| {
-        window.state().scene().ahead().is_some()
+        screen_of::<SceneScreen>(window).ahead().is_some()
     });
     flow.window.run_steps(3);
-    let ahead = flow.window.state().scene().ahead().unwrap();
+    let ahead = screen_of::<SceneScreen>(&flow.window).ahead().unwrap();
     let deepest = ahead.as_ref().unwrap().deepest.tick;
     assert!(flow.says(&format!("at {:.2} mm", deepest.depth)));
     assert!(flow.says("poke, computed: where it is deepest"));
@@ -61,7 +63,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     assert!(flow.says("the scene runs and would be disturbed"));
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.wait("the end of the path", |window| {
-        let touch = window.state().scene().touch().unwrap();
+        let touch = screen_of::<SceneScreen>(window).touch().unwrap();
         touch.is_running() && !touch.is_led()
     });
     flow.wait("the stylus above", |window| {
@@ -71,7 +73,7 @@ fn a_poke_is_computed_then_felt_along_its_path_and_stopped_by_escape() {
     assert!(flow.says(WhyNoForce::NoContact.words()));
     flow.window.key_press(Key::Escape);
     flow.window.run_steps(3);
-    assert!(!flow.window.state().scene().is_running());
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
     assert!(flow.says("stopped; as it was seen last"));
 }
 
@@ -102,7 +104,7 @@ fn keys_press_into_the_tissue_and_lift_again() {
     flow.window.run_steps(2);
     assert!(flow.says(WhyNoForce::NoContact.words()));
     flow.click("Stop the scene");
-    assert!(!flow.window.state().scene().is_running());
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
 }
 
 #[test]
@@ -112,7 +114,7 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
     let text = "name = \"soft pad\"\n[tissue]\nside_mm = 40.0\n[mesh]\nnodes = 81\n";
     read(&mut flow, &path, text, "soft pad");
     flow.click("Start the scene");
-    let touch = flow.window.state().scene().touch().unwrap();
+    let touch = screen_of::<SceneScreen>(&flow.window).touch().unwrap();
     assert_eq!(
         (touch.settings().side_mm, touch.settings().nodes),
         (40.0, 81)
@@ -125,9 +127,7 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
         found.next().is_some()
     });
     assert_eq!(
-        flow.window
-            .state()
-            .scene()
+        screen_of::<SceneScreen>(&flow.window)
             .touch()
             .unwrap()
             .settings()
@@ -137,7 +137,7 @@ fn a_scene_file_fills_the_form_and_a_wrong_one_says_where() {
 }
 
 fn replayed(window: &Window) -> Option<Result<bool, String>> {
-    let replayed = window.state().scene().replayed()?;
+    let replayed = screen_of::<SceneScreen>(window).replayed()?;
     Some(
         replayed
             .as_ref()
@@ -157,7 +157,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     flow.click("Start the scene");
     assert!(!flow.is_enabled("Replay it"));
     flow.wait("the end of the path", |window| {
-        let touch = window.state().scene().touch().unwrap();
+        let touch = screen_of::<SceneScreen>(window).touch().unwrap();
         touch.is_running() && !touch.is_led()
     });
     flow.window.key_press(Key::Escape);
@@ -175,7 +175,7 @@ fn a_scene_is_recorded_and_its_recording_replayed_bit_by_bit() {
     // A folder has one recording.
     flow.type_into("record to", &called);
     flow.click("Start the scene");
-    assert!(!flow.window.state().scene().is_running());
+    assert!(!screen_of::<SceneScreen>(&flow.window).is_running());
     assert!(flow.says("give a new folder that may be written"));
     flow.type_into("record to", "");
     // Another body gives other forces, and a line that was changed is told.
@@ -215,7 +215,7 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     flow.click("few rows, rough times");
     flow.click("Measure here  F6");
     flow.wait("the curves", |window| {
-        window.state().scene_curves().is_some()
+        screen_of::<TradeScreen>(window).scene_curves().is_some()
     });
     flow.window.key_press_modifiers(Modifiers::COMMAND, Key::E);
     flow.window.run_steps(3);
@@ -223,8 +223,13 @@ fn a_plan_is_taken_and_stands_in_the_form() {
     flow.click("Take the plan");
     flow.window.run_steps(3);
     flow.click("Start the scene");
-    let settings = *flow.window.state().scene().touch().unwrap().settings();
-    let curves = flow.window.state().scene_curves().unwrap();
+    let settings = *screen_of::<SceneScreen>(&flow.window)
+        .touch()
+        .unwrap()
+        .settings();
+    let curves = screen_of::<TradeScreen>(&flow.window)
+        .scene_curves()
+        .unwrap();
     let meshes = curves.meshes.iter().map(|mesh| mesh.nodes as usize);
     assert!(meshes.clone().any(|nodes| nodes == settings.nodes));
     assert!(flow.says(&format!("plan: {0} x {0} nodes", settings.nodes)));
@@ -240,7 +245,7 @@ fn a_missed_budget_is_told_before_anything_was_measured_and_a_button_leads_to_th
     read(&mut flow, &path, text, "strict");
     flow.click("Start the scene");
     flow.wait("times", |window| {
-        let touch = window.state().scene().touch();
+        let touch = screen_of::<SceneScreen>(window).touch();
         touch.is_some_and(|touch| touch.kept().work.count > 0)
     });
     flow.window.run_steps(2);

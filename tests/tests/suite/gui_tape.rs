@@ -3,7 +3,10 @@ use eframe::App;
 use eframe::egui::{DroppedFile, Key, Modifiers};
 use egui_kittest::kittest::Queryable;
 use palpate_runner::TimeScale;
-use palpate_tests::flow::{Flow, Window};
+use palpate_tests::flow::{Flow, Window, screen_of};
+use palpate_window::screens::haptics::HapticsScreen;
+use palpate_window::screens::scene::SceneScreen;
+use palpate_window::screens::screen::Screen;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -30,7 +33,7 @@ fn hear(flow: &mut Flow, words: &str) {
 }
 
 fn is_deep(window: &Window) -> bool {
-    let touch = window.state().scene().touch();
+    let touch = screen_of::<SceneScreen>(window).touch();
     touch.is_some_and(|touch| touch.moment().tick.depth > 1.0)
 }
 
@@ -89,7 +92,7 @@ fn the_end_of_a_recording_is_told_as_it_is_on_disk_and_a_changed_digit_is_found(
     check_told(&mut flow, &folder, "depth_mm");
     // What is not asked for is not recorded, and nothing is said of the one before.
     flow.click("Start the scene");
-    assert!(flow.window.state().scene().is_running());
+    assert!(screen_of::<SceneScreen>(&flow.window).is_running());
     assert!(!flow.says("every tick is recorded") && !flow.says("ticks recorded"));
     flow.click("Stop the scene");
 }
@@ -111,7 +114,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     let mut flow = open(Key::Num9);
     flow.click("Check  F6");
     flow.wait("the check", |window| {
-        let haptics = window.state().haptics();
+        let haptics = screen_of::<HapticsScreen>(window);
         haptics.looked().is_some() && !haptics.is_busy()
     });
     // What is recorded is what runs: without guards too.
@@ -120,7 +123,7 @@ fn where_a_hand_was_led_is_replayed_and_every_kind_of_recording_has_its_screen()
     flow.click("Start the loop");
     flow.click("Ramp and hold");
     flow.wait("a force", |window| {
-        let feel = window.state().haptics().feel();
+        let feel = screen_of::<HapticsScreen>(window).feel();
         feel.is_some_and(|feel| feel.last().snapshot.force.0 > 1.0)
     });
     flow.click("Stop the loop");

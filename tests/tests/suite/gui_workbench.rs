@@ -11,7 +11,8 @@ use palpate_runner::programme::calibration_of;
 use palpate_runner::replay::replay;
 use palpate_sessions::log::Session;
 use palpate_tests::flow::Flow;
-use palpate_window::shell::rail::Screen;
+use palpate_window::screens::rig;
+use palpate_window::screens::table::SCREENS;
 use palpate_window::widgets::places::places;
 use palpate_window::window::WindowOptions;
 
@@ -38,8 +39,8 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     ] {
         assert!(flow.says(words), "{words}");
     }
-    for screen in Screen::ALL {
-        assert!(flow.says(&format!("Screen {}", screen.name())));
+    for screen in SCREENS {
+        assert!(flow.says(&format!("Screen {}", screen.name)));
     }
     flow.type_into("what to do", "nothing is called like this");
     assert!(flow.says("nothing is called so"));
@@ -54,7 +55,7 @@ fn everything_has_a_name_in_the_palette_and_what_is_closed_says_why() {
     assert!(
         !flow.says("a few letters of it") && flow.window.query_by_label("what to do").is_none()
     );
-    let button = flow.window.get_by_label(Screen::ALL[3].name());
+    let button = flow.window.get_by_label(SCREENS[3].name);
     assert!(button.accesskit_node().toggled().is_some());
     // What cannot be asked for now stays where it is.
     by_name(&mut flow, "retract after");
@@ -107,7 +108,7 @@ fn a_run_starts_and_stops_by_name_and_keeps_what_was_noted() {
 fn the_rig_is_moved_by_hand_and_every_move_is_a_session() {
     let mut flow = Flow::open(TimeScale::Max);
     flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Screen::Rig.key());
+        .key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.window.check_accessibility();
     assert!(flow.says("counter, home not known") && flow.says("to 9.0 N"));
@@ -144,7 +145,7 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
     options.to_acknowledge = vec!["the daily check failed: zero".into()];
     let mut flow = Flow::open_on(options, tempfile::tempdir().unwrap());
     flow.window
-        .key_press_modifiers(Modifiers::COMMAND, Screen::Rig.key());
+        .key_press_modifiers(Modifiers::COMMAND, rig::SCREEN.key);
     flow.window.run_steps(3);
     flow.click("+5 mm");
     flow.window.run_steps(10);
@@ -160,8 +161,8 @@ fn no_move_by_hand_goes_past_a_daily_check_that_failed() {
 fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
     let mut flow = Flow::open(TimeScale::Max);
     let mut seen = 0;
-    for screen in Screen::ALL {
-        by_name(&mut flow, &format!("screen {}", screen.name()));
+    for screen in SCREENS {
+        by_name(&mut flow, &format!("screen {}", screen.name));
         let known: Vec<String> = places(&flow.window.ctx)
             .into_iter()
             .map(|(name, _)| name)
@@ -179,7 +180,7 @@ fn the_palette_leads_to_whatever_is_chosen_ticked_or_typed() {
                     node.is_disabled()
                         || (!name.is_empty() && known.iter().any(|one| one.contains(&name))),
                     "{}: {role:?} '{name}' of {known:?}",
-                    screen.name()
+                    screen.name
                 );
                 seen += 1;
             }

@@ -6,7 +6,7 @@ use palpate_drivers::{Rig, RigEvent};
 use palpate_model::Nanos;
 use palpate_model::rig::{RigCommand, RigDescription};
 use palpate_runner::TimeScale;
-use palpate_test_support::wait::until;
+use palpate_test_support::wait::{Deadline, until};
 use std::sync::Mutex;
 
 /// What a rig was told to do, in order.
@@ -93,7 +93,7 @@ fn a_stop_key_is_sent_before_its_frame_begins_and_once() {
         app.logic(ui.ctx(), &mut frame);
     });
     drawn.textures_delta.clear();
-    app.operator(Operator::Halt);
+    app.workbench.operator(Operator::Halt);
     let all = until(
         || {
             let all = commanded.lock().unwrap().clone();
@@ -103,4 +103,46 @@ fn a_stop_key_is_sent_before_its_frame_begins_and_once() {
     );
     use RigCommand::{Halt, Stop};
     assert_eq!(all, [Stop, Halt, Stop, Halt]);
+}
+
+/// A screen that notes of everything a frame does to it whether the rig had been told to stop by then.
+struct Witness(Commanded, Arc<Mutex<Vec<(&'static str, bool)>>>);
+
+impl Witness {
+    /// The stop is on its way to the runner's thread: one that was sent comes, one that was not never does.
+    fn note(&self, what: &'static str) {
+        let end = Deadline::new();
+        let has_come = || self.0.lock().unwrap().contains(&RigCommand::Stop);
+        while !has_come() && !end.is_over() {
+            std::thread::sleep(std::time::Duration::from_millis(1));
+        }
+        self.1.lock().unwrap().push((what, has_come()));
+    }
+}
+
+impl Screen for Witness {
+    fn left_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut Commands) {}
+
+    fn middle_ui(&mut self, _: &mut Ui, _: &mut Workbench, _: &mut Commands) {}
+
+    fn stop(&mut self) {
+        self.note("stop");
+    }
+
+    fn poll(&mut self, _: &Context, _: &mut Workbench) {
+        self.note("poll");
+    }
+}
+
+#[test]
+fn a_stop_reaches_the_rig_before_the_loops_are_stopped_and_workers_are_asked() {
+    let ctx = Context::default();
+    let (mut app, commanded) = open(&ctx);
+    let noted = Arc::default();
+    let witness = Witness(commanded, Arc::clone(&noted));
+    app.screens.all.insert(0, ("Witness", Box::new(witness)));
+    let mut frame = eframe::Frame::_new_kittest();
+    let mut drawn = ctx.run_ui(pressed(Key::Escape), |ui| app.logic(ui.ctx(), &mut frame));
+    drawn.textures_delta.clear();
+    assert_eq!(*noted.lock().unwrap(), [("stop", true), ("poll", true)]);
 }

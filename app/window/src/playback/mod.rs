@@ -10,10 +10,11 @@ use crate::plots::force_time::{TimeView, force_time_ui, head_ui};
 use crate::screens::results_panel::findings_ui;
 use crate::shell::activity::{Intent, activity};
 use crate::shell::event_log::EventLog;
+use crate::shell::panels::frame;
 use crate::shell::top_bar::{HEIGHT, numbers_ui};
 use crate::theme::{self, Tokens};
 use crate::widgets::state_badge::badge_ui;
-use crate::window::{frame, open_window};
+use crate::window::open_window;
 use crate::workers::fit::Refit;
 use crate::workers::player::PlayerThread;
 use eframe::egui::{

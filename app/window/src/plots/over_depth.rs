@@ -2,7 +2,7 @@
 //! points than a frame can draw are found as a picture.
 
 use super::navigate::{Gesture, Span, gesture};
-use super::style::quiet;
+use super::style::still;
 use crate::theme::Tokens;
 use crate::workers::Job;
 use eframe::egui::{Color32, ColorImage, Context, TextureHandle, TextureOptions, Ui, vec2};
@@ -248,16 +248,9 @@ pub fn over_depth_ui(
 ) -> (Gesture, [f64; 2]) {
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (x, y) = (depth.shown(), force.shown());
-    let plot = quiet(ui, Plot::new("review_force_depth"), tokens)
+    let plot = still(ui, Plot::new("review_force_depth"), tokens)
         .x_axis_label("depth from contact (mm)")
-        .y_axis_label("force above tare (N)")
-        .set_margin_fraction(vec2(0.0, 0.0))
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .allow_double_click_reset(false)
-        .show_x(false)
-        .show_y(false);
+        .y_axis_label("force above tare (N)");
     let response = plot.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(x[0]..=x[1]);
         plot_ui.set_plot_bounds_y(y[0]..=y[1]);

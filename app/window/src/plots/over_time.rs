@@ -2,10 +2,10 @@
 
 use super::navigate::{Gesture, Span, gesture};
 use super::stretches::Stretches;
-use super::style::{quiet, round_marks};
+use super::style::{round_marks, still};
 use crate::theme::Tokens;
-use eframe::egui::{Align2, Color32, RichText, Ui, vec2};
-use egui_plot::{HLine, LineStyle, Plot, PlotPoint, Span as Shade, Text, VLine};
+use eframe::egui::{Align2, Color32, RichText, Ui};
+use egui_plot::{HLine, LineStyle, Plot, PlotPoint, PlotUi, Span as Shade, Text, VLine};
 use palpate_model::rig::Phase;
 
 /// One line.
@@ -71,6 +71,46 @@ fn heights(panel: &Panel<'_>) -> [f64; 2] {
     [low - MARGIN * height, high + (MARGIN + NAMES) * height]
 }
 
+/// Draws what all plots of a session have behind their lines: phases, what is left out, what happened.
+fn setting_ui(plot_ui: &mut PlotUi<'_>, setting: &Setting, shown: [f64; 2], tokens: &Tokens) {
+    for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
+        if *to < shown[0] || *from > shown[1] {
+            continue;
+        }
+        let fill = match number % 2 {
+            0 => Color32::TRANSPARENT,
+            _ => tokens.phase_band,
+        };
+        let seen = to.min(shown[1]) - from.max(shown[0]);
+        let has_name = seen > NAME_SHARE * (shown[1] - shown[0]);
+        let name = if has_name { phase.name() } else { "" };
+        plot_ui.span(
+            Shade::new(name, *from..=*to)
+                .fill(fill)
+                .border_color(tokens.line),
+        );
+    }
+    for [from, to] in &setting.left_out {
+        plot_ui.span(
+            Shade::new("left out", *from..=*to)
+                .fill(tokens.limit.gamma_multiply(0.16))
+                .border_color(tokens.limit),
+        );
+    }
+    for moment in &setting.moments {
+        if !(shown[0]..=shown[1]).contains(&moment.t) {
+            continue;
+        }
+        let (color, style) = match (moment.is_alarm, moment.is_note) {
+            (true, _) => (tokens.alarm_fill, LineStyle::Solid),
+            (_, true) => (tokens.text, LineStyle::dashed_loose()),
+            _ => (tokens.text_quiet, LineStyle::dotted_dense()),
+        };
+        let line = VLine::new("event", moment.t).color(color).width(1.0);
+        plot_ui.vline(line.style(style).allow_hover(false));
+    }
+}
+
 /// Draws one plot in the space there is and returns what the pointer did in it. `is_last`: it has the time's name.
 pub fn over_time_ui(
     ui: &mut Ui,
@@ -82,57 +122,15 @@ pub fn over_time_ui(
     let tokens = Tokens::of(ui.visuals().dark_mode);
     let (shown, [low, high]) = (span.shown(), heights(panel));
     let marks_up = (f64::from(ui.available_height()) / 34.0).clamp(2.0, 6.0);
-    let plot = quiet(ui, Plot::new(panel.id), tokens)
+    let plot = still(ui, Plot::new(panel.id), tokens)
         .y_axis_label(panel.axis)
         .y_grid_spacer(move |input| round_marks(input, marks_up))
         .x_axis_label(time_axis.unwrap_or_default())
-        .show_axes([time_axis.is_some(), true])
-        .set_margin_fraction(vec2(0.0, 0.0))
-        .allow_drag(false)
-        .allow_zoom(false)
-        .allow_boxed_zoom(false)
-        .allow_double_click_reset(false)
-        .show_x(false)
-        .show_y(false);
+        .show_axes([time_axis.is_some(), true]);
     let response = plot.show(ui, |plot_ui| {
         plot_ui.set_plot_bounds_x(shown[0]..=shown[1]);
         plot_ui.set_plot_bounds_y(low..=high);
-        for (number, (from, to, phase)) in setting.phases.iter().enumerate() {
-            if *to < shown[0] || *from > shown[1] {
-                continue;
-            }
-            let fill = match number % 2 {
-                0 => Color32::TRANSPARENT,
-                _ => tokens.phase_band,
-            };
-            let seen = to.min(shown[1]) - from.max(shown[0]);
-            let has_name = seen > NAME_SHARE * (shown[1] - shown[0]);
-            let name = if has_name { phase.name() } else { "" };
-            plot_ui.span(
-                Shade::new(name, *from..=*to)
-                    .fill(fill)
-                    .border_color(tokens.line),
-            );
-        }
-        for [from, to] in &setting.left_out {
-            plot_ui.span(
-                Shade::new("left out", *from..=*to)
-                    .fill(tokens.limit.gamma_multiply(0.16))
-                    .border_color(tokens.limit),
-            );
-        }
-        for moment in &setting.moments {
-            if !(shown[0]..=shown[1]).contains(&moment.t) {
-                continue;
-            }
-            let (color, style) = match (moment.is_alarm, moment.is_note) {
-                (true, _) => (tokens.alarm_fill, LineStyle::Solid),
-                (_, true) => (tokens.text, LineStyle::dashed_loose()),
-                _ => (tokens.text_quiet, LineStyle::dotted_dense()),
-            };
-            let line = VLine::new("event", moment.t).color(color).width(1.0);
-            plot_ui.vline(line.style(style).allow_hover(false));
-        }
+        setting_ui(plot_ui, setting, shown, tokens);
         if panel.has_zero {
             let zero = HLine::new("zero", 0.0).color(tokens.text_quiet).width(1.0);
             plot_ui.hline(zero.allow_hover(false));

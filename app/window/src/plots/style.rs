@@ -42,6 +42,18 @@ pub(crate) fn quiet<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
         })
 }
 
+/// The same for a plot whose bounds are ours: [`super::navigate`] moves and zooms it, and its readouts are drawn by us.
+pub(super) fn still<'a>(ui: &Ui, plot: Plot<'a>, tokens: &Tokens) -> Plot<'a> {
+    quiet(ui, plot, tokens)
+        .set_margin_fraction(vec2(0.0, 0.0))
+        .allow_drag(false)
+        .allow_zoom(false)
+        .allow_boxed_zoom(false)
+        .allow_double_click_reset(false)
+        .show_x(false)
+        .show_y(false)
+}
+
 /// Labelled steps that a plot of a size in points has room for, across and up.
 fn steps(size: Vec2) -> [f64; 2] {
     let [across, up] = POINTS_PER_STEP;

@@ -5,6 +5,7 @@ use crate::command::{Command, Commands};
 use crate::shell::activity::is_planned;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use eframe::egui::{Button, Label, RichText, Ui, vec2};
 use palpate_protocols::engine::Outcome;
 use palpate_runner::RunView;
@@ -27,7 +28,6 @@ pub fn after_stop_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
 
 /// The two ways on, with the reason if one of them is closed.
 fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     let button = |text: &'static str| Button::new(text).min_size(vec2(112.0, 28.0));
     ui.horizontal(|ui| {
         if ui
@@ -42,7 +42,7 @@ fn choices_ui(ui: &mut Ui, run: &RunView, commands: &mut Commands) {
     });
     if let Err(reason) = &run.can_retract {
         let text = format!("No retract: {reason}");
-        ui.add(Label::new(RichText::new(text).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, &text);
     }
 }
 
@@ -71,7 +71,7 @@ fn log_ui(ui: &mut Ui, run: &RunView) {
     };
     match alarm {
         Some(text) => {
-            ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, &text);
         }
         None => {
             let text = format!("Session in {}", run.folder.display());

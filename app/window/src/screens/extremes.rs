@@ -1,17 +1,27 @@
 //! What is right and what is refused at the ends of every range.
 
-use crate::command::{Command, Commands};
+use super::screen::{Screen, ScreenEntry};
+use crate::command::Commands;
 use crate::theme::Tokens;
+use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
 use crate::widgets::table::{Column, Row as TableRow, RowLook, table_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::work_ui;
+use crate::workbench::Workbench;
 use crate::workers::task::Task;
-use eframe::egui::{ComboBox, Context, Label, RichText, Ui};
+use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::extremes::survey;
 use palpate_analysis::report::extremes::{GroupSummary, VERDICTS, summary};
 use palpate_rheology::extremes::{Extent, Row, Verdict};
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Extremes",
+    purpose: "what is right and what is refused at the ends of every range",
+    key: Key::Num8,
+    open: |_| Box::new(ExtremesScreen::default()),
+};
 
 /// How much is run, in words.
 const EXTENTS: [(Extent, &str); 2] = [
@@ -47,45 +57,16 @@ impl Default for ExtremesScreen {
 }
 
 impl ExtremesScreen {
-    /// Whether work is under way.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
-    }
-
-    /// Fetches an answer that has come.
-    pub fn poll(&mut self) {
-        self.task.poll();
-    }
-
     /// Rows found by the last test.
     #[must_use]
     pub fn rows(&self) -> Option<&[Row]> {
         let found = self.task.answer()?.as_ref().ok()?;
         Some(&found.rows)
     }
+}
 
-    /// Starts the test.
-    pub fn start(&mut self, ctx: &Context) {
-        let extent = self.extent;
-        self.task.start("extremes", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            let rows = survey(extent, None, &tell).map_err(|err| err.to_string())?;
-            let rows = rows.ok_or("ended before it was done")?;
-            Ok(Found {
-                groups: summary(&rows),
-                rows,
-            })
-        });
-    }
-
-    /// Ends a test under way.
-    pub fn cancel(&self) {
-        self.task.cancel();
-    }
-
-    /// What is run and what is shown.
-    pub fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+impl Screen for ExtremesScreen {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         section_ui(ui, "Test");
         ui.add(
             Label::new(
@@ -93,29 +74,9 @@ impl ExtremesScreen {
             )
             .wrap(),
         );
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "extent");
-            let words = EXTENTS
-                .iter()
-                .find(|(extent, _)| *extent == self.extent)
-                .map_or("", |(_, words)| words);
-            ComboBox::from_id_salt("extent")
-                .selected_text(words)
-                .show_ui(ui, |ui| {
-                    for (extent, words) in EXTENTS {
-                        ui.selectable_value(&mut self.extent, extent, words);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("extent");
-        });
+        choice_ui(ui, "extent", &mut self.extent, &EXTENTS);
         ui.add_space(8.0);
-        match task_ui(ui, "Test the extremes  F6", &self.task, &Ok(())) {
-            Some(Pressed::Start) => commands.push(Command::Work),
-            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
-            None => {}
-        }
+        work_ui(ui, "Test the extremes  F6", &self.task, &Ok(()), commands);
         if let Some(Ok(found)) = self.task.answer() {
             section_ui(ui, "Shown");
             let groups = found.groups.iter().map(|one| (Some(one.group), one.group));
@@ -131,13 +92,12 @@ impl ExtremesScreen {
         }
     }
 
-    /// The table.
-    pub fn middle_ui(&self, ui: &mut Ui) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let found = match self.task.answer() {
             Some(Ok(found)) => found,
             Some(Err(reason)) => {
-                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+                alarm_ui(ui, reason);
                 return;
             }
             None => {
@@ -165,8 +125,7 @@ impl ExtremesScreen {
         table_ui(ui, "extremes_table", &columns, &rows);
     }
 
-    /// Each group in numbers.
-    pub fn right_ui(&self, ui: &mut Ui) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Result");
         let Some(Ok(found)) = self.task.answer() else {
@@ -195,30 +154,35 @@ impl ExtremesScreen {
             ui.label(counts.join(", "));
             if let Some(tightest) = &facts.tightest {
                 let text = format!("closest to its tolerance: {tightest}");
-                ui.add(Label::new(RichText::new(text).color(tokens.text_quiet).small()).wrap());
+                quiet_ui(ui, &text);
             }
         }
     }
-}
 
-fn choice_ui<T: Copy + PartialEq>(ui: &mut Ui, name: &str, value: &mut T, choices: &[(T, &str)]) {
-    ui.horizontal(|ui| {
-        let label = form_label(ui, name);
-        let words = choices
-            .iter()
-            .find(|(choice, _)| choice == value)
-            .map_or("", |(_, words)| words);
-        ComboBox::from_id_salt(name)
-            .selected_text(words)
-            .show_ui(ui, |ui| {
-                for (choice, words) in choices {
-                    ui.selectable_value(value, *choice, *words);
-                }
+    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        self.task.poll();
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        let extent = self.extent;
+        self.task.start("extremes", ctx, move |progress| {
+            let tell = |done, of, what: &str| progress.tell(done, of, what);
+            let rows = survey(extent, None, &tell).map_err(|err| err.to_string())?;
+            let rows = rows.ok_or("ended before it was done")?;
+            Ok(Found {
+                groups: summary(&rows),
+                rows,
             })
-            .response
-            .labelled_by(label.id)
-            .place(name);
-    });
+        });
+    }
+
+    fn cancel(&mut self) {
+        self.task.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
+    }
 }
 
 fn table_row(row: &Row) -> TableRow {

@@ -1,4 +1,4 @@
-//! The panels around the plots: rig and protocol on the left, what is known on the right.
+//! The screens: [`screen`] says what one is, [`table`] which there are; each has a file or a folder of its own.
 
 pub mod after_stop;
 pub mod approach;
@@ -16,8 +16,11 @@ pub mod results_panel;
 pub mod review;
 pub mod rig;
 pub mod rig_panel;
+pub mod run;
 pub mod run_middle;
 pub mod scene;
+pub mod screen;
+pub mod table;
 mod tape;
 pub mod trade;
 pub mod weighing;

@@ -9,6 +9,7 @@ use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::remark::quiet_ui;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
 use eframe::egui::{Align2, Button, CollapsingHeader, Label, RichText, TextEdit, Ui, vec2};
@@ -118,7 +119,7 @@ fn parameter_ui(ui: &mut Ui, field: &mut ParamField) {
         })
         .inner;
     if is_focused {
-        ui.add(Label::new(RichText::new(hint).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, &hint);
     }
     if let Err(reason) = &field.value {
         ui.label(RichText::new(reason).color(tokens.alarm_text).small());

@@ -7,9 +7,10 @@ use crate::command::Commands;
 use crate::plots::CycleLoop;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::remark::alarm_ui;
 use crate::widgets::step_mark::{StepState, step_ui};
 use crate::workers::fit::Refit;
-use eframe::egui::{Label, RichText, Ui};
+use eframe::egui::{RichText, Ui};
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::{RunView, Snapshot};
 
@@ -62,11 +63,10 @@ const BUSY_SECS: f64 = 1.0;
 
 /// Why the parameters are still the live ones.
 fn refit_ui(ui: &mut Ui, refit: Refit<'_>) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     match refit {
         Refit::Refused(reason) => {
             let text = format!("No exact fit: {reason}");
-            ui.add(Label::new(RichText::new(text).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, &text);
         }
         Refit::Busy(seconds) if seconds > BUSY_SECS => {
             ui.horizontal(|ui| {

@@ -2,10 +2,10 @@
 
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
-use crate::workers::path_dialog::FolderDialog;
+use crate::workers::path_dialog::Dialog;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Ui};
 use palpate_analysis::recorded::{Ended, Replayed, ended_words};
@@ -19,8 +19,7 @@ pub(super) type Replay = fn(&Path, &mut dyn FnMut(f64) -> bool) -> Result<Replay
 pub(super) struct TapePanel {
     to: String,
     from: String,
-    dialog: FolderDialog,
-    refusal: Option<String>,
+    dialog: Dialog<PathBuf>,
     /// The window of a recording on its way, which is drawn again when that has ended.
     recording: Option<Context>,
     /// The end of a recording, which waits for the disk.
@@ -132,33 +131,23 @@ impl TapePanel {
             None => {}
         }
         text_row(ui, "replay", "the folder of a recording", &mut self.from);
-        let is_open = self.dialog.is_open();
-        let button = eframe::egui::Button::new("Choose a recording...");
-        if ui.add_enabled(!is_open, button).clicked()
-            && let Err(err) = self.dialog.open("Folder of a recording", ui.ctx())
-        {
-            self.refusal = Some(format!("the dialog cannot be opened: {err}"));
-        }
-        if let Some(refusal) = &self.refusal {
-            alarm_ui(ui, refusal);
-        }
+        self.dialog
+            .button_ui(ui, "Choose a recording...", |dialog| {
+                dialog.set_title("Folder of a recording").pick_folder()
+            });
         let may = match (is_running || self.ending.is_busy(), self.from.trim()) {
             (true, _) => Err("the loop runs".to_owned()),
             (false, "") => Err("name the folder of a recording first".to_owned()),
             (false, _) => Ok(()),
         };
-        match task_ui(ui, "Replay it", &self.task, &may) {
-            Some(Pressed::Start) => {
-                let from = PathBuf::from(self.from.trim());
-                self.task.start("replay", ui.ctx(), move |progress| {
-                    replay(&from, &mut |share| {
-                        let done = (1000.0 * share) as usize;
-                        progress.tell(done, 1000, "the recording").is_continue()
-                    })
-                });
-            }
-            Some(Pressed::Cancel) => self.task.cancel(),
-            None => {}
+        if task_ui(ui, "Replay it", &self.task, &may) {
+            let from = PathBuf::from(self.from.trim());
+            self.task.start("replay", ui.ctx(), move |progress| {
+                replay(&from, &mut |share| {
+                    let done = (1000.0 * share) as usize;
+                    progress.tell(done, 1000, "the recording").is_continue()
+                })
+            });
         }
         match self.task.answer() {
             Some(Ok(replayed)) => {

@@ -2,25 +2,22 @@
 
 use super::activity::run_in_progress;
 use super::palette::Action;
-use super::rail::Screen;
 use super::run_strip::Wish;
 use super::sizes::Edge;
 use crate::app::WorkbenchApp;
 use crate::command::{Aside, Command, TextSize};
-use crate::screens::calibration::can_keep;
-use crate::screens::run_middle::{Middle, is_offered};
-use crate::workers::path_dialog::Ask;
-use palpate_protocols::file::BUILT_IN;
+use crate::screens::table::SCREENS;
 
 impl WorkbenchApp {
     /// What can be asked for now, and of the rest why not.
     pub(crate) fn actions(&self) -> Vec<Action> {
-        let run = run_in_progress(&self.snapshot);
+        let bench = &self.workbench;
+        let run = run_in_progress(&bench.snapshot);
         let no_run = || Err("no run is in progress".to_owned());
         let mut actions = vec![
             Action::new("Stop motion", "F12, Escape", Command::Stop),
             Action::new("Halt: cut the motion without braking", "F11", Command::Halt),
-            Action::new("Start the protocol", "F5", Command::Start).if_ok(self.start_verdict()),
+            Action::new("Start the protocol", "F5", Command::Start).if_ok(bench.start_verdict()),
         ];
         for (name, keys, wish) in [
             ("Pause", "F7", Wish::Pause),
@@ -42,85 +39,43 @@ impl WorkbenchApp {
             Some(false) => Err("the run has not stopped".to_owned()),
             None => no_run(),
         };
-        let is_lost = match self.snapshot.rig.link_error {
+        let is_lost = match bench.snapshot.rig.link_error {
             Some(_) => Ok(()),
             None => Err("the link is there".to_owned()),
-        };
-        let is_felt = match self.haptics.is_running() {
-            true => Ok(()),
-            false => Err("the loop does not run".to_owned()),
-        };
-        let is_touched = match self.scene.is_running() {
-            true => Ok(()),
-            false => Err("the scene does not run".to_owned()),
         };
         actions.extend([
             Action::new("Retract after a stop", "F8", Command::Retract).if_ok(can_retract),
             Action::new("Close the session after a stop", "", Command::CloseSession).if_ok(is_held),
             Action::new("Write a note or a mark", "F3", Command::NoteTyped).if_ok(has_run),
-            Action::new("Find home", "", Command::Aside(Aside::home())).if_ok(self.aside_verdict()),
+            Action::new("Find home", "", Command::Aside(Aside::home()))
+                .if_ok(bench.aside_verdict()),
             Action::new("Connect the rig again", "", Command::Reconnect).if_ok(is_lost),
             Action::new("List the serial ports again", "", Command::ListPorts),
             Action::new("Begin the work of this screen", "F6", Command::Work),
             Action::new("Cancel the work of this screen", "", Command::CancelWork),
-            Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(self.loop_verdict()),
-            Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(is_felt),
-            Action::new("Start the scene", "", Command::SceneStart).if_ok(self.scene_verdict()),
-            Action::new("Stop the scene", "", Command::SceneStop).if_ok(is_touched),
         ]);
-        for screen in Screen::ALL {
-            let keys = format!("Ctrl+{}", screen.key().symbol_or_name());
-            let name = format!("Screen {}: {}", screen.name(), screen.purpose());
-            actions.push(Action::new(name, &keys, Command::Show(screen)));
-        }
-        for (view, name) in [
-            (Middle::Choose, "View: protocols"),
-            (Middle::Course, "View: expected course"),
-            (Middle::Measured, "View: measured"),
-            (Middle::Weighing, "View: weights"),
-            (Middle::Approach, "View: search for the surface"),
-        ] {
-            let verdict = match is_offered(view, self.snapshot.run.as_ref()) {
-                true => Ok(()),
-                false => Err("the run has no such thing".to_owned()),
-            };
-            actions.push(Action::new(name, "", Command::View(view)).if_ok(verdict));
-        }
-        let is_free = match self.is_busy() {
-            true => Err("a run is in progress".to_owned()),
-            false => Ok(()),
-        };
-        for (name, _) in BUILT_IN {
-            let words = format!("Protocol {name}");
-            actions
-                .push(Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone()));
+        actions.extend(self.screens.actions(bench));
+        for screen in SCREENS {
+            let keys = format!("Ctrl+{}", screen.key.symbol_or_name());
+            let name = format!("Screen {}: {}", screen.name, screen.purpose);
+            actions.push(Action::new(name, &keys, Command::Show(screen.name)));
         }
         let is_on_tour = match self.tour.is_on() {
             true => Ok(()),
             false => Err("no tour is under way".to_owned()),
         };
-        actions.extend([
-            Action::new("Open a protocol file", "", Command::Choose(Ask::Protocol)),
-            Action::new("Measure a calibration", "", Command::MeasureCalibration).if_ok(is_free),
-            Action::new(
-                "Keep the calibration that was measured",
-                "",
-                Command::KeepCalibration,
-            )
-            .if_ok(can_keep(self.snapshot.run.as_ref()).map(|_| ())),
-            Action::new("Light or dark screen", "", Command::SwitchTheme),
-            Action::new("Larger text", "Ctrl++", Command::TextSize(TextSize::Larger)),
-            Action::new(
-                "Smaller text",
-                "Ctrl+-",
-                Command::TextSize(TextSize::Smaller),
-            ),
-            Action::new(
-                "Text as it is made",
-                "Ctrl+0",
-                Command::TextSize(TextSize::Usual),
-            ),
-        ]);
+        actions.push(Action::new(
+            "Light or dark screen",
+            "",
+            Command::SwitchTheme,
+        ));
+        for (name, keys, size) in [
+            ("Larger text", "Ctrl++", TextSize::Larger),
+            ("Smaller text", "Ctrl+-", TextSize::Smaller),
+            ("Text as it is made", "Ctrl+0", TextSize::Usual),
+        ] {
+            actions.push(Action::new(name, keys, Command::TextSize(size)));
+        }
         for edge in Edge::ALL {
             for (word, is_larger) in [("Larger", true), ("Smaller", false)] {
                 let name = format!("{word} {}", edge.name());

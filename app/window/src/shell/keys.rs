@@ -1,9 +1,9 @@
 //! Keys that work whatever has the focus. Read before any widget, so no widget can eat them.
 
-use super::rail::Screen;
 use super::run_strip::Wish;
 use super::top_bar::push_stop_buttons;
 use crate::command::{Command, Commands};
+use crate::screens::table::SCREENS;
 use eframe::egui::{Context, Event, Key};
 
 /// The keys and what they ask for. Escape stops too: it is what a startled hand finds.
@@ -77,9 +77,9 @@ impl Keys {
             if is_pressed(&input.events, Key::K, true) {
                 commands.push(Command::Palette);
             }
-            for screen in Screen::ALL {
-                if is_pressed(&input.events, screen.key(), true) {
-                    commands.push(Command::Show(screen));
+            for screen in SCREENS {
+                if is_pressed(&input.events, screen.key, true) {
+                    commands.push(Command::Show(screen.name));
                 }
             }
         });

@@ -2,11 +2,13 @@
 
 pub mod actions;
 pub mod activity;
+pub mod dropped;
 pub mod event_log;
 pub mod frame_meter;
 pub mod keys;
 pub mod pace;
 pub mod palette;
+pub mod panels;
 pub mod rail;
 pub mod run_strip;
 pub mod sizes;

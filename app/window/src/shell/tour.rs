@@ -1,7 +1,7 @@
 //! The first-run tour: a strip of a few sentences, each about what is on the screen, in nobody's way.
 
-use super::rail::Screen;
 use crate::command::{Command, Commands};
+use crate::screens::{calibration, library, review, rig, run};
 use crate::theme::Tokens;
 use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
 
@@ -10,33 +10,33 @@ use eframe::egui::{Frame, Label, Margin, RichText, Stroke, Ui};
 pub struct Tour(Option<usize>);
 
 /// Screen and what is said of it.
-const STOPS: [(Screen, &str); 7] = [
+const STOPS: [(&str, &str); 7] = [
     (
-        Screen::Run,
+        run::SCREEN.name,
         "This is the built-in simulated rig: nothing here can be damaged. Press Start F5 and watch the probe find the tissue, press into it and hold. F12 or Escape stops the motion from any screen.",
     ),
     (
-        Screen::Run,
+        run::SCREEN.name,
         "The left panel has the protocol and what it asks for; Expected course draws it before anything moves. While Start is closed, the reason stands beside it.",
     ),
     (
-        Screen::Rig,
+        rig::SCREEN.name,
         "What the rig reports, large, and moving it by hand. A rig on wires is opened with 'palpate window --rig FILE.toml'.",
     ),
     (
-        Screen::Calibration,
+        calibration::SCREEN.name,
         "Volts to newtons. Measure... asks for one weight after the other, shows when the signal is steady, and lets you read any of them again.",
     ),
     (
-        Screen::Library,
+        library::SCREEN.name,
         "Every session, found by words, names and values. What is chosen here opens in Review with Enter.",
     ),
     (
-        Screen::Review,
+        review::SCREEN.name,
         "One session closely or several beside each other: cursors, phases, fits, other calibrations, a report.",
     ),
     (
-        Screen::Run,
+        run::SCREEN.name,
         "Ctrl+K opens everything by name, with its keys. Press Start F5 when you like.",
     ),
 ];
@@ -59,7 +59,7 @@ impl Tour {
     }
 
     /// Goes on to the next stop, or ends; gives the screen to show.
-    pub fn go_on(&mut self) -> Option<Screen> {
+    pub fn go_on(&mut self) -> Option<&'static str> {
         let next = self.0? + 1;
         self.0 = (next < STOPS.len()).then_some(next);
         self.0.map(|at| STOPS[at].0)

@@ -1,5 +1,6 @@
 //! Small controls used in more than one place.
 
+pub mod choice;
 pub mod choice_box;
 pub mod choice_table;
 pub mod fact_row;

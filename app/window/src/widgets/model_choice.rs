@@ -1,8 +1,7 @@
 //! The family to be fitted, chosen from a list.
 
-use super::places::Place;
-use super::quantity_input::form_label;
-use eframe::egui::{ComboBox, Ui};
+use super::choice::choice_ui;
+use eframe::egui::Ui;
 use palpate_rheology::families;
 
 /// The family that needs no key.
@@ -27,21 +26,9 @@ impl Default for ModelChoice {
 impl ModelChoice {
     /// Draws the choice under a name that no other on the screen has.
     pub fn ui(&mut self, ui: &mut Ui, name: &'static str) {
-        ui.horizontal(|ui| {
-            let label = form_label(ui, name);
-            let chosen = self.family.as_deref().unwrap_or(OWN_MODEL);
-            ComboBox::from_id_salt(name)
-                .selected_text(chosen)
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    ui.selectable_value(&mut self.family, None, OWN_MODEL);
-                    for key in &self.keys {
-                        ui.selectable_value(&mut self.family, Some(key.clone()), key);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place(name);
-        });
+        let keys = self.keys.iter();
+        let keys = keys.map(|key| (Some(key.clone()), key.as_str()));
+        let all: Vec<_> = std::iter::once((None, OWN_MODEL)).chain(keys).collect();
+        choice_ui(ui, name, &mut self.family, &all);
     }
 }

@@ -1,40 +1,44 @@
 //! Start of a longer piece of work, how far it is, and its end.
 
 use super::reason_button::reason_button;
+use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::workers::task::{Standing, Task};
 use eframe::egui::{Button, Label, ProgressBar, RichText, Ui, vec2};
 use palpate_figures::uncertain::clock;
 
-/// What was pressed.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Pressed {
-    /// Begin.
-    Start,
-    /// End before it is done.
-    Cancel,
-}
-
-/// Draws the button, or the progress and its cancel. `verdict` says whether it may begin, or why not.
+/// Draws the button, or the progress and its cancel; true when the work is to begin. `verdict` says whether it may, or
+/// why not.
 pub fn task_ui<T: Send + 'static>(
     ui: &mut Ui,
     start: &str,
     task: &Task<T>,
     verdict: &Result<(), String>,
-) -> Option<Pressed> {
+) -> bool {
     let Some(standing) = task.standing() else {
-        let is_pressed = reason_button(ui, start, vec2(170.0, 34.0), verdict);
-        return is_pressed.then_some(Pressed::Start);
+        return reason_button(ui, start, vec2(170.0, 34.0), verdict);
     };
     bar_ui(ui, &standing);
-    let mut pressed = None;
     if task.is_ending() {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.label(RichText::new("ending").color(tokens.text_quiet));
     } else if cancel_ui(ui, "Cancel") {
-        pressed = Some(Pressed::Cancel);
+        task.cancel();
     }
-    pressed
+    false
+}
+
+/// The same for the work of the screen shown.
+pub fn work_ui<T: Send + 'static>(
+    ui: &mut Ui,
+    start: &str,
+    task: &Task<T>,
+    verdict: &Result<(), String>,
+    commands: &mut Commands,
+) {
+    if task_ui(ui, start, task, verdict) {
+        commands.push(Command::Work);
+    }
 }
 
 /// Draws the progress of work that began by itself, and a button that ends it; true when that is pressed.

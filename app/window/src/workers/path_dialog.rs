@@ -1,7 +1,9 @@
-//! The desktop's own dialog for folders and files, on its own thread: it blocks whoever opens it.
+//! The desktop's own dialogs for folders and files, each on its own thread: they block whoever opens them.
 
 use super::Job;
-use eframe::egui::Context;
+use crate::widgets::remark::{alarm_ui, quiet_ui};
+use eframe::egui::{Button, Context, Ui};
+use rfd::FileDialog;
 use std::path::PathBuf;
 
 /// What is asked for.
@@ -21,138 +23,81 @@ pub enum Ask {
     Scene,
 }
 
-/// A dialog that may be open.
-#[derive(Debug, Default)]
-pub struct PathDialog(Job<Option<(Ask, PathBuf)>>);
+/// A dialog that may be open, and gives a `T`.
+#[derive(Debug)]
+pub struct Dialog<T> {
+    job: Job<Option<T>>,
+    refusal: Option<String>,
+}
 
-impl PathDialog {
-    /// Whether the dialog is open.
-    #[must_use]
-    pub fn is_open(&self) -> bool {
-        self.0.is_busy()
-    }
-
-    /// Opens the dialog, unless one is open.
-    pub fn open(&mut self, ask: Ask, ctx: &Context) -> std::io::Result<()> {
-        let ctx = ctx.clone();
-        let dialog = rfd::FileDialog::new();
-        let pick = move || match ask {
-            Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
-            Ask::Session | Ask::Body => dialog.set_title("Folder of a session").pick_folder(),
-            Ask::Table => dialog
-                .set_title("Table of a recording")
-                .add_filter("tables", &["csv", "tsv", "txt"])
-                .pick_file(),
-            Ask::Scene => dialog
-                .set_title("Scene")
-                .add_filter("scenes", &["toml"])
-                .pick_file(),
-            Ask::Protocol => dialog
-                .set_title("Protocol")
-                .add_filter("protocols", &["toml"])
-                .pick_file(),
-        };
-        self.0.start(
-            "path-dialog",
-            move || pick().map(|path| (ask, path)),
-            move || ctx.request_repaint(),
-        )
-    }
-
-    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
-    pub fn poll(&mut self) -> Option<(Ask, PathBuf)> {
-        self.0.poll().flatten()
+impl<T> Default for Dialog<T> {
+    fn default() -> Self {
+        Self {
+            job: Job::default(),
+            refusal: None,
+        }
     }
 }
 
-/// The dialog for a folder, which may be open.
-#[derive(Debug, Default)]
-pub struct FolderDialog(Job<Option<PathBuf>>);
-
-impl FolderDialog {
+impl<T: Send + 'static> Dialog<T> {
     /// Whether the dialog is open.
     #[must_use]
     pub fn is_open(&self) -> bool {
-        self.0.is_busy()
-    }
-
-    /// Opens the dialog with this head, unless it is open.
-    pub fn open(&mut self, title: &'static str, ctx: &Context) -> std::io::Result<()> {
-        let ctx = ctx.clone();
-        let pick = move || rfd::FileDialog::new().set_title(title).pick_folder();
-        self.0
-            .start("folder-dialog", pick, move || ctx.request_repaint())
-    }
-
-    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
-    pub fn poll(&mut self) -> Option<PathBuf> {
-        self.0.poll().flatten()
-    }
-}
-
-/// The dialog for files to read, which may be open.
-#[derive(Debug, Default)]
-pub struct FilesDialog(Job<Option<Vec<PathBuf>>>);
-
-impl FilesDialog {
-    /// Whether the dialog is open.
-    #[must_use]
-    pub fn is_open(&self) -> bool {
-        self.0.is_busy()
-    }
-
-    /// Opens the dialog with this head, unless it is open.
-    pub fn open(&mut self, title: &'static str, ctx: &Context) -> std::io::Result<()> {
-        let ctx = ctx.clone();
-        let pick = move || rfd::FileDialog::new().set_title(title).pick_files();
-        self.0
-            .start("files-dialog", pick, move || ctx.request_repaint())
-    }
-
-    /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
-    pub fn poll(&mut self) -> Option<Vec<PathBuf>> {
-        self.0.poll().flatten()
-    }
-}
-
-/// What a file is written as.
-#[derive(Clone, Debug, PartialEq, Eq)]
-pub struct SaveAs {
-    /// Head of the dialog.
-    pub title: &'static str,
-    /// Name that stands there.
-    pub name: String,
-    /// Ending without its dot.
-    pub ending: &'static str,
-}
-
-/// The dialog for a file to write, which may be open.
-#[derive(Debug, Default)]
-pub struct SaveDialog(Job<Option<PathBuf>>);
-
-impl SaveDialog {
-    /// Whether the dialog is open.
-    #[must_use]
-    pub fn is_open(&self) -> bool {
-        self.0.is_busy()
+        self.job.is_busy()
     }
 
     /// Opens the dialog, unless it is open.
-    pub fn open(&mut self, wanted: SaveAs, ctx: &Context) -> std::io::Result<()> {
+    pub fn open(
+        &mut self,
+        ctx: &Context,
+        pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
+    ) -> Result<(), String> {
         let ctx = ctx.clone();
-        let pick = move || {
-            rfd::FileDialog::new()
-                .set_title(wanted.title)
-                .set_file_name(wanted.name)
-                .add_filter(wanted.ending, &[wanted.ending])
-                .save_file()
-        };
-        self.0
-            .start("save-dialog", pick, move || ctx.request_repaint())
+        let pick = move || pick(FileDialog::new());
+        let opened = self
+            .job
+            .start("dialog", pick, move || ctx.request_repaint());
+        opened.map_err(|err| format!("the dialog cannot be opened: {err}"))
     }
 
     /// What was chosen, once; `None` while the dialog is open or when it was cancelled.
-    pub fn poll(&mut self) -> Option<PathBuf> {
-        self.0.poll().flatten()
+    pub fn poll(&mut self) -> Option<T> {
+        self.job.poll().flatten()
     }
+
+    /// Draws the button that opens the dialog.
+    pub fn button_ui(
+        &mut self,
+        ui: &mut Ui,
+        text: &str,
+        pick: impl FnOnce(FileDialog) -> Option<T> + Send + 'static,
+    ) {
+        let is_open = self.is_open();
+        if ui.add_enabled(!is_open, Button::new(text)).clicked() {
+            self.refusal = self.open(ui.ctx(), pick).err();
+        }
+        if is_open {
+            quiet_ui(ui, "the dialog is open");
+        }
+        if let Some(refusal) = &self.refusal {
+            alarm_ui(ui, refusal);
+        }
+    }
+}
+
+/// Chooses what is asked for.
+#[must_use]
+pub fn pick(ask: Ask, dialog: FileDialog) -> Option<(Ask, PathBuf)> {
+    let of_kind = |title: &str, kind: &str, endings: &[&str]| {
+        let dialog = dialog.clone().set_title(title);
+        dialog.add_filter(kind, endings).pick_file()
+    };
+    let path = match ask {
+        Ask::NewSessions => dialog.set_title("Folder for new sessions").pick_folder(),
+        Ask::Session | Ask::Body => dialog.set_title("Folder of a session").pick_folder(),
+        Ask::Table => of_kind("Table of a recording", "tables", &["csv", "tsv", "txt"]),
+        Ask::Scene => of_kind("Scene", "scenes", &["toml"]),
+        Ask::Protocol => of_kind("Protocol", "protocols", &["toml"]),
+    };
+    Some((ask, path?))
 }

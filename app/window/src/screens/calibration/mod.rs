@@ -3,14 +3,18 @@
 
 mod plots;
 
+use super::screen::{Reply, Screen, ScreenEntry};
 use crate::command::{Command, Commands};
+use crate::shell::palette::Action;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
+use crate::widgets::remark::alarm_ui;
+use crate::workbench::Workbench;
 use crate::workers::Job;
-use eframe::egui::{Button, Context, Label, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Button, Context, Key, Label, RichText, TextEdit, Ui, vec2};
 use palpate_analysis::calibrations::{Shelved, Shown, keep, read};
 use palpate_analysis::report::calibration::Entry;
 use palpate_model::calibration::Calibration;
@@ -18,6 +22,14 @@ use palpate_model::rig::Phase;
 use palpate_protocols::engine::EndingKind;
 use palpate_runner::RunView;
 use std::path::{Path, PathBuf};
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Calibration",
+    purpose: "volts to newtons: which calibrations there are",
+    key: Key::Num2,
+    open: |workbench| Box::new(CalibrationScreen::new(workbench)),
+};
 
 /// The screen's state.
 pub struct CalibrationScreen {
@@ -28,16 +40,6 @@ pub struct CalibrationScreen {
     shelved: Option<Result<Shelved, String>>,
     chosen: usize,
     name: String,
-}
-
-/// What the screen must know of the rest of the window.
-pub struct Facts<'a> {
-    /// The calibration new sessions are read with.
-    pub in_use: &'a Calibration,
-    /// Whether a run is in progress or about to start.
-    pub is_busy: bool,
-    /// The last run.
-    pub run: Option<&'a RunView>,
 }
 
 /// Whether a run measured a calibration, or why not.
@@ -56,30 +58,20 @@ pub fn can_keep(run: Option<&RunView>) -> Result<&Path, String> {
 }
 
 impl CalibrationScreen {
-    /// A screen for the library, which is read when it is first shown.
-    #[must_use]
-    pub fn new(library: Result<PathBuf, String>, own: Calibration, rig: &str) -> Self {
+    fn new(workbench: &Workbench) -> Self {
+        let rig = &workbench.snapshot.rig.description.name;
         Self {
-            library,
+            library: workbench.library.clone(),
             name: format!("cell of {rig}"),
-            own: (own, rig.to_owned()),
+            own: (workbench.bench.calibration.clone(), rig.clone()),
             job: Job::default(),
             shelved: None,
             chosen: 0,
         }
     }
 
-    /// Reads the library, the first time.
-    pub fn shown(&mut self, ctx: &Context) {
-        if self.shelved.is_none() && !self.job.is_busy() {
-            let (library, own, ctx) = (self.library.clone(), self.own.clone(), ctx.clone());
-            let work = move || library.map(|library| read(&library, own, None));
-            self.begin(work, ctx);
-        }
-    }
-
     /// Stores what a run measured and reads the library again.
-    pub fn keep(&mut self, run: Option<&RunView>, ctx: &Context) {
+    fn keep(&mut self, run: Option<&RunView>, ctx: &Context) {
         let (Ok(folder), name) = (can_keep(run), self.name.trim().to_owned()) else {
             return;
         };
@@ -107,33 +99,17 @@ impl CalibrationScreen {
         }
     }
 
-    /// Fetches what was read.
-    pub fn poll(&mut self) {
-        if let Some(answer) = self.job.poll() {
-            if let Ok(Shelved {
-                kept: Some(Ok(id)),
-                shown,
-                ..
-            }) = &answer
-            {
-                let place = shown.iter().position(|one| one.entry.id == *id);
-                self.chosen = place.unwrap_or(0);
-            }
-            self.shelved = Some(answer);
-        }
-    }
-
     fn shown_one(&self) -> Option<&Shown> {
         self.shelved.as_ref()?.as_ref().ok()?.shown.get(self.chosen)
     }
 
     /// The chosen calibration, if it may be used now, or why not.
-    pub fn usable(&self, facts: &Facts<'_>) -> Result<&Calibration, String> {
+    fn usable(&self, workbench: &Workbench) -> Result<&Calibration, String> {
         let one = self.shown_one().ok_or("the library is not read yet")?;
-        if facts.is_busy {
+        if workbench.is_busy() {
             return Err("a run is in progress".into());
         }
-        if one.calibration == *facts.in_use {
+        if one.calibration == workbench.bench.calibration {
             return Err("it is in use".into());
         }
         if let Err(reason) = &one.told {
@@ -141,9 +117,10 @@ impl CalibrationScreen {
         }
         Ok(&one.calibration)
     }
+}
 
-    /// Which there are, and what to do with them.
-    pub fn left_ui(&mut self, ui: &mut Ui, facts: &Facts<'_>, commands: &mut Commands) {
+impl Screen for CalibrationScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Calibrations");
         let quiet = |text: String| RichText::new(text).color(tokens.text_quiet).small();
@@ -165,7 +142,7 @@ impl CalibrationScreen {
                     }
                     // The rig's own stands first.
                     let is_own = index == 0;
-                    let is_used = one.calibration == *facts.in_use;
+                    let is_used = one.calibration == workbench.bench.calibration;
                     ui.add(Label::new(quiet(state_words(&one.entry, is_own, is_used))).wrap());
                 }
                 for reason in &shelved.unreadable {
@@ -174,13 +151,13 @@ impl CalibrationScreen {
             }
         }
         ui.add_space(8.0);
-        let verdict = self.usable(facts).map(|_| ());
+        let verdict = self.usable(workbench).map(|_| ());
         if reason_button(ui, "Use this one  F6", vec2(150.0, 30.0), &verdict) {
             commands.push(Command::Work);
         }
         section_ui(ui, "A new one");
         let button = Button::new("Measure...").min_size(vec2(150.0, 28.0));
-        if ui.add_enabled(!facts.is_busy, button).clicked() {
+        if ui.add_enabled(!workbench.is_busy(), button).clicked() {
             commands.push(Command::MeasureCalibration);
         }
         ui.horizontal(|ui| {
@@ -190,7 +167,7 @@ impl CalibrationScreen {
                 .char_limit(80);
             ui.add(input).labelled_by(label.id).place("name");
         });
-        let verdict = match (can_keep(facts.run), self.name.trim().is_empty()) {
+        let verdict = match (can_keep(workbench.run()), self.name.trim().is_empty()) {
             (Err(reason), _) => Err(reason),
             (Ok(_), true) => Err("give it a name first".into()),
             (Ok(_), false) => Ok(()),
@@ -211,8 +188,7 @@ impl CalibrationScreen {
         }
     }
 
-    /// The chosen one as plots.
-    pub fn middle_ui(&self, ui: &mut Ui) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         if let Some(Shown {
             told: Ok((_, curves)),
             ..
@@ -222,8 +198,7 @@ impl CalibrationScreen {
         }
     }
 
-    /// What is known of the chosen one.
-    pub fn right_ui(&self, ui: &mut Ui) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Chosen calibration");
         let Some(one) = self.shown_one() else {
@@ -247,7 +222,7 @@ impl CalibrationScreen {
         let findings = match &one.told {
             Ok((told, _)) => &told.quality.findings,
             Err(reason) => {
-                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+                alarm_ui(ui, reason);
                 return;
             }
         };
@@ -262,8 +237,62 @@ impl CalibrationScreen {
             section_ui(ui, "Doubts");
         }
         for doubt in &one.doubts {
-            ui.add(Label::new(RichText::new(doubt).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, doubt);
         }
+    }
+
+    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        if let Some(answer) = self.job.poll() {
+            if let Ok(Shelved {
+                kept: Some(Ok(id)),
+                shown,
+                ..
+            }) = &answer
+            {
+                let place = shown.iter().position(|one| one.entry.id == *id);
+                self.chosen = place.unwrap_or(0);
+            }
+            self.shelved = Some(answer);
+        }
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        if self.shelved.is_none() && !self.job.is_busy() {
+            let (library, own, ctx) = (self.library.clone(), self.own.clone(), ctx.clone());
+            let work = move || library.map(|library| read(&library, own, None));
+            self.begin(work, ctx);
+        }
+    }
+
+    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::KeepCalibration => self.keep(workbench.run(), ctx),
+            _ => return Reply::NotMine,
+        }
+        Reply::Show
+    }
+
+    /// New sessions are read with the calibration that is chosen.
+    fn work(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+        let Ok(calibration) = self.usable(workbench).cloned() else {
+            return;
+        };
+        // What makes no curve is not usable.
+        if let Ok(curve) = calibration.curve() {
+            workbench.bench.calibration = calibration;
+            workbench.bench.curve = curve;
+            workbench.form.forget();
+        }
+    }
+
+    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+        let can_keep = can_keep(workbench.run()).map(|_| ());
+        let keep = "Keep the calibration that was measured";
+        vec![
+            Action::new("Measure a calibration", "", Command::MeasureCalibration)
+                .if_ok(workbench.free_verdict()),
+            Action::new(keep, "", Command::KeepCalibration).if_ok(can_keep),
+        ]
     }
 }
 

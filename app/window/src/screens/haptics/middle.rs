@@ -5,9 +5,10 @@ use crate::plots::margin::{MarginPicture, margin_ui};
 use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
+use crate::widgets::remark::alarm_ui;
 use crate::workers::feel::Feel;
 use crate::workers::trail::PAST_S;
-use eframe::egui::{Color32, Label, RichText, Ui, vec2};
+use eframe::egui::{Color32, RichText, Ui, vec2};
 use palpate_analysis::haptics::Tried;
 use palpate_runner::haptics::TrailPoint;
 
@@ -26,7 +27,7 @@ const HEAD: f32 = 52.0;
 
 impl HapticsScreen {
     /// The plots.
-    pub fn middle_ui(&mut self, ui: &mut Ui) {
+    pub fn draw_middle(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (view, name) in [(View::Margin, "Before play"), (View::Live, "Live")] {
@@ -44,7 +45,7 @@ impl HapticsScreen {
                 before_ui(ui, looked, running);
             }
             (View::Margin, Some(Err(reason)), _) => {
-                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+                alarm_ui(ui, reason);
             }
             (View::Margin, None, _) => quiet(ui, "nothing checked yet"),
         }

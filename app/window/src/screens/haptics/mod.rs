@@ -4,19 +4,22 @@ mod form;
 mod middle;
 mod right;
 
+use super::screen::{Reply, Screen, ScreenEntry};
+use super::tape::TapePanel;
 use crate::command::{Command, Commands};
-use crate::screens::tape::TapePanel;
-use crate::theme::Tokens;
+use crate::shell::palette::Action;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::reason_button::reason_button;
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::task_bar::work_ui;
 use crate::widgets::tick_box::tick_box;
+use crate::workbench::Workbench;
 use crate::workers::feel::Feel;
 use crate::workers::path_dialog::Ask;
 use crate::workers::task::Task;
-use eframe::egui::{Button, Context, Label, RichText, Slider, Ui, vec2};
+use eframe::egui::{Button, Context, Key, Slider, Ui, vec2};
 use form::HapticsForm;
 use middle::View;
 use palpate_analysis::haptics::{Checked, Setting, body_of, check};
@@ -45,6 +48,14 @@ pub struct Looked {
     pub checked: Checked,
 }
 
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Haptics",
+    purpose: "feel a body through a device: margin, buzz and loop",
+    key: Key::Num9,
+    open: |_| Box::new(HapticsScreen::default()),
+};
+
 /// The screen's state.
 #[derive(Default)]
 pub struct HapticsScreen {
@@ -58,12 +69,6 @@ pub struct HapticsScreen {
 }
 
 impl HapticsScreen {
-    /// Whether times measured now would be disturbed.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.tape.is_busy() || self.is_running()
-    }
-
     /// Whether the loop runs.
     #[must_use]
     pub fn is_running(&self) -> bool {
@@ -88,60 +93,6 @@ impl HapticsScreen {
         self.tape.replayed()
     }
 
-    /// Takes a session or a table as the body's.
-    pub fn take(&mut self, path: &Path) {
-        self.form.take(path);
-    }
-
-    /// Fetches what is new.
-    pub fn poll(&mut self) {
-        self.task.poll();
-        self.form.check();
-        self.tape.poll();
-        if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
-            self.refusal = Some(reason);
-            self.tape.cut_off();
-        }
-    }
-
-    /// Takes the folder of a recording.
-    pub fn take_recording(&mut self, folder: &Path) {
-        self.tape.take(folder);
-    }
-
-    /// Checks what stands in the form.
-    pub fn start_check(&mut self, ctx: &Context) {
-        let Ok((source, setting)) = self.form.wanted() else {
-            return;
-        };
-        self.view = View::Margin;
-        self.task.start("haptics-check", ctx, move |progress| {
-            let tell = |share: f64, what: &str| {
-                progress
-                    .tell((1000.0 * share) as usize, 1000, what)
-                    .is_continue()
-            };
-            tell(0.0, "the body's fit");
-            let body = body_of(&source)?;
-            let checked = check(body.body, &setting, &mut |share| {
-                tell(share, "the simulated device")
-            })?;
-            let mut notes = body.notes.clone();
-            notes.extend(body.beyond(setting.deepest));
-            Ok(Looked {
-                source,
-                setting,
-                notes,
-                checked,
-            })
-        });
-    }
-
-    /// Ends a check under way.
-    pub fn cancel(&self) {
-        self.task.cancel();
-    }
-
     /// The check of what stands in the form, or why the loop may not start.
     fn checked(&self) -> Result<&Looked, String> {
         let wanted = self.form.wanted()?;
@@ -154,7 +105,7 @@ impl HapticsScreen {
     }
 
     /// Starts the loop, unless it runs, and records it if a folder is named.
-    pub fn start_loop(&mut self, ctx: &Context) {
+    fn start_loop(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
@@ -180,57 +131,14 @@ impl HapticsScreen {
         }
     }
 
-    /// Stops the loop.
-    pub fn stop_loop(&mut self) {
-        if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
-            self.tape.end(move || beat.end().and_then(recorded));
-        }
-    }
-
-    /// Stops it for good, its recording on disk.
-    pub fn close(&mut self) {
-        self.stop_loop();
-        self.tape.settle();
-    }
-
-    /// What is asked for. `verdict` says whether the loop would disturb something.
-    pub fn left_ui(
-        &mut self,
-        ui: &mut Ui,
-        offered: &Offered<'_>,
-        verdict: &Result<(), String>,
-        commands: &mut Commands,
-    ) {
-        // What runs is what was checked: it is not to be changed under a hand.
-        let is_running = self.is_running();
-        ui.add_enabled_ui(!is_running, |ui| {
-            if self.form.ui(ui, offered) {
-                commands.push(Command::Choose(Ask::Body));
-            }
-        });
-        ui.add_space(6.0);
-        let wanted = match is_running {
-            true => Err("the loop runs".into()),
-            false => self.form.wanted().map(|_| ()),
-        };
-        match task_ui(ui, "Check  F6", &self.task, &wanted) {
-            Some(Pressed::Start) => commands.push(Command::Work),
-            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
-            None => {}
-        }
-        self.feel_ui(ui, verdict, commands);
-        self.tape.ui(ui, is_running, replay);
-    }
-
     fn feel_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "Feel");
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| {
             tick_box(ui, &mut self.is_open, "without guards and controller");
         });
         if let Some(reason) = &self.refusal {
-            ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, reason);
         }
         let size = vec2(170.0, 34.0);
         if is_running {
@@ -271,6 +179,128 @@ impl HapticsScreen {
         });
         let words =
             "the hand goes there at its speed; arrow keys move the slider when it has the focus";
-        ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, words);
+    }
+}
+
+impl Screen for HapticsScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let offered = Offered {
+            review: workbench.front.review.as_deref(),
+            library: workbench.front.library.as_deref(),
+        };
+        // What runs is what was checked: it is not to be changed under a hand.
+        let is_running = self.is_running();
+        ui.add_enabled_ui(!is_running, |ui| {
+            if self.form.ui(ui, &offered) {
+                commands.push(Command::Choose(Ask::Body));
+            }
+        });
+        ui.add_space(6.0);
+        let wanted = match is_running {
+            true => Err("the loop runs".into()),
+            false => self.form.wanted().map(|_| ()),
+        };
+        work_ui(ui, "Check  F6", &self.task, &wanted, commands);
+        self.feel_ui(ui, &workbench.loop_verdict(SCREEN.name), commands);
+        self.tape.ui(ui, is_running, replay);
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        self.draw_middle(ui);
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        self.draw_right(ui);
+    }
+
+    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        self.task.poll();
+        self.form.check();
+        self.tape.poll();
+        if let Some(Err(reason)) = self.feel.as_mut().map(Feel::poll) {
+            self.refusal = Some(reason);
+            self.tape.cut_off();
+        }
+    }
+
+    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::LoopStart if workbench.loop_verdict(SCREEN.name).is_ok() => {
+                self.start_loop(ctx);
+                return Reply::Show;
+            }
+            Command::LoopStart => {}
+            Command::LoopStop => self.stop(),
+            Command::Chosen(Ask::Body, path) => self.form.take(path),
+            Command::ReplayLoop(folder) => {
+                self.tape.take(folder);
+                return Reply::Show;
+            }
+            _ => return Reply::NotMine,
+        }
+        Reply::Done
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        let Ok((source, setting)) = self.form.wanted() else {
+            return;
+        };
+        self.view = View::Margin;
+        self.task.start("haptics-check", ctx, move |progress| {
+            let tell = |share: f64, what: &str| {
+                progress
+                    .tell((1000.0 * share) as usize, 1000, what)
+                    .is_continue()
+            };
+            tell(0.0, "the body's fit");
+            let body = body_of(&source)?;
+            let checked = check(body.body, &setting, &mut |share| {
+                tell(share, "the simulated device")
+            })?;
+            let mut notes = body.notes.clone();
+            notes.extend(body.beyond(setting.deepest));
+            Ok(Looked {
+                source,
+                setting,
+                notes,
+                checked,
+            })
+        });
+    }
+
+    fn cancel(&mut self) {
+        self.task.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.standing().is_some() || self.tape.is_busy() || self.is_running()
+    }
+
+    fn running(&self) -> Option<&'static str> {
+        self.is_running().then_some("the haptic loop runs")
+    }
+
+    fn stop(&mut self) {
+        if let Some(beat) = self.feel.as_mut().and_then(Feel::stop) {
+            self.tape.end(move || beat.end().and_then(recorded));
+        }
+    }
+
+    fn close(&mut self) {
+        self.stop();
+        self.tape.settle();
+    }
+
+    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+        let can_stop = match self.is_running() {
+            true => Ok(()),
+            false => Err("the loop does not run".to_owned()),
+        };
+        let can_start = workbench.loop_verdict(SCREEN.name);
+        vec![
+            Action::new("Start the haptic loop", "", Command::LoopStart).if_ok(can_start),
+            Action::new("Stop the haptic loop", "", Command::LoopStop).if_ok(can_stop),
+        ]
     }
 }

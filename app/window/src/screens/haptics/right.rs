@@ -4,13 +4,14 @@ use super::{HapticsScreen, Looked};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
 use crate::widgets::loop_times::loop_times_ui;
+use crate::widgets::remark::quiet_ui;
 use crate::workers::feel::Feel;
 use eframe::egui::{Label, RichText, Ui};
 use palpate_analysis::report::haptics::{margin_text, tried_text, why_less};
 
 impl HapticsScreen {
     /// What is known.
-    pub fn right_ui(&self, ui: &mut Ui) {
+    pub fn draw_right(&self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         if let Some(feel) = &self.feel {
             force_ui(ui, feel);
@@ -87,7 +88,6 @@ fn loop_ui(ui: &mut Ui, feel: &Feel) {
 }
 
 fn looked_ui(ui: &mut Ui, looked: &Looked) {
-    let tokens = Tokens::of(ui.visuals().dark_mode);
     for (index, sentence) in looked.checked.sentences.iter().enumerate() {
         let mut text = RichText::new(sentence);
         if index == 0 {
@@ -102,6 +102,6 @@ fn looked_ui(ui: &mut Ui, looked: &Looked) {
         ui.add_space(3.0);
     }
     for note in &looked.notes {
-        ui.add(Label::new(RichText::new(note).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, note);
     }
 }

@@ -1,14 +1,13 @@
 //! Sessions chosen written as tables or into a lake.
 
 use super::say::sentence;
+use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
-use crate::workers::path_dialog::FolderDialog;
+use crate::workers::path_dialog::Dialog;
 use crate::workers::task::Task;
-use eframe::egui::{ComboBox, Context, Ui};
+use eframe::egui::{Context, Ui};
 use palpate_analysis::exports::{Destination, Exported, export_all};
 use palpate_tables::export::Format;
 use std::path::PathBuf;
@@ -50,8 +49,7 @@ impl Kind {
 pub(super) struct FilesPanel {
     kind: Kind,
     to: String,
-    dialog: FolderDialog,
-    refusal: Option<String>,
+    dialog: Dialog<PathBuf>,
     task: Task<Exported>,
 }
 
@@ -78,45 +76,19 @@ impl FilesPanel {
     pub fn ui(&mut self, ui: &mut Ui, sessions: &[PathBuf]) {
         let ctx: Context = ui.ctx().clone();
         section_ui(ui, "Export the sessions chosen");
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "as");
-            ComboBox::from_id_salt("export_as")
-                .selected_text(self.kind.words())
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    for kind in Kind::ALL {
-                        ui.selectable_value(&mut self.kind, kind, kind.words());
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("as");
-        });
+        let kinds = Kind::ALL.map(|kind| (kind, kind.words()));
+        choice_ui(ui, "as", &mut self.kind, &kinds);
         text_row(ui, "to folder", "made if there is none", &mut self.to);
-        let is_open = self.dialog.is_open();
-        let button = eframe::egui::Button::new("Choose folder...");
-        if ui.add_enabled(!is_open, button).clicked()
-            && let Err(err) = self.dialog.open("Folder for exports", &ctx)
-        {
-            self.refusal = Some(format!("the dialog cannot be opened: {err}"));
-        }
-        if is_open {
-            sentence(ui, "the dialog is open", false);
-        }
-        if let Some(refusal) = &self.refusal {
-            sentence(ui, refusal, true);
-        }
+        self.dialog.button_ui(ui, "Choose folder...", |dialog| {
+            dialog.set_title("Folder for exports").pick_folder()
+        });
         let verdict = self.verdict(sessions.len());
-        match task_ui(ui, "Export", &self.task, &verdict) {
-            Some(Pressed::Start) => {
-                let to = self.kind.destination(PathBuf::from(self.to.trim()));
-                let sessions = sessions.to_vec();
-                self.task.start("export", &ctx, move |progress| {
-                    Ok(export_all(sessions, &to, progress))
-                });
-            }
-            Some(Pressed::Cancel) => self.task.cancel(),
-            None => {}
+        if task_ui(ui, "Export", &self.task, &verdict) {
+            let to = self.kind.destination(PathBuf::from(self.to.trim()));
+            let sessions = sessions.to_vec();
+            self.task.start("export", &ctx, move |progress| {
+                Ok(export_all(sessions, &to, progress))
+            });
         }
         if self.task.standing().is_none() {
             match self.task.answer() {

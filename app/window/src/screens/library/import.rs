@@ -4,7 +4,7 @@ use super::say::sentence;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::task_bar::standing_ui;
 use crate::widgets::text_row::text_row;
-use crate::workers::path_dialog::FilesDialog;
+use crate::workers::path_dialog::Dialog;
 use crate::workers::task::Task;
 use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
 use palpate_analysis::imports::{Request, import_and_tell};
@@ -20,8 +20,7 @@ pub(super) struct ImportPanel {
     files: String,
     specimen: String,
     operator: String,
-    dialog: FilesDialog,
-    refusal: Option<String>,
+    dialog: Dialog<Vec<PathBuf>>,
     task: Task<Vec<String>>,
     was_dry_run: bool,
 }
@@ -90,20 +89,9 @@ impl ImportPanel {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Import files of other programs");
         text_row(ui, "files", "paths, ; between them", &mut self.files);
-        let is_open = self.dialog.is_open();
-        if ui
-            .add_enabled(!is_open, Button::new("Choose files..."))
-            .clicked()
-            && let Err(err) = self.dialog.open("Files to import", &ctx)
-        {
-            self.refusal = Some(format!("the dialog cannot be opened: {err}"));
-        }
-        if is_open {
-            sentence(ui, "the dialog is open", false);
-        }
-        if let Some(refusal) = &self.refusal {
-            sentence(ui, refusal, true);
-        }
+        self.dialog.button_ui(ui, "Choose files...", |dialog| {
+            dialog.set_title("Files to import").pick_files()
+        });
         text_row(ui, "of what", "specimen", &mut self.specimen);
         text_row(ui, "who", "who measured", &mut self.operator);
         let verdict = self.verdict();

@@ -9,10 +9,12 @@ mod list;
 mod say;
 mod session;
 
+use super::screen::{Reply, Screen, ScreenEntry};
 use crate::command::{Command, Commands};
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::task_bar::standing_ui;
+use crate::workbench::Workbench;
 use crate::workers::latest::Latest;
 use crate::workers::task::Task;
 use eframe::egui::{Context, Key, Label, RichText, TextStyle, Ui, vec2};
@@ -25,6 +27,14 @@ use palpate_sessions::catalog::{Changes, Choices, Entry, Query};
 use say::{SayPanel, sentence};
 use std::path::PathBuf;
 use std::rc::Rc;
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Library",
+    purpose: "find sessions",
+    key: Key::Num4,
+    open: |workbench| Box::new(LibraryScreen::new(workbench.library.clone())),
+};
 
 /// Sessions of which all that is known comes with the search.
 const PAGE: usize = 120;
@@ -78,9 +88,7 @@ pub struct LibraryScreen {
 }
 
 impl LibraryScreen {
-    /// A screen for the library in this folder.
-    #[must_use]
-    pub fn new(library: Result<PathBuf, String>) -> Self {
+    fn new(library: Result<PathBuf, String>) -> Self {
         Self {
             library,
             form: SearchForm::default(),
@@ -108,47 +116,6 @@ impl LibraryScreen {
     /// Whether sessions are being read or searched.
     fn is_busy(&self) -> bool {
         self.search.is_busy() || self.is_update_wanted || self.update.standing().is_some()
-    }
-
-    /// Called in every frame in which the screen is shown.
-    pub fn shown(&mut self, ctx: &Context) {
-        self.was_shown = true;
-        if std::mem::take(&mut self.is_back) {
-            self.look_again(ctx);
-        }
-        self.say.keys(ctx);
-    }
-
-    /// Fetches what threads have answered.
-    pub fn poll(&mut self, ctx: &Context) {
-        self.is_back |= !std::mem::take(&mut self.was_shown);
-        if let Some(found) = self.search.poll(ctx) {
-            self.searches += 1;
-            self.heading = Some(found.map(|mut found| {
-                self.list.take(&mut found);
-                self.choices = found.choices;
-                // A file that was set aside has been replaced by an empty one.
-                self.is_update_wanted |= !found.remarks.is_empty();
-                Heading {
-                    count: self.list.count(),
-                    seconds: found.seconds,
-                    doubts: found.doubts,
-                    remarks: found.remarks,
-                }
-            }));
-        }
-        if let Some(Ok(entries)) = self.pages.poll(ctx) {
-            self.list.learn(entries);
-        }
-        if let Some(told) = self.told.poll(ctx)
-            && let Some(known) = &mut self.known
-        {
-            known.told = Some(told);
-        }
-        self.is_update_wanted |= self.say.poll() | self.import.poll();
-        self.files.poll();
-        self.poll_update(ctx);
-        self.ask_for_more(ctx);
     }
 
     fn poll_update(&mut self, ctx: &Context) {
@@ -221,7 +188,7 @@ impl LibraryScreen {
     }
 
     /// Folders of the sessions chosen.
-    pub(crate) fn chosen(&mut self) -> Rc<Vec<PathBuf>> {
+    fn chosen(&mut self) -> Rc<Vec<PathBuf>> {
         if self.chosen.0 != self.list.choice()
             && let Ok(library) = &self.library
         {
@@ -249,13 +216,40 @@ impl LibraryScreen {
         }
     }
 
-    /// Takes files of other programs that were dropped on the window, to be imported.
-    pub fn take_files(&mut self, files: &[PathBuf]) {
-        self.import.add(files);
+    fn heading_ui(&self, ui: &mut Ui) {
+        match &self.heading {
+            None => sentence(ui, "searching", false),
+            Some(Err(err)) => sentence(ui, err, true),
+            Some(Ok(heading)) => {
+                let sessions = match heading.count {
+                    1 => "1 session".to_owned(),
+                    count => format!("{count} sessions"),
+                };
+                let chosen = match self.list.chosen_count() {
+                    0 => String::new(),
+                    count => format!(", {count} chosen"),
+                };
+                let text = format!(
+                    "{sessions}{chosen}, found in {:.0} ms",
+                    (heading.seconds * 1e3).max(1.0)
+                );
+                ui.label(RichText::new(text).text_style(TextStyle::Heading).strong());
+                let remarks = heading.doubts.iter().chain(&heading.remarks);
+                remarks.for_each(|remark| sentence(ui, remark, true));
+                if heading.count == 0 && !self.is_busy() {
+                    sentence(ui, "No session is like that.", false);
+                }
+            }
+        }
+        if let Some(Ok(changes)) = self.update.answer() {
+            let remarks = changes.remarks.iter();
+            remarks.for_each(|remark| sentence(ui, remark, true));
+        }
     }
+}
 
-    /// Draws what is searched for.
-    pub fn left_ui(&mut self, ui: &mut Ui, _commands: &mut Commands) {
+impl Screen for LibraryScreen {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let ctx = ui.ctx().clone();
         section_ui(ui, "Find sessions");
         if let Err(err) = &self.library {
@@ -299,39 +293,7 @@ impl LibraryScreen {
         }
     }
 
-    fn heading_ui(&self, ui: &mut Ui) {
-        match &self.heading {
-            None => sentence(ui, "searching", false),
-            Some(Err(err)) => sentence(ui, err, true),
-            Some(Ok(heading)) => {
-                let sessions = match heading.count {
-                    1 => "1 session".to_owned(),
-                    count => format!("{count} sessions"),
-                };
-                let chosen = match self.list.chosen_count() {
-                    0 => String::new(),
-                    count => format!(", {count} chosen"),
-                };
-                let text = format!(
-                    "{sessions}{chosen}, found in {:.0} ms",
-                    (heading.seconds * 1e3).max(1.0)
-                );
-                ui.label(RichText::new(text).text_style(TextStyle::Heading).strong());
-                let remarks = heading.doubts.iter().chain(&heading.remarks);
-                remarks.for_each(|remark| sentence(ui, remark, true));
-                if heading.count == 0 && !self.is_busy() {
-                    sentence(ui, "No session is like that.", false);
-                }
-            }
-        }
-        if let Some(Ok(changes)) = self.update.answer() {
-            let remarks = changes.remarks.iter();
-            remarks.for_each(|remark| sentence(ui, remark, true));
-        }
-    }
-
-    /// Draws what was found.
-    pub fn middle_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.heading_ui(ui);
         let help = "Arrows choose, Shift extends, Space and Ctrl with a click add, Ctrl+A takes all, Enter reviews.";
         ui.add(Label::new(RichText::new(help).small().weak()).truncate());
@@ -347,8 +309,7 @@ impl LibraryScreen {
         }
     }
 
-    /// Draws what is known of the session chosen.
-    pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         let chosen = self.chosen();
         if chosen.is_empty() {
             section_ui(ui, "Session");
@@ -373,5 +334,56 @@ impl LibraryScreen {
                 self.say.ui(ui, &chosen);
             }
         }
+    }
+
+    fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
+        self.is_back |= !std::mem::take(&mut self.was_shown);
+        if let Some(found) = self.search.poll(ctx) {
+            self.searches += 1;
+            self.heading = Some(found.map(|mut found| {
+                self.list.take(&mut found);
+                self.choices = found.choices;
+                // A file that was set aside has been replaced by an empty one.
+                self.is_update_wanted |= !found.remarks.is_empty();
+                Heading {
+                    count: self.list.count(),
+                    seconds: found.seconds,
+                    doubts: found.doubts,
+                    remarks: found.remarks,
+                }
+            }));
+        }
+        if let Some(Ok(entries)) = self.pages.poll(ctx) {
+            self.list.learn(entries);
+        }
+        if let Some(told) = self.told.poll(ctx)
+            && let Some(known) = &mut self.known
+        {
+            known.told = Some(told);
+        }
+        self.is_update_wanted |= self.say.poll() | self.import.poll();
+        self.files.poll();
+        self.poll_update(ctx);
+        self.ask_for_more(ctx);
+        let chosen = self.chosen();
+        if workbench.front.library.as_ref() != chosen.first() {
+            workbench.front.library = chosen.first().cloned();
+        }
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        self.was_shown = true;
+        if std::mem::take(&mut self.is_back) {
+            self.look_again(ctx);
+        }
+        self.say.keys(ctx);
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::Import(files) => self.import.add(files),
+            _ => return Reply::NotMine,
+        }
+        Reply::Show
     }
 }

@@ -3,6 +3,7 @@
 use crate::plots::log_scatter::{Mark, Scatter, log_scatter_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::remark::quiet_ui;
 use crate::widgets::table::{Column, Row, RowLook, table_ui};
 use eframe::egui::{Label, RichText, Ui, vec2};
 use palpate_analysis::report::selection;
@@ -180,6 +181,6 @@ pub(super) fn choice_ui(ui: &mut Ui, selected: &Selected) {
         ui.add(Label::new(RichText::new(text).small()).wrap());
     }
     for note in &selected.notes {
-        ui.add(Label::new(RichText::new(note).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, note);
     }
 }

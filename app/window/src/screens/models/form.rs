@@ -2,11 +2,12 @@
 
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
+use crate::widgets::choice::choice_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::form_label;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::path_dialog::Ask;
-use eframe::egui::{Button, ComboBox, Label, RichText, TextEdit, Ui};
+use eframe::egui::{Button, Label, RichText, TextEdit, Ui};
 use palpate_analysis::source::Stretch;
 use palpate_rheology::select::{HoldOut, SelectOptions};
 use palpate_rheology::tolerance::{BadTolerance, Tolerance};
@@ -187,24 +188,7 @@ impl ModelsForm {
                 ui.label(RichText::new(text).color(tokens.text_quiet).small());
             }
         }
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "hold out");
-            let words = |choice| {
-                let known = HOLD_OUTS.iter().find(|(known, _)| *known == choice);
-                known.map_or("", |(_, words)| *words)
-            };
-            ComboBox::from_id_salt("hold_out")
-                .selected_text(words(self.hold_out))
-                .width(ui.available_width() - 16.0)
-                .show_ui(ui, |ui| {
-                    for (choice, words) in HOLD_OUTS {
-                        ui.selectable_value(&mut self.hold_out, choice, words);
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("hold out");
-        });
+        choice_ui(ui, "hold out", &mut self.hold_out, &HOLD_OUTS);
         tick_box(
             ui,
             &mut self.with_unload,

@@ -6,13 +6,24 @@ mod form;
 
 pub use form::ModelsForm;
 
+use super::screen::{Reply, Screen, ScreenEntry};
 use crate::command::{Command, Commands};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::work_ui;
+use crate::workbench::Workbench;
+use crate::workers::path_dialog::Ask;
 use crate::workers::task::Task;
-use eframe::egui::{Context, Label, RichText, Ui};
+use eframe::egui::{Context, Key, Label, RichText, Ui};
 use palpate_analysis::select::{Selected, select_sources};
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Models",
+    purpose: "how much model a recording needs",
+    key: Key::Num6,
+    open: |_| Box::new(ModelsScreen::default()),
+};
 
 /// The screen's state.
 #[derive(Default)]
@@ -22,67 +33,27 @@ pub struct ModelsScreen {
 }
 
 impl ModelsScreen {
-    /// Whether work is under way.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some()
-    }
-
-    /// Fetches an answer that has come.
-    pub fn poll(&mut self) {
-        self.task.poll();
-    }
-
-    /// Adds a recording to those compared.
-    pub fn add(&mut self, path: &std::path::Path) {
-        self.form.add(path);
-    }
-
     /// The last comparison.
     #[must_use]
     pub fn answer(&self) -> Option<&Result<Selected, String>> {
         self.task.answer()
     }
+}
 
-    /// Starts the comparison that stands in the form.
-    pub fn start(&mut self, ctx: &Context) {
-        let Ok(request) = self.form.request() else {
-            return;
-        };
-        self.task.start("select", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            select_sources(&request.paths, request.stretch, request.options, &tell)
-                .map_err(|err| err.to_string())
-        });
-    }
-
-    /// Ends a comparison under way.
-    pub fn cancel(&self) {
-        self.task.cancel();
-    }
-
-    /// What is compared. `last_run` is the session on the run screen, once it has ended.
-    pub fn left_ui(
-        &mut self,
-        ui: &mut Ui,
-        last_run: Option<&std::path::Path>,
-        commands: &mut Commands,
-    ) {
+impl Screen for ModelsScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let run = workbench.run().filter(|run| run.outcome.is_some());
+        let last_run = run.map(|run| run.folder.as_path());
         section_ui(ui, "Recordings compared");
         self.form.sources_ui(ui, last_run, commands);
         section_ui(ui, "How");
         self.form.choices_ui(ui);
         ui.add_space(8.0);
         let verdict = self.form.request().map(|_| ());
-        match task_ui(ui, "Compare models  F6", &self.task, &verdict) {
-            Some(Pressed::Start) => commands.push(Command::Work),
-            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
-            None => {}
-        }
+        work_ui(ui, "Compare models  F6", &self.task, &verdict, commands);
     }
 
-    /// The families as points and as a table.
-    pub fn middle_ui(&self, ui: &mut Ui) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         match self.task.answer() {
             Some(Ok(selected)) => answer::families_ui(ui, &selected.selection),
             Some(Err(reason)) => sentence_ui(ui, reason, true),
@@ -94,8 +65,7 @@ impl ModelsScreen {
         }
     }
 
-    /// The choice, what each term buys, and what is known of the recordings.
-    pub fn right_ui(&self, ui: &mut Ui) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         match self.task.answer() {
             Some(Ok(selected)) => answer::choice_ui(ui, selected),
             _ => {
@@ -103,6 +73,37 @@ impl ModelsScreen {
                 sentence_ui(ui, "nothing compared yet", false);
             }
         }
+    }
+
+    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        self.task.poll();
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::Chosen(Ask::Session | Ask::Table, path) => self.form.add(path),
+            _ => return Reply::NotMine,
+        }
+        Reply::Done
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        let Ok(request) = self.form.request() else {
+            return;
+        };
+        self.task.start("select", ctx, move |progress| {
+            let tell = |done, of, what: &str| progress.tell(done, of, what);
+            select_sources(&request.paths, request.stretch, request.options, &tell)
+                .map_err(|err| err.to_string())
+        });
+    }
+
+    fn cancel(&mut self) {
+        self.task.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
     }
 }
 

@@ -9,7 +9,7 @@ use super::Looked;
 use crate::command::Commands;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::workers::Job;
 use crate::workers::task::Task;
@@ -202,14 +202,10 @@ impl AnalysesPanel {
         let name = self.form.ui(ui, known, read_by, &others);
         self.who_ui(ui);
         let verdict = self.free().and(name.clone().map(|_| ()));
-        match task_ui(ui, "Make analysis", &self.work, &verdict) {
-            Some(Pressed::Start) => {
-                if let Ok(deed) = name {
-                    self.start(ui.ctx(), &known.session, deed);
-                }
-            }
-            Some(Pressed::Cancel) => self.work.cancel(),
-            None => {}
+        if task_ui(ui, "Make analysis", &self.work, &verdict)
+            && let Ok(deed) = name
+        {
+            self.start(ui.ctx(), &known.session, deed);
         }
         self.answer_ui(ui);
         let taken = list::withdraw_ui(ui, known, looked, &self.reason_verdict());

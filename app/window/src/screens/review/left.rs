@@ -1,14 +1,14 @@
 //! The sessions shown, and how they are laid over each other.
 
-use super::{ReviewScreen, View};
+use super::{ReviewScreen, Subject, View};
 use crate::command::{Command, Commands};
-use crate::shell::rail::Screen;
+use crate::screens::library;
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
 use crate::workers::review::{Leader, Quantity, Stage};
@@ -33,13 +33,42 @@ fn small(text: &str) -> Button<'_> {
     Button::new(text).small().truncate()
 }
 
+/// Draws how far a session is read; what was pressed there.
+fn stage_ui(ui: &mut Ui, index: usize, subject: &Subject) -> Option<Asked> {
+    let recording = &subject.recording;
+    let share = recording.share();
+    let mut asked = None;
+    match &recording.stage {
+        Stage::Whole => return None,
+        Stage::Waiting => quiet_ui(ui, "waits to be read"),
+        Stage::Reading => {
+            let tokens = Tokens::of(ui.visuals().dark_mode);
+            let bar = ProgressBar::new(share as f32).desired_height(8.0);
+            ui.add(bar.fill(tokens.text_quiet));
+            ui.horizontal(|ui| {
+                quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
+                let cancel = format!("cancel: {}", subject.name);
+                if ui.add(small(&cancel)).clicked() {
+                    asked = Some(Asked::Cancel(index));
+                }
+            });
+            return asked;
+        }
+        Stage::Cancelled => quiet_ui(ui, &format!("only {:.0} % of it is read", 100.0 * share)),
+        Stage::Failed(reason) => alarm_ui(ui, reason),
+    }
+    let can_read = matches!(recording.stage, Stage::Cancelled | Stage::Failed(_));
+    let again = format!("read again: {}", subject.name);
+    (can_read && ui.small_button(again).clicked()).then_some(Asked::Again(index))
+}
+
 impl ReviewScreen {
     pub(super) fn draw_left(&mut self, ui: &mut Ui, commands: &mut Commands) {
         section_ui(ui, "Sessions shown");
         self.sessions_ui(ui);
         self.add_ui(ui);
         if ui.button("Find sessions in the library").clicked() {
-            commands.push(Command::Show(Screen::Library));
+            commands.push(Command::Show(library::SCREEN.name));
         }
         section_ui(ui, "Time zero at");
         for leader in Leader::ALL {
@@ -69,10 +98,8 @@ impl ReviewScreen {
         section_ui(ui, "Fit");
         self.model.ui(ui, "fit with");
         let verdict = self.fit_verdict();
-        match task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
-            Some(Pressed::Start) => self.start_fits(ui.ctx()),
-            Some(Pressed::Cancel) => self.fits.cancel(),
-            None => {}
+        if task_ui(ui, "Fit the sessions shown", &self.fits, &verdict) {
+            self.start_fits(ui.ctx());
         }
         if let (Some(Err(reason)), None) = (self.fits.answer(), self.fits.standing()) {
             alarm_ui(ui, reason);
@@ -114,40 +141,7 @@ impl ReviewScreen {
                     asked = Some(Asked::Remove(index));
                 }
             });
-            let recording = &subject.recording;
-            match &recording.stage {
-                Stage::Whole => {}
-                Stage::Waiting => quiet_ui(ui, "waits to be read"),
-                Stage::Reading => {
-                    let share = recording.share();
-                    let bar = ProgressBar::new(share as f32).desired_height(8.0);
-                    ui.add(bar.fill(tokens.text_quiet));
-                    ui.horizontal(|ui| {
-                        quiet_ui(ui, &format!("still reading {:.0} %", 100.0 * share));
-                        if ui
-                            .add(small(&format!("cancel: {}", subject.name)))
-                            .clicked()
-                        {
-                            asked = Some(Asked::Cancel(index));
-                        }
-                    });
-                }
-                Stage::Cancelled | Stage::Failed(_) => {
-                    match &recording.stage {
-                        Stage::Failed(reason) => alarm_ui(ui, reason),
-                        _ => quiet_ui(
-                            ui,
-                            &format!("only {:.0} % of it is read", 100.0 * recording.share()),
-                        ),
-                    }
-                    if ui
-                        .small_button(format!("read again: {}", subject.name))
-                        .clicked()
-                    {
-                        asked = Some(Asked::Again(index));
-                    }
-                }
-            }
+            asked = asked.or(stage_ui(ui, index, subject));
             ui.add_space(4.0);
         }
         match asked {

@@ -19,7 +19,7 @@ const AXIS_HEIGHT: f32 = 34.0;
 const FULL_LINES: usize = 6;
 
 impl ReviewScreen {
-    pub(super) fn draw_middle(&mut self, ui: &mut Ui) {
+    pub fn draw_middle(&mut self, ui: &mut Ui) {
         self.read_keys(ui.ctx());
         ui.horizontal_wrapped(|ui| self.views_ui(ui));
         if self.subjects.is_empty() {

@@ -16,16 +16,26 @@ pub use parameters::{ParameterRow, parameter_rows};
 pub use shown::{Shown, ShownSeries, ShownSession};
 pub use subject::Subject;
 
-use crate::command::Commands;
+use super::screen::{Reply, Screen, ScreenEntry};
+use crate::command::{Command, Commands};
 use crate::plots::navigate::Span;
 use crate::plots::over_depth::DepthLines;
 use crate::widgets::model_choice::ModelChoice;
+use crate::workbench::Workbench;
 use crate::workers::review::fit::{FitAnswer, Prediction};
 use crate::workers::review::{Leader, Quantity};
 use crate::workers::task::Task;
 use analyses::AnalysesPanel;
-use eframe::egui::{Context, Ui};
+use eframe::egui::{Context, Key, Ui};
 use std::path::{Path, PathBuf};
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Review",
+    purpose: "look at sessions: one closely, several beside each other",
+    key: Key::Num5,
+    open: |workbench| Box::new(ReviewScreen::new(workbench.library.clone())),
+};
 
 /// A session as it is looked at.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -168,12 +178,11 @@ impl ReviewScreen {
         };
         self.subjects.push(Subject::new(looked, self.next_id));
         self.next_id += 1;
-        self.poll(ctx);
+        self.fetch(ctx);
     }
 
     /// The folder of the session in front.
-    #[must_use]
-    pub fn front_session(&self) -> Option<&Path> {
+    fn front_session(&self) -> Option<&Path> {
         Some(&self.front()?.looked.session)
     }
 
@@ -191,7 +200,7 @@ impl ReviewScreen {
     }
 
     /// Fetches what threads have answered.
-    pub fn poll(&mut self, ctx: &Context) {
+    pub fn fetch(&mut self, ctx: &Context) {
         self.analyses.poll(ctx);
         if let Some(changed) = self.analyses.take_changed() {
             let is_it = |one: &&mut Subject| one.looked.session == changed;
@@ -233,18 +242,6 @@ impl ReviewScreen {
                 subject.set_fit(answer.clone());
             }
         }
-    }
-
-    /// Begins to fit the sessions shown, where they can be fitted now.
-    pub fn fit(&mut self, ctx: &Context) {
-        if self.fits.standing().is_none() && self.fit_verdict().is_ok() {
-            self.start_fits(ctx);
-        }
-    }
-
-    /// Ends the fit under way.
-    pub fn cancel_fit(&mut self) {
-        self.fits.cancel();
     }
 
     /// Begins to fit every session shown.
@@ -299,19 +296,18 @@ impl ReviewScreen {
     fn front(&self) -> Option<&Subject> {
         self.subjects.first()
     }
+}
 
-    /// Draws the sessions and how they are laid over each other.
-    pub fn left_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+impl Screen for ReviewScreen {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_left(ui, commands);
     }
 
-    /// Draws the plots.
-    pub fn middle_ui(&mut self, ui: &mut Ui, _commands: &mut Commands) {
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         self.draw_middle(ui);
     }
 
-    /// Draws what is known of the session in front, and what can be made of it.
-    pub fn right_ui(&mut self, ui: &mut Ui, commands: &mut Commands) {
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
         self.draw_right(ui);
         let shown: Vec<Looked> = self.subjects.iter().map(|one| one.looked.clone()).collect();
         self.analyses.set_shown(&shown);
@@ -324,5 +320,30 @@ impl ReviewScreen {
         if let Some(front) = self.subjects.first_mut() {
             self.analyses.ui(ui, &mut front.looked, commands);
         }
+    }
+
+    fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
+        self.fetch(ctx);
+        if workbench.front.review.as_deref() != self.front_session() {
+            workbench.front.review = self.front_session().map(Path::to_owned);
+        }
+    }
+
+    fn act(&mut self, ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::Review(sessions) => self.open(sessions.clone(), ctx),
+            _ => return Reply::NotMine,
+        }
+        Reply::Show
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        if self.fits.standing().is_none() && self.fit_verdict().is_ok() {
+            self.start_fits(ctx);
+        }
+    }
+
+    fn cancel(&mut self) {
+        self.fits.cancel();
     }
 }

@@ -7,7 +7,7 @@ use crate::plots::navigate::Span;
 use crate::plots::over_time::{Layer, Panel, Setting, over_time_ui};
 use crate::theme::Tokens;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::workers::review::Quantity;
 use crate::workers::review::fit::{MODELLED, Prediction, RESIDUAL, predict};
 use eframe::egui::{Ui, vec2};
@@ -30,24 +30,16 @@ impl ReviewScreen {
         };
         head_ui(ui, "Prediction against validation", &words);
         let verdict = self.prediction_verdict();
-        match task_ui(
-            ui,
-            "Foretell the second session",
-            &self.prediction,
-            &verdict,
-        ) {
-            Some(Pressed::Start) => {
-                if let [known, other, ..] = self.subjects.as_slice() {
-                    let pair = [known, other].map(|one| one.for_fit(&self.model));
-                    self.prediction_of = Some([known.name.clone(), other.name.clone()]);
-                    self.prediction
-                        .start("review-predict", ui.ctx(), move |progress| {
-                            predict(&pair, progress)
-                        });
-                }
-            }
-            Some(Pressed::Cancel) => self.prediction.cancel(),
-            None => {}
+        const NAME: &str = "Foretell the second session";
+        if task_ui(ui, NAME, &self.prediction, &verdict)
+            && let [known, other, ..] = self.subjects.as_slice()
+        {
+            let pair = [known, other].map(|one| one.for_fit(&self.model));
+            self.prediction_of = Some([known.name.clone(), other.name.clone()]);
+            self.prediction
+                .start("review-predict", ui.ctx(), move |progress| {
+                    predict(&pair, progress)
+                });
         }
         let (found, [known, other]) = match (self.prediction.answer(), &self.prediction_of) {
             (Some(Ok(found)), Some(names)) => (found.clone(), names.clone()),

@@ -1,14 +1,26 @@
 //! The rig's own screen: what it reports, large, and moving it by hand.
 
+use super::rig_panel::rig_ui;
+use super::screen::{Screen, ScreenEntry};
 use crate::command::{Aside, Command, Commands};
 use crate::theme::{Tokens, reading_style};
 use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::reason_button::reason_button;
-use eframe::egui::{Button, Grid, Label, RichText, ScrollArea, Ui, vec2};
+use crate::widgets::remark::alarm_ui;
+use crate::workbench::Workbench;
+use eframe::egui::{Button, Grid, Key, Label, RichText, ScrollArea, Ui, vec2};
 use palpate_model::rig::Limits;
 use palpate_model::rig::command::position_from_pulses;
 use palpate_model::units::{MmPerS, Newtons, Seconds};
-use palpate_runner::{RigView, Snapshot};
+use palpate_runner::RigView;
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Rig",
+    purpose: "what the rig reports, and moving it by hand",
+    key: Key::Num1,
+    open: |_| Box::new(RigScreen::default()),
+};
 
 /// Distances that stand ready, in mm; towards the tissue is positive.
 const READY: [f64; 8] = [-10.0, -5.0, -1.0, -0.1, 0.1, 1.0, 5.0, 10.0];
@@ -30,39 +42,57 @@ impl Default for RigScreen {
 }
 
 /// What the screen must know of the rest.
-pub struct Facts<'a> {
+struct Facts<'a> {
     /// The interlocks.
-    pub limits: &'a Limits,
+    limits: &'a Limits,
     /// Force of the newest sample by the calibration in use, without tare.
-    pub force: Option<Newtons>,
+    force: Option<Newtons>,
     /// Whether the axis may be moved now, or why not.
-    pub verdict: &'a Result<(), String>,
+    verdict: &'a Result<(), String>,
     /// Why the last move was refused.
-    pub refusal: Option<&'a str>,
+    refusal: Option<&'a str>,
 }
 
-impl RigScreen {
-    /// Draws the middle.
-    pub fn middle_ui(
-        &mut self,
-        ui: &mut Ui,
-        snapshot: &Snapshot,
-        facts: &Facts<'_>,
-        commands: &mut Commands,
-    ) {
+impl Screen for RigScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let curve = &workbench.bench.curve;
+        let rig = &workbench.snapshot.rig;
+        let facts = Facts {
+            limits: &workbench.bench.limits,
+            force: rig
+                .reading
+                .map(|reading| curve.newtons_from_volts(reading.volts)),
+            verdict: &workbench.aside_verdict(),
+            refusal: workbench.refusal.as_deref(),
+        };
         ScrollArea::vertical()
             .id_salt("rig")
             .auto_shrink(false)
             .show(ui, |ui| {
                 heading(ui, "Now");
-                values_ui(ui, &snapshot.rig, facts);
+                values_ui(ui, rig, &facts);
                 heading(ui, "Move by hand");
-                self.move_ui(ui, &snapshot.rig, facts, commands);
+                self.move_ui(ui, rig, &facts, commands);
                 heading(ui, "Limits that no protocol can loosen");
-                limits_ui(ui, &snapshot.rig, facts.limits);
+                limits_ui(ui, rig, facts.limits);
             });
     }
 
+    fn has_right(&self) -> bool {
+        false
+    }
+
+    fn is_watched(&self) -> bool {
+        // Somebody may press the cell by hand.
+        true
+    }
+}
+
+impl RigScreen {
     fn move_ui(&mut self, ui: &mut Ui, rig: &RigView, facts: &Facts<'_>, commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let fastest = rig.description.speed_max.0;
@@ -121,7 +151,7 @@ impl RigScreen {
             ui.add(Label::new(RichText::new(words).color(tokens.text_quiet)).wrap());
         });
         if let Some(reason) = facts.refusal {
-            ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, reason);
         }
     }
 }

@@ -5,10 +5,12 @@ use crate::plots::strip::{Curve, Strip, legend_ui, strip_ui};
 use crate::scene::view::Shown;
 use crate::theme::Tokens;
 use crate::widgets::places::Place;
+use crate::widgets::remark::alarm_ui;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::touch::TouchPoint;
+use crate::workers::touch::{Ahead, Moment, Touch, TouchPoint};
 use crate::workers::trail::PAST_S;
-use eframe::egui::{Label, RichText, Ui, vec2};
+use eframe::egui::{RichText, Ui, vec2};
+use std::ops::RangeInclusive;
 
 /// What the middle shows.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,9 +26,57 @@ const PICTURE_SHARE: f32 = 0.52;
 /// Room for a legend.
 const HEAD: f32 = 24.0;
 
+/// What the picture and the plots show.
+struct Played<'a> {
+    moment: &'a Moment,
+    trail: Vec<TouchPoint>,
+    /// Seconds along the plots.
+    shown: RangeInclusive<f64>,
+    title: String,
+}
+
+/// What was computed or runs, or why there is nothing; without a reason, nothing was asked for yet.
+fn played<'a>(
+    side: Side,
+    touch: Option<&'a Touch>,
+    ahead: Option<&'a Result<Ahead, String>>,
+) -> Result<Played<'a>, Option<&'a str>> {
+    match (side, touch, ahead) {
+        (Side::Live, Some(touch), _) => {
+            let end = touch.now().max(PAST_S);
+            let title = match (touch.is_running(), touch.is_led()) {
+                (false, _) => "stopped; as it was seen last",
+                (true, true) => "the path leads the hand",
+                (true, false) => "the pointer and the keys lead the hand",
+            };
+            Ok(Played {
+                moment: touch.moment(),
+                trail: touch.trail().copied().collect(),
+                shown: end - PAST_S..=end,
+                title: title.to_owned(),
+            })
+        }
+        (Side::Ahead, _, Some(Ok(ahead))) => {
+            let at = ahead.settings.period.time_of(ahead.deepest.tick.tick);
+            Ok(Played {
+                moment: &ahead.deepest,
+                trail: ahead.trail.clone(),
+                shown: 0.0..=ahead.path.seconds(),
+                title: format!(
+                    "{}, computed: where it is deepest, after {:.2} s",
+                    ahead.path.name(),
+                    at.seconds().0
+                ),
+            })
+        }
+        (Side::Ahead, _, Some(Err(reason))) => Err(Some(reason)),
+        (Side::Live, None, _) | (Side::Ahead, _, None) => Err(None),
+    }
+}
+
 impl SceneScreen {
     /// Picture and plots.
-    pub fn middle_ui(&mut self, ui: &mut Ui) {
+    pub fn draw_middle(&mut self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         ui.horizontal(|ui| {
             for (side, name) in [(Side::Ahead, "Computed"), (Side::Live, "Live")] {
@@ -38,49 +88,27 @@ impl SceneScreen {
                 self.view.reset();
             }
         });
-        let (moment, trail, shown, title): (_, Vec<TouchPoint>, _, _) =
-            match (self.side, &self.touch, self.ahead.answer()) {
-                (Side::Live, Some(touch), _) => {
-                    let end = touch.now().max(PAST_S);
-                    let title = match (touch.is_running(), touch.is_led()) {
-                        (false, _) => "stopped; as it was seen last".to_owned(),
-                        (true, true) => "the path leads the hand".to_owned(),
-                        (true, false) => "the pointer and the keys lead the hand".to_owned(),
-                    };
-                    let trail = touch.trail().copied().collect();
-                    (touch.moment(), trail, end - PAST_S..=end, title)
-                }
-                (Side::Ahead, _, Some(Ok(ahead))) => {
-                    let name = ahead.path.name();
-                    let at = ahead.settings.period.time_of(ahead.deepest.tick.tick);
-                    let title = format!(
-                        "{name}, computed: where it is deepest, after {:.2} s",
-                        at.seconds().0
-                    );
-                    let end = ahead.path.seconds();
-                    (&ahead.deepest, ahead.trail.clone(), 0.0..=end, title)
-                }
-                (Side::Ahead, _, Some(Err(reason))) => {
-                    ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
-                    return;
-                }
-                (Side::Live, None, _) => {
-                    ui.label(RichText::new("the scene has not run yet").color(tokens.text_quiet));
-                    return;
-                }
-                (Side::Ahead, _, None) => {
-                    ui.label(RichText::new("nothing computed yet").color(tokens.text_quiet));
-                    return;
-                }
-            };
+        let Played {
+            moment,
+            trail,
+            shown,
+            title,
+        } = match played(self.side, self.touch.as_ref(), self.ahead.answer()) {
+            Ok(played) => played,
+            Err(None) => {
+                let words = match self.side {
+                    Side::Live => "the scene has not run yet",
+                    Side::Ahead => "nothing computed yet",
+                };
+                ui.label(RichText::new(words).color(tokens.text_quiet));
+                return;
+            }
+            Err(Some(reason)) => return alarm_ui(ui, reason),
+        };
         ui.label(RichText::new(title).color(tokens.text_quiet).small());
         let now = match moment.now() {
             Ok(now) => now,
-            Err(reason) => {
-                let text = RichText::new(reason.to_string()).color(tokens.alarm_text);
-                ui.add(Label::new(text).wrap());
-                return;
-            }
+            Err(reason) => return alarm_ui(ui, &reason.to_string()),
         };
         let tick = &moment.tick;
         let picture = Shown {

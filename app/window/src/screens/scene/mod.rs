@@ -6,18 +6,21 @@ mod middle;
 mod plan;
 mod right;
 
+use super::screen::{Reply, Screen, ScreenEntry};
+use super::tape::TapePanel;
 use crate::command::{Command, Commands};
 use crate::scene::view::SceneView;
-use crate::screens::tape::TapePanel;
-use crate::theme::Tokens;
+use crate::shell::palette::Action;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::reason_button::reason_button;
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::task_bar::work_ui;
+use crate::workbench::Workbench;
 use crate::workers::path_dialog::Ask;
 use crate::workers::task::Task;
 use crate::workers::touch::{Ahead, Moment, Touch, ahead};
-use eframe::egui::{Button, Context, Label, RichText, Ui, vec2};
+use eframe::egui::{Button, Context, Key, Ui, vec2};
 use form::SceneForm;
 use middle::Side;
 use palpate_analysis::recorded::Replayed;
@@ -30,6 +33,15 @@ use std::path::Path;
 
 /// How the stylus is held with the pointer and the keys: yaw, pitch and roll in rad, as the paths have it at rest.
 const TURN: [f64; 3] = [0.0, -0.5, 0.0];
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Scene",
+    purpose: "press into a piece of tissue and see it give way",
+    // Every number is taken: Ctrl+0 is the usual size of text.
+    key: Key::E,
+    open: |_| Box::new(SceneScreen::default()),
+};
 
 /// The screen's state.
 pub struct SceneScreen {
@@ -74,12 +86,6 @@ impl Default for SceneScreen {
 }
 
 impl SceneScreen {
-    /// Whether times measured now would be disturbed.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.ahead.standing().is_some() || self.tape.is_busy() || self.is_running()
-    }
-
     /// Whether the scene runs.
     #[must_use]
     pub fn is_running(&self) -> bool {
@@ -99,18 +105,12 @@ impl SceneScreen {
     }
 
     /// Whether what stands in the form can be started.
-    pub fn verdict(&self) -> Result<(), String> {
+    fn verdict(&self, workbench: &Workbench) -> Result<(), String> {
+        workbench.loop_verdict(SCREEN.name)?;
         if self.is_running() {
             return Err("the scene runs".into());
         }
         self.form.settings().map(|_| ())
-    }
-
-    /// Computes the path the first time the screen is shown, so that there is something to see.
-    pub fn shown(&mut self, ctx: &Context) {
-        if !std::mem::replace(&mut self.is_shown, true) {
-            self.compute(ctx);
-        }
     }
 
     /// A recording that was computed again last.
@@ -119,46 +119,8 @@ impl SceneScreen {
         self.tape.replayed()
     }
 
-    /// Fetches what is new.
-    pub fn poll(&mut self) {
-        self.form.check();
-        self.tape.poll();
-        self.ahead.poll();
-        self.reading.poll();
-        if self.is_reading && self.reading.standing().is_none() {
-            self.is_reading = false;
-            match self.reading.answer() {
-                Some(Ok((file, notes))) => {
-                    self.refusal = None;
-                    self.form.fill(file.clone(), notes.clone());
-                }
-                Some(Err(reason)) => self.refusal = Some(reason.clone()),
-                None => {}
-            }
-        }
-        let hand = Hand6 {
-            at: self.view.hand().at(),
-            turn: TURN,
-        };
-        if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
-            self.refusal = Some(reason);
-            self.tape.cut_off();
-        }
-    }
-
-    /// Takes the folder of a recording.
-    pub fn take_recording(&mut self, folder: &Path) {
-        self.tape.take(folder);
-    }
-
-    /// Takes a scene file.
-    pub fn take(&mut self, path: &Path, ctx: &Context) {
-        self.form.file = path.display().to_string();
-        self.read(ctx);
-    }
-
     /// Reads the file that is named, on a thread: a body may have to be fitted.
-    pub fn read(&mut self, ctx: &Context) {
+    fn read(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
@@ -170,7 +132,7 @@ impl SceneScreen {
     }
 
     /// Computes what stands in the form along its path.
-    pub fn compute(&mut self, ctx: &Context) {
+    fn compute(&mut self, ctx: &Context) {
         let Ok(settings) = self.form.settings() else {
             return;
         };
@@ -185,13 +147,8 @@ impl SceneScreen {
         });
     }
 
-    /// Ends that.
-    pub fn cancel(&self) {
-        self.ahead.cancel();
-    }
-
     /// Starts the scene, unless it runs, and records it if a folder is named.
-    pub fn start(&mut self, ctx: &Context) {
+    fn start(&mut self, ctx: &Context) {
         if self.is_running() {
             return;
         }
@@ -218,19 +175,6 @@ impl SceneScreen {
         }
     }
 
-    /// Stops it.
-    pub fn stop(&mut self) {
-        if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
-            self.tape.end(move || live.stop().and_then(recorded));
-        }
-    }
-
-    /// Stops it for good, its recording on disk.
-    pub fn close(&mut self) {
-        self.stop();
-        self.tape.settle();
-    }
-
     /// Another piece of tissue is looked at anew.
     fn look_at(&mut self, settings: &SceneSettings) {
         if settings.side_mm.to_bits() != self.viewed_mm.to_bits() {
@@ -249,10 +193,10 @@ impl SceneScreen {
             _ => None,
         }
     }
+}
 
-    /// What is asked for. `verdict` says whether the scene may be started.
-    pub fn left_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
+impl Screen for SceneScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
         // What runs is not to be changed under a hand.
         let is_running = self.is_running();
         ui.add_enabled_ui(!is_running, |ui| match self.form.ui(ui) {
@@ -261,18 +205,14 @@ impl SceneScreen {
             None => {}
         });
         if let Some(reason) = &self.refusal {
-            ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
+            alarm_ui(ui, reason);
         }
         ui.add_space(6.0);
         let may = match is_running {
             true => Err("the scene runs".into()),
             false => self.form.settings().map(|_| ()),
         };
-        match task_ui(ui, "Compute the path  F6", &self.ahead, &may) {
-            Some(Pressed::Start) => commands.push(Command::Work),
-            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
-            None => {}
-        }
+        work_ui(ui, "Compute the path  F6", &self.ahead, &may, commands);
         section_ui(ui, "Touch");
         let size = vec2(170.0, 34.0);
         if is_running {
@@ -280,7 +220,7 @@ impl SceneScreen {
             if ui.add(stop).place("Stop the scene").clicked() {
                 commands.push(Command::SceneStop);
             }
-        } else if reason_button(ui, "Start the scene", size, verdict) {
+        } else if reason_button(ui, "Start the scene", size, &self.verdict(workbench)) {
             commands.push(Command::SceneStart);
         }
         let words = match self.touch.as_ref().is_some_and(Touch::is_led) {
@@ -291,9 +231,112 @@ impl SceneScreen {
                  + and - zoom, Home looks as at first"
             }
         };
-        ui.add(Label::new(RichText::new(words).color(tokens.text_quiet).small()).wrap());
+        quiet_ui(ui, words);
         ui.add_enabled_ui(!is_running, |ui| self.form.parts_ui(ui));
         self.plan_ui(ui, is_running, commands);
         self.tape.ui(ui, is_running, replay);
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        self.draw_middle(ui);
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        self.draw_right(ui);
+    }
+
+    fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+        self.form.check();
+        self.tape.poll();
+        self.ahead.poll();
+        self.reading.poll();
+        if self.is_reading && self.reading.standing().is_none() {
+            self.is_reading = false;
+            match self.reading.answer() {
+                Some(Ok((file, notes))) => {
+                    self.refusal = None;
+                    self.form.fill(file.clone(), notes.clone());
+                }
+                Some(Err(reason)) => self.refusal = Some(reason.clone()),
+                None => {}
+            }
+        }
+        let hand = Hand6 {
+            at: self.view.hand().at(),
+            turn: TURN,
+        };
+        if let Some(Err(reason)) = self.touch.as_mut().map(|touch| touch.poll(hand)) {
+            self.refusal = Some(reason);
+            self.tape.cut_off();
+        }
+        self.plan(workbench.front.scene_curves.as_deref());
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        // So that there is something to see.
+        if !std::mem::replace(&mut self.is_shown, true) {
+            self.compute(ctx);
+        }
+    }
+
+    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::SceneStart if self.verdict(workbench).is_ok() => {
+                self.start(ctx);
+                return Reply::Show;
+            }
+            Command::SceneStart => {}
+            Command::SceneStop => self.stop(),
+            Command::OpenScene => self.read(ctx),
+            Command::Chosen(Ask::Scene, path) => {
+                self.form.file = path.display().to_string();
+                self.read(ctx);
+            }
+            Command::ReplayScene(folder) => {
+                self.tape.take(folder);
+                return Reply::Show;
+            }
+            _ => return Reply::NotMine,
+        }
+        Reply::Done
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        self.compute(ctx);
+    }
+
+    fn cancel(&mut self) {
+        self.ahead.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.ahead.standing().is_some() || self.tape.is_busy() || self.is_running()
+    }
+
+    fn running(&self) -> Option<&'static str> {
+        self.is_running().then_some("the scene runs")
+    }
+
+    fn stop(&mut self) {
+        if let Some(live) = self.touch.as_mut().and_then(Touch::stop) {
+            self.tape.end(move || live.stop().and_then(recorded));
+        }
+    }
+
+    fn close(&mut self) {
+        self.stop();
+        self.tape.settle();
+    }
+
+    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+        let can_stop = match self.is_running() {
+            true => Ok(()),
+            false => Err("the scene does not run".to_owned()),
+        };
+        let can_start = self.verdict(workbench);
+        vec![
+            Action::new("Start the scene", "", Command::SceneStart).if_ok(can_start),
+            Action::new("Stop the scene", "", Command::SceneStop).if_ok(can_stop),
+        ]
     }
 }

@@ -36,7 +36,7 @@ impl Planned {
 
 impl SceneScreen {
     /// Plans what stands in the form, once there are curves of this computer.
-    pub fn plan(&mut self, curves: Option<&SceneCurves>) {
+    pub(super) fn plan(&mut self, curves: Option<&SceneCurves>) {
         let (Some(curves), Ok(file)) = (curves, self.form.scene_file()) else {
             self.planned = None;
             return;

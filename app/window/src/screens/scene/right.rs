@@ -12,7 +12,7 @@ use palpate_haptics::scene::{SceneSettings, SceneTick};
 
 impl SceneScreen {
     /// What is known.
-    pub fn right_ui(&self, ui: &mut Ui) {
+    pub fn draw_right(&self, ui: &mut Ui) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         let Some((settings, moment)) = self.seen() else {
             ui.label(RichText::new("nothing to feel yet").color(tokens.text_quiet));

@@ -3,17 +3,20 @@
 
 mod shown;
 
+use super::screen::{Reply, Screen, ScreenEntry};
 use crate::command::{Command, Commands};
 use crate::plots::log_scatter::{Scatter, log_scatter_ui};
 use crate::theme::Tokens;
 use crate::widgets::fact_row::section_ui;
 use crate::widgets::places::Place;
 use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::widgets::remark::alarm_ui;
 use crate::widgets::table::table_ui;
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::work_ui;
 use crate::widgets::tick_box::tick_box;
+use crate::workbench::Workbench;
 use crate::workers::task::Task;
-use eframe::egui::{Context, Label, RichText, TextEdit, Ui, vec2};
+use eframe::egui::{Context, Key, Label, RichText, TextEdit, Ui, vec2};
 use palpate_analysis::report::text::capital;
 use palpate_analysis::trade::text::{advice, percent, terms};
 use palpate_analysis::trade::{self, Extent, SCENE_PEAK};
@@ -24,6 +27,7 @@ use palpate_rheology::trade::{Recommendation, TradeCurves};
 use palpate_sessions::trade::{read_trade, trade_file, write_trade};
 use shown::{Shown, cuts, families, fits, integrators, meshes, plan_lines, steps};
 use std::path::PathBuf;
+use std::sync::Arc;
 
 /// Share of the height that the plot gets.
 const PLOT_SHARE: f32 = 0.5;
@@ -70,6 +74,14 @@ pub struct Known {
     stored: Result<String, String>,
 }
 
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Trade",
+    purpose: "what accuracy costs on this machine",
+    key: Key::Num7,
+    open: |workbench| Box::new(TradeScreen::new(workbench.library.clone())),
+};
+
 /// The screen's state.
 pub struct TradeScreen {
     library: Result<PathBuf, String>,
@@ -82,13 +94,11 @@ pub struct TradeScreen {
     is_read: bool,
     shape: QuantityField,
     budget: QuantityField,
-    scene: Task<SceneCurves>,
+    scene: Task<Arc<SceneCurves>>,
 }
 
 impl TradeScreen {
-    /// A screen that keeps its curves in `library`, or the reason why there is none.
-    #[must_use]
-    pub fn new(library: Result<PathBuf, String>) -> Self {
+    fn new(library: Result<PathBuf, String>) -> Self {
         Self {
             library,
             tolerance: "1%".into(),
@@ -104,16 +114,6 @@ impl TradeScreen {
         }
     }
 
-    /// Fetches an answer that has come.
-    pub fn poll(&mut self) {
-        self.task.poll();
-        self.rate.check(|rate| in_range(rate, RATE_MAX));
-        self.share.check(|share| in_range(share, 100.0));
-        self.scene.poll();
-        self.shape.check(|shape| in_range(shape, SHAPE_MAX));
-        self.budget.check(|budget| in_range(budget, BUDGET_MAX));
-    }
-
     /// The curves on the screen.
     #[must_use]
     pub fn curves(&self) -> Option<&TradeCurves> {
@@ -124,77 +124,11 @@ impl TradeScreen {
     /// The curves of a scene.
     #[must_use]
     pub fn scene_curves(&self) -> Option<&SceneCurves> {
+        self.scene_answer().map(Arc::as_ref)
+    }
+
+    fn scene_answer(&self) -> Option<&Arc<SceneCurves>> {
         self.scene.answer()?.as_ref().ok()
-    }
-
-    /// Shows the curves of a scene.
-    pub fn show_scene(&mut self) {
-        self.view = View::Mesh;
-    }
-
-    /// Reads the stored curves of this machine, the first time the screen is shown.
-    pub fn shown(&mut self, ctx: &Context) {
-        if std::mem::replace(&mut self.is_read, true) {
-            return;
-        }
-        let Ok(library) = &self.library else {
-            return;
-        };
-        let file = trade_file(library, &trade::this_machine());
-        if !file.exists() {
-            return;
-        }
-        self.task.start("trade-read", ctx, move |_| {
-            let curves = read_trade(&file).map_err(|err| err.to_string())?;
-            Ok(Known {
-                doubts: doubts(&curves),
-                stored: Ok(file.display().to_string()),
-                curves,
-            })
-        });
-    }
-
-    /// Measures what is shown.
-    pub fn start(&mut self, ctx: &Context) {
-        let extent = if self.is_quick {
-            Extent::Quick
-        } else {
-            Extent::Full
-        };
-        if self.view.is_scene() {
-            self.scene.start("scene-curves", ctx, move |progress| {
-                let tell = |done, of, what: &str| progress.tell(done, of, what);
-                trade::measure_scene(extent, &tell)?
-                    .ok_or_else(|| "ended before it was done".to_owned())
-            });
-            return;
-        }
-        let library = self.library.clone();
-        self.task.start("trade", ctx, move |progress| {
-            let tell = |done, of, what: &str| progress.tell(done, of, what);
-            let curves = trade::measure(extent, &tell)?.ok_or("ended before it was done")?;
-            let stored = library
-                .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
-            Ok(Known {
-                doubts: doubts(&curves),
-                stored: stored.map(|file| file.display().to_string()),
-                curves,
-            })
-        });
-    }
-
-    /// Ends a measurement under way.
-    pub fn cancel(&self) {
-        match self.view.is_scene() {
-            true => self.scene.cancel(),
-            false => self.task.cancel(),
-        }
-    }
-
-    /// Whether a measurement is under way.
-    #[must_use]
-    pub fn is_busy(&self) -> bool {
-        self.task.standing().is_some() || self.scene.standing().is_some()
     }
 
     /// The plan for what is wanted of a scene; none before its curves are measured.
@@ -224,114 +158,6 @@ impl TradeScreen {
     fn recommendation(&self) -> Option<Recommendation> {
         let (tolerance, rate, share) = self.wanted().ok()?;
         Some(self.curves()?.recommend(tolerance, rate, 0.01 * share))
-    }
-
-    /// What is wanted. `verdict` says whether a measurement would be disturbed.
-    pub fn left_ui(&mut self, ui: &mut Ui, verdict: &Result<(), String>, commands: &mut Commands) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        section_ui(ui, "Wanted");
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "tolerance");
-            let input = TextEdit::singleline(&mut self.tolerance)
-                .desired_width(96.0)
-                .char_limit(24);
-            ui.add(input).labelled_by(label.id).place("tolerance");
-        });
-        match self.tolerance.parse::<Tolerance>() {
-            Ok(tolerance) => {
-                let text = format!("an error of {tolerance} does not matter");
-                ui.label(RichText::new(text).color(tokens.text_quiet).small());
-            }
-            Err(reason) => {
-                let text = RichText::new(reason.to_string()).color(tokens.alarm_text);
-                ui.add(Label::new(text.small()).wrap());
-            }
-        }
-        let is_scene = self.view.is_scene();
-        if is_scene {
-            quantity_ui(ui, "shape", "mm of error", &mut self.shape);
-            quantity_ui(ui, "budget", "us of each tick", &mut self.budget);
-        } else {
-            quantity_ui(ui, "rate", "updates a second", &mut self.rate);
-            quantity_ui(ui, "share", "% of each period", &mut self.share);
-        }
-        section_ui(ui, "Measure");
-        tick_box(ui, &mut self.is_quick, "few rows, rough times");
-        ui.add_space(4.0);
-        let pressed = match is_scene {
-            true => task_ui(ui, "Measure here  F6", &self.scene, verdict),
-            false => task_ui(ui, "Measure here  F6", &self.task, verdict),
-        };
-        match pressed {
-            Some(Pressed::Start) => commands.push(Command::Work),
-            Some(Pressed::Cancel) => commands.push(Command::CancelWork),
-            None => {}
-        }
-        if is_scene {
-            return;
-        }
-        let Some(Ok(known)) = self.task.answer() else {
-            return;
-        };
-        section_ui(ui, "Measured");
-        let facts = [
-            known.curves.machine.words(),
-            format!(
-                "{} by palpate {}",
-                known.curves.measured_at, known.curves.version
-            ),
-            format!(
-                "even and odd rounds differ by {} at most",
-                percent(known.curves.worst_halves())
-            ),
-        ];
-        for fact in facts {
-            ui.add(Label::new(RichText::new(fact).small()).wrap());
-        }
-        for doubt in &known.doubts {
-            let text = RichText::new(doubt).color(tokens.alarm_text);
-            ui.add(Label::new(text.small()).wrap());
-        }
-        let (text, ink) = match &known.stored {
-            Ok(file) => (format!("stored in {file}"), tokens.text_quiet),
-            Err(reason) => (format!("not stored: {reason}"), tokens.alarm_text),
-        };
-        ui.add(Label::new(RichText::new(text).small().color(ink)).wrap());
-    }
-
-    /// Error over time, and the table.
-    pub fn middle_ui(&mut self, ui: &mut Ui) {
-        let tokens = Tokens::of(ui.visuals().dark_mode);
-        ui.horizontal(|ui| {
-            ui.label(RichText::new("Error over time").heading().strong());
-            for (view, name) in VIEWS {
-                ui.selectable_value(&mut self.view, view, name).place(name);
-            }
-        });
-        let (shown, level) = match self.drawn() {
-            Ok(Some(shown)) => shown,
-            Ok(None) => {
-                let text = "nothing measured on this machine yet";
-                ui.label(RichText::new(text).color(tokens.text_quiet));
-                return;
-            }
-            Err(reason) => {
-                ui.add(Label::new(RichText::new(reason).color(tokens.alarm_text)).wrap());
-                return;
-            }
-        };
-        let height = ui.available_height() * PLOT_SHARE;
-        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
-            let scatter = Scatter {
-                axes: shown.axes,
-                marks: &shown.marks,
-                has_front: self.view != View::Families,
-                chosen: shown.chosen,
-                level,
-            };
-            log_scatter_ui(ui, shown.axes[0], &scatter);
-        });
-        table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
     }
 
     /// What the view shows and the level not to exceed in it, once that is measured.
@@ -388,7 +214,7 @@ impl TradeScreen {
             }
             Some(Err(none)) => {
                 let why = format!("no plan: {}", none.why);
-                ui.add(Label::new(RichText::new(why).color(tokens.alarm_text)).wrap());
+                alarm_ui(ui, &why);
                 if let Some(plan) = &none.nearest {
                     section_ui(ui, "Nearest within the budget");
                     lines(ui, plan);
@@ -396,9 +222,112 @@ impl TradeScreen {
             }
         }
     }
+}
 
-    /// What to use.
-    pub fn right_ui(&self, ui: &mut Ui) {
+impl Screen for TradeScreen {
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        section_ui(ui, "Wanted");
+        ui.horizontal(|ui| {
+            let label = form_label(ui, "tolerance");
+            let input = TextEdit::singleline(&mut self.tolerance)
+                .desired_width(96.0)
+                .char_limit(24);
+            ui.add(input).labelled_by(label.id).place("tolerance");
+        });
+        match self.tolerance.parse::<Tolerance>() {
+            Ok(tolerance) => {
+                let text = format!("an error of {tolerance} does not matter");
+                ui.label(RichText::new(text).color(tokens.text_quiet).small());
+            }
+            Err(reason) => {
+                let text = RichText::new(reason.to_string()).color(tokens.alarm_text);
+                ui.add(Label::new(text.small()).wrap());
+            }
+        }
+        let is_scene = self.view.is_scene();
+        if is_scene {
+            quantity_ui(ui, "shape", "mm of error", &mut self.shape);
+            quantity_ui(ui, "budget", "us of each tick", &mut self.budget);
+        } else {
+            quantity_ui(ui, "rate", "updates a second", &mut self.rate);
+            quantity_ui(ui, "share", "% of each period", &mut self.share);
+        }
+        section_ui(ui, "Measure");
+        let verdict = workbench.measure_verdict();
+        tick_box(ui, &mut self.is_quick, "few rows, rough times");
+        ui.add_space(4.0);
+        match is_scene {
+            true => work_ui(ui, "Measure here  F6", &self.scene, &verdict, commands),
+            false => work_ui(ui, "Measure here  F6", &self.task, &verdict, commands),
+        }
+        if is_scene {
+            return;
+        }
+        let Some(Ok(known)) = self.task.answer() else {
+            return;
+        };
+        section_ui(ui, "Measured");
+        let facts = [
+            known.curves.machine.words(),
+            format!(
+                "{} by palpate {}",
+                known.curves.measured_at, known.curves.version
+            ),
+            format!(
+                "even and odd rounds differ by {} at most",
+                percent(known.curves.worst_halves())
+            ),
+        ];
+        for fact in facts {
+            ui.add(Label::new(RichText::new(fact).small()).wrap());
+        }
+        for doubt in &known.doubts {
+            let text = RichText::new(doubt).color(tokens.alarm_text);
+            ui.add(Label::new(text.small()).wrap());
+        }
+        let (text, ink) = match &known.stored {
+            Ok(file) => (format!("stored in {file}"), tokens.text_quiet),
+            Err(reason) => (format!("not stored: {reason}"), tokens.alarm_text),
+        };
+        ui.add(Label::new(RichText::new(text).small().color(ink)).wrap());
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        let tokens = Tokens::of(ui.visuals().dark_mode);
+        ui.horizontal(|ui| {
+            ui.label(RichText::new("Error over time").heading().strong());
+            for (view, name) in VIEWS {
+                ui.selectable_value(&mut self.view, view, name).place(name);
+            }
+        });
+        let (shown, level) = match self.drawn() {
+            Ok(Some(shown)) => shown,
+            Ok(None) => {
+                let text = "nothing measured on this machine yet";
+                ui.label(RichText::new(text).color(tokens.text_quiet));
+                return;
+            }
+            Err(reason) => {
+                alarm_ui(ui, &reason);
+                return;
+            }
+        };
+        let height = ui.available_height() * PLOT_SHARE;
+        ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+            let scatter = Scatter {
+                axes: shown.axes,
+                marks: &shown.marks,
+                has_front: self.view != View::Families,
+                chosen: shown.chosen,
+                level,
+            };
+            log_scatter_ui(ui, shown.axes[0], &scatter);
+        });
+        table_ui(ui, shown.axes[0], &shown.columns, &shown.rows);
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
         let tokens = Tokens::of(ui.visuals().dark_mode);
         section_ui(ui, "What to use");
         if self.view.is_scene() {
@@ -418,6 +347,92 @@ impl TradeScreen {
             section_ui(ui, &capital(&name));
             ui.add(Label::new(words).wrap());
         }
+    }
+
+    fn poll(&mut self, _ctx: &Context, workbench: &mut Workbench) {
+        self.task.poll();
+        self.rate.check(|rate| in_range(rate, RATE_MAX));
+        self.share.check(|share| in_range(share, 100.0));
+        self.scene.poll();
+        self.shape.check(|shape| in_range(shape, SHAPE_MAX));
+        self.budget.check(|budget| in_range(budget, BUDGET_MAX));
+        let curves = self.scene_answer();
+        if workbench.front.scene_curves.as_ref().map(Arc::as_ptr) != curves.map(Arc::as_ptr) {
+            workbench.front.scene_curves = curves.cloned();
+        }
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        if std::mem::replace(&mut self.is_read, true) {
+            return;
+        }
+        let Ok(library) = &self.library else {
+            return;
+        };
+        let file = trade_file(library, &trade::this_machine());
+        if !file.exists() {
+            return;
+        }
+        self.task.start("trade-read", ctx, move |_| {
+            let curves = read_trade(&file).map_err(|err| err.to_string())?;
+            Ok(Known {
+                doubts: doubts(&curves),
+                stored: Ok(file.display().to_string()),
+                curves,
+            })
+        });
+    }
+
+    fn act(&mut self, _ctx: &Context, command: &Command, _workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::MeasureScene => self.view = View::Mesh,
+            _ => return Reply::NotMine,
+        }
+        Reply::Show
+    }
+
+    fn work(&mut self, ctx: &Context, workbench: &mut Workbench) {
+        if workbench.measure_verdict().is_err() {
+            return;
+        }
+        let extent = if self.is_quick {
+            Extent::Quick
+        } else {
+            Extent::Full
+        };
+        if self.view.is_scene() {
+            self.scene.start("scene-curves", ctx, move |progress| {
+                let tell = |done, of, what: &str| progress.tell(done, of, what);
+                let curves = trade::measure_scene(extent, &tell)?;
+                curves
+                    .map(Arc::new)
+                    .ok_or_else(|| "ended before it was done".to_owned())
+            });
+            return;
+        }
+        let library = self.library.clone();
+        self.task.start("trade", ctx, move |progress| {
+            let tell = |done, of, what: &str| progress.tell(done, of, what);
+            let curves = trade::measure(extent, &tell)?.ok_or("ended before it was done")?;
+            let stored = library
+                .and_then(|library| write_trade(&library, &curves).map_err(|err| err.to_string()));
+            Ok(Known {
+                doubts: doubts(&curves),
+                stored: stored.map(|file| file.display().to_string()),
+                curves,
+            })
+        });
+    }
+
+    fn cancel(&mut self) {
+        match self.view.is_scene() {
+            true => self.scene.cancel(),
+            false => self.task.cancel(),
+        }
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.standing().is_some() || self.scene.standing().is_some()
     }
 }
 

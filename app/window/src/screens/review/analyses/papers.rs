@@ -1,19 +1,19 @@
 //! Report and figure of what is in front, as new files.
 
 use super::super::Looked;
+use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::form_label;
 use crate::widgets::remark::{alarm_ui, quiet_ui};
-use crate::widgets::task_bar::{Pressed, task_ui};
+use crate::widgets::task_bar::task_ui;
 use crate::widgets::text_row::text_row;
 use crate::widgets::tick_box::tick_box;
-use crate::workers::path_dialog::{SaveAs, SaveDialog};
+use crate::workers::path_dialog::Dialog;
 use crate::workers::task::Task;
-use eframe::egui::{ComboBox, Ui};
+use eframe::egui::Ui;
 use palpate_analysis::analyses::{Done, Paper, paper};
 use palpate_analysis::report::dossier::{Figure, Wanted, name_of};
 use palpate_analysis::report::figures::Window;
+use rfd::FileDialog;
 use std::path::PathBuf;
 
 /// Which field a dialog fills.
@@ -34,7 +34,7 @@ pub(super) struct Papers {
     pub span: Option<[f64; 2]>,
     /// Whether the figure shows it alone.
     is_of_span: bool,
-    dialog: SaveDialog,
+    dialog: Dialog<PathBuf>,
     asked: Option<Field>,
     pages: Task<Done>,
     figures: Task<Done>,
@@ -72,36 +72,21 @@ impl Papers {
             );
         }
         let verdict = path_verdict(&self.report, &["html", "htm"]);
-        match task_ui(ui, "Write report", &self.pages, &verdict) {
-            Some(Pressed::Start) => {
-                let sessions: Vec<Wanted> = match self.is_of_all && shown.len() > 1 {
-                    true => shown.iter().map(wanted).collect(),
-                    false => vec![wanted(looked)],
-                };
-                let to = PathBuf::from(self.report.trim());
-                self.pages.start("report", ui.ctx(), move |progress| {
-                    paper(&Paper::Page(sessions), &to, progress)
-                });
-            }
-            Some(Pressed::Cancel) => self.pages.cancel(),
-            None => {}
+        if task_ui(ui, "Write report", &self.pages, &verdict) {
+            let sessions: Vec<Wanted> = match self.is_of_all && shown.len() > 1 {
+                true => shown.iter().map(wanted).collect(),
+                false => vec![wanted(looked)],
+            };
+            let to = PathBuf::from(self.report.trim());
+            self.pages.start("report", ui.ctx(), move |progress| {
+                paper(&Paper::Page(sessions), &to, progress)
+            });
         }
         answer_ui(ui, &self.pages);
 
         section_ui(ui, "Figure");
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "of");
-            ComboBox::from_id_salt("figure_of")
-                .selected_text(self.of.word())
-                .show_ui(ui, |ui| {
-                    for one in Figure::ALL {
-                        ui.selectable_value(&mut self.of, one, one.word());
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("of");
-        });
+        let figures = Figure::ALL.map(|one| (one, one.word()));
+        choice_ui(ui, "of", &mut self.of, &figures);
         text_row(
             ui,
             "figure file",
@@ -115,18 +100,14 @@ impl Papers {
             tick_box(ui, &mut self.is_of_span, &words);
         }
         let verdict = path_verdict(&self.figure, &["svg", "png"]);
-        match task_ui(ui, "Write figure", &self.figures, &verdict) {
-            Some(Pressed::Start) => {
-                let span = self.span.filter(|_| self.is_of_span && is_over_samples);
-                let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
-                let one = Paper::Figure(wanted(looked), self.of, window);
-                let to = PathBuf::from(self.figure.trim());
-                self.figures.start("figure", ui.ctx(), move |progress| {
-                    paper(&one, &to, progress)
-                });
-            }
-            Some(Pressed::Cancel) => self.figures.cancel(),
-            None => {}
+        if task_ui(ui, "Write figure", &self.figures, &verdict) {
+            let span = self.span.filter(|_| self.is_of_span && is_over_samples);
+            let window = span.map_or(Window::WHOLE, |[from, until]| Window { from, until });
+            let one = Paper::Figure(wanted(looked), self.of, window);
+            let to = PathBuf::from(self.figure.trim());
+            self.figures.start("figure", ui.ctx(), move |progress| {
+                paper(&one, &to, progress)
+            });
         }
         answer_ui(ui, &self.figures);
     }
@@ -138,13 +119,13 @@ impl Papers {
         };
         if ui.button(words).clicked() && !self.dialog.is_open() {
             self.asked = Some(field);
-            let wanted = SaveAs {
-                title,
-                name: format!("{}.{ending}", name_of(&looked.session)),
-                ending,
+            let name = format!("{}.{ending}", name_of(&looked.session));
+            let pick = move |dialog: FileDialog| {
+                let dialog = dialog.set_title(title).set_file_name(name);
+                dialog.add_filter(ending, &[ending]).save_file()
             };
             // Without a dialog the path is typed.
-            if self.dialog.open(wanted, ui.ctx()).is_err() {
+            if self.dialog.open(ui.ctx(), pick).is_err() {
                 self.asked = None;
             }
         }

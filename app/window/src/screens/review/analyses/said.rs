@@ -1,11 +1,11 @@
 //! What a session is worth, and where its contact really was.
 
+use crate::widgets::choice::choice_ui;
 use crate::widgets::fact_row::section_ui;
-use crate::widgets::places::Place;
-use crate::widgets::quantity_input::{QuantityField, form_label, quantity_ui};
+use crate::widgets::quantity_input::{QuantityField, quantity_ui};
 use crate::widgets::reason_button::reason_button;
 use crate::widgets::remark::quiet_ui;
-use eframe::egui::{ComboBox, Ui, vec2};
+use eframe::egui::{Ui, vec2};
 use palpate_analysis::analyses::{Deed, Known};
 use palpate_model::units::Position;
 use palpate_sessions::edits::Verdict;
@@ -36,19 +36,9 @@ impl Said {
             None => "nobody gave a verdict".to_owned(),
         };
         quiet_ui(ui, &words);
-        ui.horizontal(|ui| {
-            let label = form_label(ui, "verdict");
-            ComboBox::from_id_salt("analysis_verdict")
-                .selected_text(self.verdict.word())
-                .show_ui(ui, |ui| {
-                    for one in [Verdict::Valid, Verdict::Suspect, Verdict::Rejected] {
-                        ui.selectable_value(&mut self.verdict, one, one.word());
-                    }
-                })
-                .response
-                .labelled_by(label.id)
-                .place("verdict");
-        });
+        let verdicts = [Verdict::Valid, Verdict::Suspect, Verdict::Rejected];
+        let verdicts = verdicts.map(|one| (one, one.word()));
+        choice_ui(ui, "verdict", &mut self.verdict, &verdicts);
         let size = vec2(170.0, 26.0);
         if reason_button(ui, "Give verdict", size, verdict) {
             return Some(Deed::Judge(self.verdict));
@@ -73,20 +63,11 @@ impl Said {
         }
         self.contact = self.contact.min(known.contacts.len() - 1);
         if known.contacts.len() > 1 {
-            ui.horizontal(|ui| {
-                let label = form_label(ui, "which");
-                ComboBox::from_id_salt("analysis_contact")
-                    .selected_text(format!("contact {}", self.contact + 1))
-                    .show_ui(ui, |ui| {
-                        for index in 0..known.contacts.len() {
-                            let words = format!("contact {}", index + 1);
-                            ui.selectable_value(&mut self.contact, index, words);
-                        }
-                    })
-                    .response
-                    .labelled_by(label.id)
-                    .place("which");
-            });
+            let names = (1..=known.contacts.len()).map(|number| format!("contact {number}"));
+            let names: Vec<String> = names.collect();
+            let contacts = names.iter().map(String::as_str).enumerate();
+            let contacts: Vec<(usize, &str)> = contacts.collect();
+            choice_ui(ui, "which", &mut self.contact, &contacts);
         }
         let found = known.contacts[self.contact].0;
         quiet_ui(ui, &format!("it stands at {found:.3} mm from home"));

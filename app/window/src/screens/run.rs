@@ -1,0 +1,318 @@
+//! The run screen: rig and protocol on the left, what is expected or measured in the middle, what is known on the right.
+
+use super::approach::Approach;
+use super::form::Checked;
+use super::protocol_panel::{ProtocolFacts, StartFacts, protocol_ui, start_ui};
+use super::results_panel::results_ui;
+use super::rig_panel::rig_ui;
+use super::run_middle::{Chooser, Middle, expected_ui, first_view, is_offered, views_ui};
+use super::screen::{Reply, Screen, ScreenEntry};
+use super::weighing::weighing_ui;
+use crate::command::{Command, Commands};
+use crate::plots::PlotCache;
+use crate::plots::course::CourseLimits;
+use crate::plots::force_depth::force_depth_ui;
+use crate::plots::force_time::{TimeView, force_time_ui, head_ui};
+use crate::plots::residual::residual_ui;
+use crate::shell::palette::Action;
+use crate::shell::panels::{frame, side_ui};
+use crate::shell::sizes::{Edge, Sizes};
+use crate::workbench::Workbench;
+use crate::workers::fit::{Refit, Refitter};
+use crate::workers::path_dialog::Ask;
+use crate::workers::recovery::Recovery;
+use eframe::egui::{
+    CentralPanel, Context, Frame, Key, Margin, Panel, RichText, ScrollArea, Ui, vec2,
+};
+use palpate_protocols::file::BUILT_IN;
+use palpate_runner::{RunRequest, RunView};
+use std::path::Path;
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Run",
+    purpose: "run a protocol and see what comes of it",
+    key: Key::Num3,
+    open: |workbench| Box::new(RunScreen::new(workbench)),
+};
+
+/// Height of the residuals under the force in points.
+const RESIDUAL_HEIGHT: f32 = 96.0;
+
+/// The screen's state. What runs belongs to the runner.
+pub struct RunScreen {
+    chooser: Chooser,
+    middle: Middle,
+    time_view: TimeView,
+    approach: Approach,
+    plots: PlotCache,
+    /// The start that the plots are of.
+    plotted: u64,
+    refitter: Refitter,
+    recovery: Recovery,
+    is_recovery_begun: bool,
+    /// Where sessions go if no folder is chosen, or why nowhere.
+    library: Result<String, String>,
+}
+
+impl RunScreen {
+    fn new(workbench: &Workbench) -> Self {
+        Self {
+            chooser: Chooser::default(),
+            middle: Middle::default(),
+            time_view: TimeView::default(),
+            approach: Approach::default(),
+            plots: PlotCache::for_calibration(&workbench.bench.calibration),
+            plotted: 0,
+            refitter: Refitter::default(),
+            recovery: Recovery::default(),
+            is_recovery_begun: false,
+            library: palpate_sessions::library_folder()
+                .map(|path| path.display().to_string())
+                .map_err(|err| err.to_string()),
+        }
+    }
+
+    /// Where the exact fit of this run stands.
+    #[must_use]
+    pub fn refit(&self, run: Option<&RunView>) -> Refit<'_> {
+        self.refitter.of(run)
+    }
+
+    /// Takes a built-in protocol into the form, unless what stands there runs.
+    fn take_protocol(&mut self, name: &str, workbench: &mut Workbench) {
+        if !workbench.is_busy() {
+            workbench.form.choose_built_in(name);
+            self.middle = Middle::Course;
+        }
+    }
+
+    fn begin(&mut self, request: Option<RunRequest>, workbench: &mut Workbench) {
+        if let Some(request) = request {
+            self.middle = first_view(&request.plan);
+            workbench.want_run(request);
+        }
+    }
+
+    fn read(&mut self, path: Option<&Path>, ctx: &Context, workbench: &mut Workbench) {
+        let begun = match path {
+            Some(path) => self.chooser.read(path, ctx),
+            None => self.chooser.read_typed(ctx),
+        };
+        if let Err(err) = begun {
+            workbench.refusal = Some(format!("the protocol cannot be read: {err}"));
+        }
+    }
+
+    fn facts<'a>(&'a self, workbench: &Workbench) -> ProtocolFacts<'a> {
+        ProtocolFacts {
+            is_busy: workbench.is_busy(),
+            library: &self.library,
+            recovered: self.recovery.told(),
+            is_dialog_open: workbench.dialog.is_open(),
+        }
+    }
+
+    fn plots_ui(&mut self, ui: &mut Ui, workbench: &Workbench) {
+        head_ui(ui, &mut self.time_view, &self.plots);
+        let run = workbench.run();
+        let limit = workbench.bench.limits.force_max;
+        let exact = match self.refit(run) {
+            Refit::Done(exact) => Some(exact),
+            _ => None,
+        };
+        // The chart over time carries the limits and phases, so it gets the larger half.
+        let height = (ui.available_height() - 30.0) * 0.56;
+        let below = if exact.is_some() {
+            RESIDUAL_HEIGHT
+        } else {
+            0.0
+        };
+        let mut shown = 0.0..=1.0;
+        ui.allocate_ui(vec2(ui.available_width(), height - below), |ui| {
+            shown = force_time_ui(ui, run, &self.plots, exact, self.time_view, limit);
+        });
+        if let Some(exact) = exact {
+            ui.allocate_ui(vec2(ui.available_width(), below), |ui| {
+                residual_ui(ui, exact, shown);
+            });
+        }
+        ui.label(RichText::new("Force over depth").heading().strong());
+        let depth = workbench.form.checked().map_or(0.0, Checked::deepest_mm);
+        force_depth_ui(ui, &self.plots, depth);
+    }
+}
+
+impl Screen for RunScreen {
+    fn ui(
+        &mut self,
+        ui: &mut Ui,
+        sizes: &mut Sizes,
+        workbench: &mut Workbench,
+        commands: &mut Commands,
+    ) {
+        // The start strip on the left never scrolls away, so that panel scrolls by itself.
+        let left = Panel::left("rig_and_protocol").frame(frame(ui, false));
+        let left = sizes.of(Edge::Left, left);
+        let left = left.show(ui, |ui| self.left_ui(ui, workbench, commands));
+        sizes.drag(ui, Edge::Left, left.response.rect);
+        side_ui(ui, sizes, Edge::Right, |ui| {
+            self.right_ui(ui, workbench, commands);
+        });
+        CentralPanel::default()
+            .frame(frame(ui, true))
+            .show(ui, |ui| self.middle_ui(ui, workbench, commands));
+    }
+
+    fn left_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let verdict = workbench.start_verdict();
+        let facts = self.facts(workbench);
+        Panel::bottom("start")
+            .resizable(false)
+            .frame(Frame::new().inner_margin(Margin::symmetric(0, 6)))
+            .show(ui, |ui| {
+                let facts = StartFacts {
+                    is_busy: facts.is_busy,
+                    verdict: &verdict,
+                    refusal: workbench.refusal.as_deref(),
+                    is_link_lost: workbench.snapshot.rig.link_error.is_some(),
+                };
+                start_ui(ui, &mut workbench.form, &facts, commands);
+            });
+        CentralPanel::no_frame().show(ui, |ui| {
+            ScrollArea::vertical()
+                .id_salt("rig_and_protocol")
+                .auto_shrink(false)
+                .show(ui, |ui| {
+                    protocol_ui(ui, &mut workbench.form, &facts, commands);
+                    rig_ui(ui, &workbench.snapshot, &workbench.ports, commands);
+                });
+        });
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let run = workbench.run();
+        views_ui(ui, self.middle, run, commands);
+        let limits = &workbench.bench.limits;
+        match (self.middle, run) {
+            (Middle::Weighing, Some(run)) => {
+                let signal = workbench.snapshot.rig.reading.map(|reading| reading.volts);
+                weighing_ui(ui, run, signal, &workbench.bench, commands);
+            }
+            (Middle::Approach, Some(run)) => self.approach.ui(ui, run),
+            (Middle::Weighing | Middle::Approach, None) => {}
+            (Middle::Choose, _) => {
+                let facts = ProtocolFacts {
+                    is_busy: workbench.is_busy(),
+                    library: &self.library,
+                    recovered: self.recovery.told(),
+                    is_dialog_open: workbench.dialog.is_open(),
+                };
+                self.chooser.ui(ui, &workbench.form, &facts, commands);
+            }
+            (Middle::Course, _) => {
+                let checked = workbench.form.checked();
+                let tight = |checked: &Checked| checked.plan.limits.tighten(*limits);
+                let limits = CourseLimits {
+                    force: checked.map_or(*limits, tight).force_max,
+                    speed: workbench.snapshot.rig.description.speed_max,
+                };
+                expected_ui(ui, checked, limits);
+            }
+            (Middle::Measured, _) => self.plots_ui(ui, workbench),
+        }
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, workbench: &mut Workbench, commands: &mut Commands) {
+        let refit = self.refit(workbench.run());
+        results_ui(ui, &workbench.snapshot, refit, self.plots.loops(), commands);
+    }
+
+    fn poll(&mut self, ctx: &Context, workbench: &mut Workbench) {
+        if !std::mem::replace(&mut self.is_recovery_begun, true)
+            && let Ok(library) = &workbench.library
+        {
+            self.recovery.start(library.clone(), ctx);
+        }
+        self.recovery.poll();
+        // What runs stands in the form until it has ended.
+        if let Some((path, text)) = self.chooser.poll()
+            && !workbench.is_busy()
+        {
+            workbench.form.choose_file(&path, text);
+            self.middle = match workbench.form.protocol {
+                Ok(_) => Middle::Course,
+                Err(_) => Middle::Choose,
+            };
+        }
+        if self.plotted != workbench.starts() {
+            self.plotted = workbench.starts();
+            self.plots = PlotCache::for_calibration(&workbench.bench.calibration);
+        }
+        self.plots.update(workbench.run());
+        self.refitter.update(ctx, workbench.run());
+    }
+
+    fn act(&mut self, ctx: &Context, command: &Command, workbench: &mut Workbench) -> Reply {
+        match command {
+            Command::Start => {
+                let request = workbench.ready_run();
+                self.begin(request, workbench);
+            }
+            Command::Aside(aside) => {
+                let request = workbench.aside_run(aside);
+                self.begin(request, workbench);
+            }
+            Command::View(view) => {
+                self.middle = *view;
+                return Reply::Show;
+            }
+            Command::TakeProtocol(name) => {
+                self.take_protocol(name, workbench);
+                return Reply::Show;
+            }
+            Command::MeasureCalibration => {
+                self.take_protocol("load-cell-calibration", workbench);
+                return Reply::Show;
+            }
+            Command::OpenProtocol => self.read(None, ctx, workbench),
+            Command::Chosen(Ask::Protocol, path) => self.read(Some(path), ctx, workbench),
+            Command::Chosen(Ask::NewSessions, folder) => {
+                workbench.form.folder = folder.display().to_string();
+            }
+            _ => return Reply::NotMine,
+        }
+        Reply::Done
+    }
+
+    fn actions(&self, workbench: &Workbench) -> Vec<Action> {
+        let views = [
+            (Middle::Choose, "View: protocols"),
+            (Middle::Course, "View: expected course"),
+            (Middle::Measured, "View: measured"),
+            (Middle::Weighing, "View: weights"),
+            (Middle::Approach, "View: search for the surface"),
+        ];
+        let mut actions: Vec<Action> = views
+            .into_iter()
+            .map(|(view, name)| {
+                let verdict = match is_offered(view, workbench.run()) {
+                    true => Ok(()),
+                    false => Err("the run has no such thing".to_owned()),
+                };
+                Action::new(name, "", Command::View(view)).if_ok(verdict)
+            })
+            .collect();
+        let is_free = workbench.free_verdict();
+        actions.extend(BUILT_IN.iter().map(|(name, _)| {
+            let words = format!("Protocol {name}");
+            Action::new(words, "", Command::TakeProtocol(name)).if_ok(is_free.clone())
+        }));
+        actions.push(Action::new(
+            "Open a protocol file",
+            "",
+            Command::Choose(Ask::Protocol),
+        ));
+        actions
+    }
+}

@@ -1,0 +1,17 @@
+//! Every screen, in the order of a day's work: a new one is a line here and its `mod` line.
+
+use super::screen::ScreenEntry;
+
+/// The screens as they stand on the rail.
+pub const SCREENS: &[ScreenEntry] = &[
+    super::rig::SCREEN,
+    super::calibration::SCREEN,
+    super::run::SCREEN,
+    super::library::SCREEN,
+    super::review::SCREEN,
+    super::models::SCREEN,
+    super::trade::SCREEN,
+    super::extremes::SCREEN,
+    super::haptics::SCREEN,
+    super::scene::SCREEN,
+];

@@ -1,0 +1,109 @@
+//! Files dropped on the window go where they belong.
+
+use crate::command::{Command, Commands};
+use crate::screens::{models, run, scene};
+use crate::workers::path_dialog::Ask;
+use palpate_analysis::haptics_tape::is_tape;
+use palpate_sessions::ticks::TICKS;
+use std::path::{Path, PathBuf};
+
+/// Asks for what files and folders are good for; `shown` is the screen that they were dropped on.
+pub fn push_dropped(paths: Vec<PathBuf>, shown: &str, commands: &mut Commands) {
+    let (protocols, others): (Vec<_>, Vec<_>) =
+        paths.into_iter().partition(|path| ends(path, "toml"));
+    let (tables, folders): (Vec<_>, Vec<_>) = others
+        .into_iter()
+        .partition(|path| path.is_file() && !ends(path, "mcap"));
+    let (recordings, sessions): (Vec<_>, Vec<_>) = folders
+        .into_iter()
+        .partition(|path| path.join(TICKS).is_file());
+    match protocols.into_iter().next() {
+        Some(path) if shown == scene::SCREEN.name => {
+            commands.push(Command::Chosen(Ask::Scene, path));
+        }
+        Some(path) => {
+            commands.push(Command::Show(run::SCREEN.name));
+            commands.push(Command::Chosen(Ask::Protocol, path));
+        }
+        None => {}
+    }
+    if shown == models::SCREEN.name {
+        let chosen = tables.into_iter();
+        chosen.for_each(|path| commands.push(Command::Chosen(Ask::Table, path)));
+    } else if !tables.is_empty() {
+        commands.push(Command::Import(tables));
+    }
+    if let Some(folder) = recordings.into_iter().next() {
+        // What is of neither is told to be so on the scene's.
+        commands.push(match is_tape(&folder).unwrap_or(false) {
+            true => Command::ReplayLoop(folder),
+            false => Command::ReplayScene(folder),
+        });
+    }
+    if !sessions.is_empty() {
+        commands.push(Command::Review(
+            sessions.into_iter().map(session_of).collect(),
+        ));
+    }
+}
+
+fn ends(path: &Path, wanted: &str) -> bool {
+    let ending = path.extension().and_then(|one| one.to_str());
+    ending.is_some_and(|one| one.eq_ignore_ascii_case(wanted))
+}
+
+/// A log that was dropped stands for its session.
+fn session_of(path: PathBuf) -> PathBuf {
+    match (path.is_file(), path.parent()) {
+        (true, Some(folder)) => folder.to_owned(),
+        _ => path,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn dropped(paths: &[&Path], shown: &str) -> Vec<Command> {
+        let mut commands = Commands::default();
+        let paths = paths.iter().map(|path| path.to_path_buf()).collect();
+        push_dropped(paths, shown, &mut commands);
+        commands.take()
+    }
+
+    #[test]
+    fn each_kind_goes_to_its_screen_and_some_to_the_one_that_is_shown() {
+        let folder = tempfile::tempdir().unwrap();
+        let at = |name: &str| folder.path().join(name);
+        let [protocol, table, session] = [at("own.TOML"), at("table.csv"), at("session")];
+        std::fs::write(&protocol, "").unwrap();
+        std::fs::write(&table, "").unwrap();
+        std::fs::create_dir(&session).unwrap();
+        let log = session.join("log.mcap");
+        std::fs::write(&log, "").unwrap();
+        let all: [&Path; 3] = [&protocol, &table, &log];
+        let review = Command::Review(vec![session.clone()]);
+        assert_eq!(
+            dropped(&all, "Rig"),
+            [
+                Command::Show("Run"),
+                Command::Chosen(Ask::Protocol, protocol.clone()),
+                Command::Import(vec![table.clone()]),
+                review.clone(),
+            ]
+        );
+        assert_eq!(
+            dropped(&all, "Models")[2..],
+            [Command::Chosen(Ask::Table, table), review]
+        );
+        assert_eq!(
+            dropped(&[&protocol], "Scene"),
+            [Command::Chosen(Ask::Scene, protocol)]
+        );
+        // Ticks of no known loop are told to be so on the scene's screen.
+        let ticks = at("ticks");
+        std::fs::create_dir(&ticks).unwrap();
+        std::fs::write(ticks.join(TICKS), "").unwrap();
+        assert_eq!(dropped(&[&ticks], "Run"), [Command::ReplayScene(ticks)]);
+    }
+}
