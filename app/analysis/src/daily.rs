@@ -1,8 +1,10 @@
 //! The daily check: the cell's zero, one known weight, the way home. A rig that failed today touches no
 //! tissue unless somebody takes the responsibility.
 
+use crate::find::session_folders;
+use crate::progress::Progress;
 use crate::source::{SourceError, calibration_of, decisions};
-use palpate_model::calibration::{Calibration, KnownWeight};
+use palpate_model::calibration::{Calibration, CheckResult, KnownWeight};
 use palpate_model::units::Volts;
 use palpate_protocols::engine::{Effect, EndingKind, Record};
 use palpate_protocols::plans::{Plan, Step};
@@ -31,17 +33,83 @@ fn part(what: &str, found: Result<(bool, String), String>) -> CheckPart {
     }
 }
 
+/// A daily check with what its session measured.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PastCheck {
+    /// The check as it was judged then.
+    pub check: DailyCheck,
+    /// The empty cell, and the known weight; none where the session is not in the library or lacks the reading.
+    pub zero: Option<Deviation>,
+    /// See [`Self::zero`].
+    pub weight: Option<Deviation>,
+}
+
+/// The newest checks of a rig, oldest first, so many at most, each with what its session in the library measured.
+pub fn past_checks(
+    library: &Path,
+    rig: &str,
+    most: usize,
+    progress: &Progress,
+) -> Result<Vec<PastCheck>, String> {
+    let mut checks = read_checks(library, rig).map_err(|err| err.to_string())?;
+    if checks.is_empty() {
+        return Ok(Vec::new());
+    }
+    let folders = session_folders(library, progress)?;
+    let checks = checks.split_off(checks.len().saturating_sub(most));
+    let count = checks.len();
+    let mut past = Vec::with_capacity(count);
+    for (done, check) in checks.into_iter().enumerate() {
+        let told = progress.tell(done, count, "the sessions of the checks");
+        if told.is_break() {
+            break;
+        }
+        let folder = folders.get(&check.session_id);
+        let [zero, weight] = folder.map_or([None; 2], |folder| deviations(&library.join(folder)));
+        past.push(PastCheck {
+            check,
+            zero,
+            weight,
+        });
+    }
+    Ok(past)
+}
+
+/// What a session measured of zero and weight, as far as it can be read.
+fn deviations(session: &Path) -> [Option<Deviation>; 2] {
+    let read = || -> Option<_> {
+        let session = Session::open(session).ok()?;
+        Some((calibration_of(&session).ok()?, decisions(&session).ok()?))
+    };
+    let Some((calibration, decisions)) = read() else {
+        return [None; 2];
+    };
+    let records = records_of(&decisions);
+    let weight = weight_of(&calibration, &records).ok();
+    [
+        zero_of(&calibration, &records).ok().map(|(_, zero)| zero),
+        weight.map(|weight| Deviation {
+            newtons: weight.error_n,
+            limit: weight.limit_n,
+        }),
+    ]
+}
+
+fn records_of(decisions: &[(u64, Effect)]) -> Vec<&Record> {
+    let effects = decisions.iter().map(|(_, effect)| effect);
+    effects
+        .filter_map(|effect| match effect {
+            Effect::Record(record) => Some(record),
+            _ => None,
+        })
+        .collect()
+}
+
 /// Judges a session of the daily check. What was not done has not passed.
 pub fn judge(session: &Session) -> Result<Vec<CheckPart>, SourceError> {
     let calibration = calibration_of(session)?;
     let decisions = decisions(session)?;
-    let records: Vec<&Record> = decisions
-        .iter()
-        .filter_map(|(_, effect)| match effect {
-            Effect::Record(record) => Some(record),
-            _ => None,
-        })
-        .collect();
+    let records = records_of(&decisions);
     let mut parts = vec![
         part("zero", zero(&calibration, &records)),
         part("weight", weight(&calibration, &records)),
@@ -69,16 +137,33 @@ fn readings(records: &[&Record]) -> Vec<(f64, Volts)> {
     readings.all().iter().map(pair).collect()
 }
 
-fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+/// How far a force is from what it should be, and how far it may be, both in N.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Deviation {
+    /// Measured less expected.
+    pub newtons: f64,
+    /// The most that passes, either way.
+    pub limit: f64,
+}
+
+/// The signal of the empty cell and how far its force is from zero.
+fn zero_of(calibration: &Calibration, records: &[&Record]) -> Result<(Volts, Deviation), String> {
     let (_, volts) = readings(records)
         .into_iter()
         .find(|(mass_g, _)| *mass_g == 0.0)
         .ok_or("the empty cell was not read; make the check again")?;
     let curve = calibration.curve().map_err(|err| err.to_string())?;
-    let force = curve.newtons_from_volts(volts);
     let (_, heaviest) = curve.force_range();
-    let limit = ZERO_SHARE * heaviest.0;
-    let is_passed = force.0.abs() <= limit;
+    let deviation = Deviation {
+        newtons: curve.newtons_from_volts(volts).0,
+        limit: ZERO_SHARE * heaviest.0,
+    };
+    Ok((volts, deviation))
+}
+
+fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+    let (volts, Deviation { newtons, limit }) = zero_of(calibration, records)?;
+    let is_passed = newtons.abs() <= limit;
     let advice = match is_passed {
         true => "",
         false => "; look what touches the probe, then take a new calibration",
@@ -86,14 +171,14 @@ fn zero(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String)
     Ok((
         is_passed,
         format!(
-            "the empty cell reads {volts:.4}, which is {:+.3} N and {} the limit of {limit:.3} N{advice}",
-            force.0,
+            "the empty cell reads {volts:.4}, which is {newtons:+.3} N and {} the limit of {limit:.3} N{advice}",
             if is_passed { "within" } else { "beyond" }
         ),
     ))
 }
 
-fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+/// What the known weight reads.
+fn weight_of(calibration: &Calibration, records: &[&Record]) -> Result<CheckResult, String> {
     let mut tare = None;
     let known = readings(records).into_iter().find(|(mass_g, volts)| {
         if *mass_g == 0.0 {
@@ -108,7 +193,7 @@ fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, Strin
     if let Some(reason) = refusal.map_err(|err| err.to_string())? {
         return Err(reason);
     }
-    let result = calibration
+    calibration
         .check(&KnownWeight {
             mass_g,
             tolerance_g: None,
@@ -116,7 +201,11 @@ fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, Strin
             tare,
             limit_percent: None,
         })
-        .map_err(|err| err.to_string())?;
+        .map_err(|err| err.to_string())
+}
+
+fn weight(calibration: &Calibration, records: &[&Record]) -> Result<(bool, String), String> {
+    let result = weight_of(calibration, records)?;
     let doubts: Vec<String> = result
         .doubts
         .iter()
@@ -257,6 +346,11 @@ mod tests {
                 },
             ];
             let records: Vec<&Record> = records.iter().collect();
+            let (_, off) = zero_of(&calibration, &records).unwrap();
+            assert!((off.newtons - zero_n).abs() < 1e-9);
+            assert!((off.limit - 0.01 * heaviest).abs() < 1e-12, "{off:?}");
+            let read = weight_of(&calibration, &records).unwrap();
+            assert!((read.error_n - error * weight_n).abs() < 1e-9, "{read:?}");
             let parts = [
                 zero(&calibration, &records).unwrap(),
                 weight(&calibration, &records).unwrap(),

@@ -4,6 +4,7 @@ use crate::progress::Progress;
 use palpate_runner::Stopwatch;
 use palpate_sessions::catalog::{Catalog, CatalogError, Changes, Choices, Entry, Event, Query};
 use palpate_sessions::edits::{Edit, Edits};
+use std::collections::BTreeMap;
 use std::ops::ControlFlow;
 use std::path::PathBuf;
 
@@ -96,6 +97,19 @@ pub fn update(library: &std::path::Path, progress: &Progress) -> Result<Changes,
     let mut changes = done.map_err(|err| err.to_string())?;
     changes.remarks.splice(0..0, remarks);
     Ok(changes)
+}
+
+/// Folder below the library of every session in it, by the session's identifier.
+pub fn session_folders(
+    library: &std::path::Path,
+    progress: &Progress,
+) -> Result<BTreeMap<String, String>, String> {
+    update(library, progress)?;
+    let all = with(library, &mut Vec::new(), |catalog| catalog.all())?;
+    let pairs = all
+        .into_iter()
+        .map(|entry| (entry.session_id, entry.folder));
+    Ok(pairs.collect())
 }
 
 /// What happened with a session, and what was said of it.
