@@ -130,12 +130,14 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
         curves,
     };
     if let Some(file) = &args.picture {
-        std::fs::write(file, picture::svg(&report)).map_err(|err| {
-            Failure::failed(format!(
-                "the picture cannot be written: {err}, {}",
-                file.display()
-            ))
-        })?;
+        palpate_sessions::atomic::replace(file, picture::svg(&report).as_bytes()).map_err(
+            |err| {
+                Failure::failed(format!(
+                    "the picture cannot be written: {err}, {}",
+                    file.display()
+                ))
+            },
+        )?;
     }
     output.result(&report, || text::text(&report));
     Ok(())
