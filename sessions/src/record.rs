@@ -98,22 +98,14 @@ pub(crate) fn is_zero(count: &u64) -> bool {
     *count == 0
 }
 
-/// An [`Entry`] to be written as JSON; its kind is the channel it is on.
-#[derive(Serialize)]
-pub(crate) struct EntryMessageRef<'a> {
+/// An [`Entry`] as JSON; its kind is the channel it is on.
+#[derive(Serialize, Deserialize)]
+pub(crate) struct EntryMessage<B> {
     pub order: u64,
     pub after_sample: u64,
     pub now_ns: u64,
-    pub body: &'a serde_json::Value,
-}
-
-/// An [`Entry`] as it is read back.
-#[derive(Deserialize)]
-pub(crate) struct EntryMessage {
-    pub order: u64,
-    pub after_sample: u64,
-    pub now_ns: u64,
-    pub body: serde_json::Value,
+    /// A JSON value, or one that is borrowed to be written.
+    pub body: B,
 }
 
 /// One of the thinned samples; what is not known is left out.

@@ -7,6 +7,7 @@
 //!
 //! [`Recorder::push`] neither waits nor allocates: ticks go through a ring, and a thread writes them.
 
+use crate::atomic;
 use std::fs::File;
 use std::io::{self, BufRead, BufReader, BufWriter, Write};
 use std::path::{Path, PathBuf};
@@ -132,7 +133,7 @@ impl<const W: usize, const R: usize> Recorder<W, R> {
             )
         };
         std::fs::create_dir(folder).map_err(told)?;
-        std::fs::write(folder.join(SETTINGS), settings).map_err(told)?;
+        atomic::create(&folder.join(SETTINGS), settings.as_bytes()).map_err(told)?;
         let mut lines = Lines {
             to: BufWriter::new(File::create_new(&file).map_err(told)?),
             hash: BASIS,

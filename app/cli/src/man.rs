@@ -53,7 +53,7 @@ fn write_pages(
     let path = folder.join(page.get_filename());
     let mut text = Vec::new();
     page.render(&mut text)?;
-    std::fs::write(&path, text)?;
+    palpate_sessions::atomic::replace(&path, &text)?;
     pages.push(path);
     for below in command
         .get_subcommands()

@@ -40,10 +40,6 @@ impl CheckHome {
 }
 
 impl StepKind for CheckHome {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = false;
     }

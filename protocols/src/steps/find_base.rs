@@ -108,10 +108,6 @@ impl Default for FindBase {
 }
 
 impl StepKind for FindBase {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.contact = true;
     }

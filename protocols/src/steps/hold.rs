@@ -101,10 +101,6 @@ impl Hold {
 }
 
 impl StepKind for Hold {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(self.duration);
         if let Some(rule) = &self.until {

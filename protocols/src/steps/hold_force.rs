@@ -51,10 +51,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for HoldForce {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = true;
     }

@@ -63,10 +63,6 @@ impl Home {
 }
 
 impl StepKind for Home {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         // An axis that is homed already stays where it is.
         known.is_inside &= known.home;

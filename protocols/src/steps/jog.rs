@@ -35,10 +35,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Jog {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         // From the surface a jog towards the tissue goes in.
         known.is_inside |= known.contact && self.may_touch();

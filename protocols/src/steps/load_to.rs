@@ -73,10 +73,6 @@ impl LoadTo {
 }
 
 impl StepKind for LoadTo {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = true;
     }

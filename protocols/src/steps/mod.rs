@@ -89,11 +89,14 @@ impl Facts {
     }
 }
 
-/// What is known of a step before it runs and judged behind it.
-pub(crate) trait StepKind {
+/// The `FACTS` of a step's file, which [`table`] gives to it.
+pub(crate) trait OfKind {
     /// What is the same for every step of its kind.
     fn facts(&self) -> &'static Facts;
+}
 
+/// What is known of a step before it runs and judged behind it.
+pub(crate) trait StepKind: OfKind {
     /// What must hold before it, in the order of [`Need`].
     fn needs(&self) -> &'static [Need] {
         self.facts().needs

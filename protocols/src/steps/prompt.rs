@@ -109,10 +109,6 @@ fn read(args: &Args) -> Result<Step, String> {
 }
 
 impl StepKind for Prompt {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn needs(&self) -> &'static [Need] {
         match self.hand {
             Some(_) => &[Need::Outside],

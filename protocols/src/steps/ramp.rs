@@ -40,10 +40,6 @@ pub(super) const FACTS: Facts = Facts {
 pub(super) const INTERRUPTED: &str = "an interrupted indentation is another experiment";
 
 impl StepKind for Ramp {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = true;
     }

@@ -27,10 +27,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Rest {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(self.duration);
         walk.wait(self.duration)

@@ -43,10 +43,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Retract {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = false;
     }

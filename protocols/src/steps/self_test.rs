@@ -35,10 +35,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for SelfTest {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.motor = true;
     }

@@ -68,10 +68,6 @@ impl Sine {
 }
 
 impl StepKind for Sine {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = true;
     }

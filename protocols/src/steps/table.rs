@@ -1,7 +1,7 @@
 //! The steps there are. A line here and a `mod` line in the folder's head make a file of a step known to the engine,
 //! the language, the preview and the fidelity.
 
-use super::{Executable, Facts, InProgress, StepKind};
+use super::{Executable, Facts, InProgress, OfKind, StepKind};
 use crate::engine::Context;
 use serde::{Deserialize, Serialize};
 
@@ -14,6 +14,10 @@ macro_rules! steps {
         #[serde(tag = "step", rename_all = "kebab-case")]
         #[expect(missing_docs, reason = "each is explained at its own data")]
         pub enum Step { $($name($name)),* }
+
+        $(impl OfKind for $name {
+            fn facts(&self) -> &'static Facts { &super::$module::FACTS }
+        })*
 
         $(impl From<$name> for Step {
             fn from(step: $name) -> Self { Self::$name(step) }

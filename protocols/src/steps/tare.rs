@@ -36,10 +36,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Tare {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.tare = true;
     }

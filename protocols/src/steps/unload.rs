@@ -48,10 +48,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Unload {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.is_inside = false;
     }

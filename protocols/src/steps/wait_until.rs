@@ -151,10 +151,6 @@ impl fmt::Display for WaitCondition {
 }
 
 impl StepKind for WaitUntil {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn expect(&self, walk: &mut Walk<'_>) -> Span {
         walk.check_span(self.timeout);
         walk.refusals.extend(self.condition.check().err());

@@ -68,10 +68,6 @@ pub(super) const FACTS: Facts = Facts {
 };
 
 impl StepKind for Weigh {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn warning(&self, known: &Known) -> Option<&'static str> {
         known.motor.then_some(
             "'weigh' with the motor on ends at the force limit of the rig; leave { do = \"self-test\" } out of a protocol that only weighs",

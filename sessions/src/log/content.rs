@@ -367,7 +367,7 @@ impl<'v> Content<'v> {
     }
 
     fn take_entry(&mut self, kind: EntryKind, data: &[u8]) -> Result<(), String> {
-        let message: EntryMessage =
+        let message: EntryMessage<serde_json::Value> =
             serde_json::from_slice(data).map_err(|err| format!("an entry is unreadable: {err}"))?;
         if let Some(last) = self.entries.last()
             && message.order <= last.order

@@ -1,7 +1,7 @@
 //! Messages of a log that are JSON, refused where they would not be read back as they were.
 
 use super::error::{LogError, json_error};
-use crate::record::{Entry, EntryMessageRef};
+use crate::record::{Entry, EntryMessage};
 
 /// Deepest nesting of an entry; the JSON parser that reads it back stops at 128.
 const JSON_DEPTH_MAX: usize = 100;
@@ -14,7 +14,7 @@ pub(super) fn entry_json(entry: &Entry) -> Result<Vec<u8>, LogError> {
             reason: format!("it is nested more than {JSON_DEPTH_MAX} levels deep"),
         });
     }
-    let message = EntryMessageRef {
+    let message = EntryMessage {
         order: entry.order,
         after_sample: entry.after_sample,
         now_ns: entry.now.0,

@@ -15,6 +15,8 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         0.0\t1\t2\n0.1\t2\t3\n<divider>\n0.0\t2\t3\n0.1\t2\t3\n<END DATA>\n";
     let rheometer = "Result:\tR\nInterval and data points:\t1\t2\nInterval data:\tTime\tDisplacement\tNormal Force\n\
         \t[s]\t[mm]\t[N]\n\t0,0\t1,5\t2\n\t0,1\t1,6\t3\n[step]\nS\nTime\tPosition\tForce\ns\tmm\tN\n0\t1\t2\n1\t2\t3\n";
+    let bluehill = "Test : Rate 1,\"1.0\",mm/s\nResults Table 1\n,Load\n,(N)\n1,3\n\nTime,Extension,Load\n(s),(mm),(N)\n\
+        \"0.0\",\"1\",\"2\"\n\"0.1\",\"2\",\"3\"\nSpecimen label,b\nTime,Extension,Load\n(s),(mm),(N)\n0,1,2\n1,2,3\n";
     let wide: Vec<u8> = "\u{feff}"
         .encode_utf16()
         .chain(table.encode_utf16())
@@ -25,6 +27,7 @@ pub fn seeds() -> Vec<(&'static str, Vec<u8>)> {
         ("table", table.into()),
         ("mach-1", mach1.into()),
         ("rheometer", rheometer.into()),
+        ("bluehill", bluehill.into()),
         ("utf-16", wide),
         ("xlsx", fs::read(data.join("zwick.xlsx")).unwrap()),
         ("xls", fs::read(data.join("zwick.xls")).unwrap()),

@@ -10,6 +10,7 @@ mod disk;
 mod exports;
 mod faults;
 mod foreign;
+mod foreign_bluehill;
 mod foreign_damage;
 mod hostile;
 mod killed;

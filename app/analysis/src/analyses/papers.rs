@@ -44,13 +44,10 @@ pub fn paper(paper: &Paper, to: &Path, progress: &dyn Progress) -> Result<Done, 
 
 /// Writes a file that was not there.
 fn write_new(to: &Path, bytes: &[u8]) -> Result<(), String> {
-    use std::io::Write;
-    let failed = |err: std::io::Error| {
+    palpate_sessions::atomic::create(to, bytes).map_err(|err| {
         format!(
             "cannot write {} ({err}); choose a folder that may be written",
             to.display()
         )
-    };
-    let mut file = std::fs::File::create_new(to).map_err(failed)?;
-    file.write_all(bytes).map_err(failed)
+    })
 }

@@ -79,12 +79,14 @@ pub(super) fn run(args: &PlanArgs, output: &Output) -> Result<(), Failure> {
     };
     let report = plan(request, assumed, bench).map_err(failure)?;
     if let Some(file) = &args.picture {
-        std::fs::write(file, plan_plot::picture(&report)).map_err(|err| {
-            Failure::failed(format!(
-                "the picture cannot be written: {err}, {}",
-                file.display()
-            ))
-        })?;
+        palpate_sessions::atomic::replace(file, plan_plot::picture(&report).as_bytes()).map_err(
+            |err| {
+                Failure::failed(format!(
+                    "the picture cannot be written: {err}, {}",
+                    file.display()
+                ))
+            },
+        )?;
     }
     output.answer("plan", &report, || text::text(&report));
     Ok(())

@@ -145,7 +145,7 @@ impl FrameMeter {
             late_given_up_s: self.late_given_up_s,
         };
         let text = serde_json::to_string_pretty(&report).map_err(std::io::Error::other)?;
-        std::fs::write(path, text)
+        palpate_sessions::atomic::replace(path, text.as_bytes())
     }
 }
 

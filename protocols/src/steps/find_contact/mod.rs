@@ -185,10 +185,6 @@ impl Press {
 }
 
 impl StepKind for FindContact {
-    fn facts(&self) -> &'static Facts {
-        &FACTS
-    }
-
     fn pass(&self, known: &mut Known) {
         known.contact = true;
     }

@@ -4,14 +4,15 @@ use super::{ForeignPart, Sample};
 use chrono::{DateTime, Utc};
 use palpate_model::Nanos;
 use palpate_model::about::Labels;
+use palpate_sessions::atomic;
 use palpate_sessions::folder::{FolderError, SessionFolder, check_free_space};
 use palpate_sessions::imported::{Imported, ORIGINAL_FOLDER};
 use palpate_sessions::log::{BATCHES_PER_SEGMENT, FolderSegments, LogError, LogWriter};
 use palpate_sessions::manifest::{IMPORTED_TICKS_PER_S, Manifest, RECORD_VERSION};
 use palpate_sessions::record::{EndRecord, Row};
 use serde_json::Value;
-use std::fs::{self, File};
-use std::io::{self, Write};
+use std::fs;
+use std::io;
 use std::path::{Path, PathBuf};
 use thiserror::Error;
 
@@ -164,14 +165,8 @@ fn ticks(samples: &[Sample]) -> Result<Vec<u64>, KeepError> {
 fn keep_original(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), KeepError> {
     let below = folder.join(ORIGINAL_FOLDER);
     let path = below.join(name);
-    let write = || -> io::Result<()> {
-        fs::create_dir(&below)?;
-        let mut file = File::create_new(&path)?;
-        file.write_all(bytes)?;
-        file.sync_all()?;
-        File::open(&below)?.sync_all()
-    };
-    write().map_err(|source| KeepError::Original { path, source })
+    let written = fs::create_dir(&below).and_then(|()| atomic::create(&path, bytes));
+    written.map_err(|source| KeepError::Original { path, source })
 }
 
 /// A name for the folder of a part: that of the file and of the part, with nothing a path could mind.

@@ -1,6 +1,7 @@
 //! The layouts that are known, one file each: how a file is told to have it, and how it is cut into the measurements it
 //! holds. What the columns are, their units and their numbers is found out in the same way for all.
 
+mod bluehill;
 mod legacy;
 mod mach1;
 mod rheometer;
@@ -17,6 +18,7 @@ const ALL: &[Layout] = &[
     mach1::LAYOUT,
     rheometer::LAYOUT,
     workbook::LAYOUT,
+    bluehill::LAYOUT,
 ];
 
 /// What is known of a layout.
