@@ -200,8 +200,11 @@ pub(super) struct Led {
     /// Asked for a lead with every sample.
     pub leader: Leader,
     /// What is to be reported of it once the run is over, as an object and in words.
-    pub told: Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>,
+    pub report: LeadReport,
 }
+
+/// Makes an object, and words, of what led a run.
+type LeadReport = Box<dyn Fn(&Output) -> Option<(serde_json::Value, String)>>;
 
 pub(super) fn carry_out(
     plan: Plan,
@@ -396,7 +399,7 @@ fn report(view: &RunView, led: Option<&Led>, output: &Output) -> Result<(), Fail
     // What a failed disk, or another program, left is only known from what can be read.
     let left = view.log_error.as_ref().map(|_| examine(&view.folder));
     let kept = left.as_ref().map_or(view.samples, |left| left.samples);
-    let told = led.and_then(|led| (led.told)(output));
+    let told = led.and_then(|led| (led.report)(output));
     let (slave, slave_text) = told.unzip();
     let report = RunReport {
         plan: view.plan_name.clone(),

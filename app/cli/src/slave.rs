@@ -93,7 +93,7 @@ pub(super) fn run(args: &SlaveArgs, output: &Output) -> Result<(), Failure> {
     let led = Led {
         command: "haptics-slave",
         leader: slave,
-        told: Box::new(move |output| {
+        report: Box::new(move |output| {
             let leader = leading.lock().unwrap_or_else(PoisonError::into_inner);
             if let Some(reason) = leader.failure() {
                 output.note(&format!("nothing led the slave: {reason}"));

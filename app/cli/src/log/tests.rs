@@ -9,9 +9,9 @@
 
 use super::{begin, stop_rigs_on_panic};
 use palpate_drivers::Rig;
-use palpate_drivers::mark10::StandRig;
+use palpate_drivers::device::{DeviceRig, OpenError, Opened, RigDevice};
 use palpate_drivers::mark10::gauge::GaugeSettings;
-use palpate_drivers::mark10::stand::StandSettings;
+use palpate_drivers::mark10::stand::{self, StandSettings};
 use palpate_drivers::wire::{HostClock, Link, MemoryLink, pair};
 use palpate_emulators::Device;
 use palpate_emulators::mark10::{EmulatedStand, EmulatedStandSettings};
@@ -115,6 +115,16 @@ fn settings() -> StandSettings {
     }
 }
 
+/// A stand on a link that is there once.
+struct OnLink(Option<Box<dyn Link>>);
+
+impl RigDevice for OnLink {
+    fn open(&mut self, clock: &HostClock) -> Result<Opened, OpenError> {
+        let used = || OpenError::Thread("the link was used".into());
+        stand::open(self.0.take().ok_or_else(used)?, &settings(), clock)
+    }
+}
+
 /// The program that panics; it tells its parent what was written when.
 fn child(case: &str) {
     let log = begin(true);
@@ -130,7 +140,7 @@ fn child(case: &str) {
         seen: Arc::clone(&seen),
         log: palpate_sessions::rotating::log_folder(&folder),
     };
-    let mut rig = StandRig::on(Box::new(link), &settings(), clock).unwrap();
+    let mut rig = DeviceRig::open(OnLink(Some(Box::new(link))), clock).unwrap();
     seen.is_watched.store(true, Ordering::SeqCst);
     rig.send(RigCommand::MoveTo(MoveTo {
         target_pulses: 5_000,
