@@ -145,7 +145,7 @@ fn a_bundle_has_log_versions_and_findings_and_nothing_that_was_measured() {
     assert_eq!(names, expected);
     let text = |name: &str| String::from_utf8_lossy(&files[name]).into_owned();
     assert!(
-        text("versions.txt").contains("features window, emulators"),
+        text("versions.txt").contains("emulators, haptics, extremes"),
         "{}",
         text("versions.txt")
     );

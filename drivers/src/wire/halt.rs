@@ -53,11 +53,17 @@ impl HaltHandle {
     /// On the link's own thread it does nothing: there the farewell stops the axis, see [`after_farewell`].
     #[must_use]
     pub fn halt(&self, patience: Duration) -> bool {
-        if std::thread::current().id() == self.owner {
+        if self.is_own_thread() {
             return false;
         }
         let number = self.standing.sent.fetch_add(1, Ordering::AcqRel) + 1;
         self.stops.try_send((number, RigCommand::Halt)).is_ok() && self.is_written(number, patience)
+    }
+
+    /// Whether this is the link's own thread, which writes nothing while it waits.
+    #[must_use]
+    pub fn is_own_thread(&self) -> bool {
+        std::thread::current().id() == self.owner
     }
 
     /// Waits about so long until so many stops are written. Whether they are.

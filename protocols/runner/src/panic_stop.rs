@@ -72,8 +72,8 @@ impl OpenRig {
         let choice = Operator::Halt;
         let is_asked = std::thread::current().id() != self.runner
             && self.requests.try_send(Request::Operator(choice)).is_ok();
-        let Some(link) = &self.link else {
-            // A rig without wires moves only while its runner asks it.
+        // A rig without wires moves only while its runner asks it; a link's own thread stops it with the farewell.
+        let Some(link) = self.link.as_ref().filter(|link| !link.is_own_thread()) else {
             return;
         };
         if !(is_asked && link.is_written(written + 1, RUNNER_PATIENCE)) {
