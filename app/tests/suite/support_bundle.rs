@@ -15,7 +15,8 @@ fn unpacked(bundle: &Path) -> BTreeMap<String, Vec<u8>> {
         let mut file = zip.by_index(index).unwrap();
         let mut bytes = Vec::new();
         file.read_to_end(&mut bytes).unwrap();
-        assert!(files.insert(file.name().to_owned(), bytes).is_none());
+        let name = file.name().unwrap().into_owned();
+        assert!(files.insert(name, bytes).is_none());
     }
     files
 }
