@@ -41,10 +41,11 @@ fn click_row(flow: &mut Flow, number: usize, modifiers: Modifiers) {
     flow.window.run_steps(3);
 }
 
-/// Takes a name from a list that is open.
+/// Takes a name from a list that is open, once it is there: the catalog may still be reading what was said.
 fn pick(flow: &mut Flow, name: &str) {
     flow.wait(name, |window| {
-        window.query_by_role_and_label(Role::Button, name).is_some()
+        let mut found = window.query_all_by_role_and_label(Role::Button, name);
+        found.next().is_some()
     });
     let button = flow.window.get_by_role_and_label(Role::Button, name);
     button.click_accesskit();
