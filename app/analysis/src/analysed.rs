@@ -45,36 +45,59 @@ pub struct ForceChange {
 
 /// Opens a session as an analysis of it does; without a name as its edits leave it.
 pub fn open(path: &Path, name: Option<&str>) -> Result<Opened, SourceError> {
-    let edited = edited::open(path)?;
+    let mut edited = edited::open(path)?;
     let analyses = Analyses::read(path, &edited.session.manifest.session_id)?;
-    let mut opened = Opened {
+    let read_by = ReadBy::of(path, &analyses, name)?;
+    let session = &mut edited.session;
+    session.notes.extend(read_by.notes);
+    if let Some((_, calibration)) = &read_by.calibration {
+        recalibrate(session, calibration)?;
+    }
+    Ok(Opened {
         edited,
         analyses,
-        left_out_s: Vec::new(),
-    };
-    // A fit reads the session as what it is based on did. Each is older than the one that names it.
-    let mut next = name.map(str::to_owned);
-    while let Some(name) = next.take() {
-        let one = opened.analyses.get(&name)?.clone();
-        let changed = changed_inputs(&one, &inputs_of(path)?);
-        let session = &mut opened.edited.session;
-        session.notes.extend(made_before(&name, &changed));
-        match one.what {
-            Analysed::Fit { based_on, .. } => next = based_on,
-            Analysed::Recalibration { calibration, .. } => {
-                let calibration = serde_json::from_value(calibration).map_err(bad_calibration)?;
-                recalibrate(session, &calibration)?;
-                session.notes.push(made_with(&name, &calibration));
+        left_out_s: read_by.left_out_s,
+    })
+}
+
+/// What an analysis reads a session with.
+#[derive(Default)]
+struct ReadBy {
+    /// What is to be said of that.
+    notes: Vec<String>,
+    /// The calibration that forces are made anew with, as it was written and as it is.
+    calibration: Option<(serde_json::Value, Calibration)>,
+    /// Stretches whose forces do not count.
+    left_out_s: Vec<[f64; 2]>,
+}
+
+impl ReadBy {
+    fn of(path: &Path, analyses: &Analyses, name: Option<&str>) -> Result<Self, SourceError> {
+        let mut read_by = Self::default();
+        // A fit reads the session as what it is based on did. Each is older than the one that names it.
+        let mut next = name.map(str::to_owned);
+        while let Some(name) = next.take() {
+            let one = analyses.get(&name)?.clone();
+            let changed = changed_inputs(&one, &inputs_of(path)?);
+            read_by.notes.extend(made_before(&name, &changed));
+            match one.what {
+                Analysed::Fit { based_on, .. } => next = based_on,
+                Analysed::Recalibration { calibration, .. } => {
+                    let own = serde_json::from_value(calibration.clone());
+                    let own = own.map_err(bad_calibration)?;
+                    read_by.notes.push(made_with(&name, &own));
+                    read_by.calibration = Some((calibration, own));
+                }
+                Analysed::Mask { left_out_s } => {
+                    read_by.notes.push(masked(&name, left_out_s.len()));
+                    read_by.left_out_s = left_out_s;
+                }
+                // It never counts, so it is not found.
+                Analysed::Withdrawal => {}
             }
-            Analysed::Mask { left_out_s } => {
-                session.notes.push(masked(&name, left_out_s.len()));
-                opened.left_out_s = left_out_s;
-            }
-            // It never counts, so it is not found.
-            Analysed::Withdrawal => {}
         }
+        Ok(read_by)
     }
-    Ok(opened)
 }
 
 fn made_before(name: &str, changed: &[String]) -> Option<String> {
@@ -210,39 +233,24 @@ pub fn of_outline(
     outline: Outline,
     name: Option<&str>,
 ) -> Result<Passing, SourceError> {
-    let edited = edited::of_outline(path, outline)?;
+    let mut edited = edited::of_outline(path, outline)?;
     let analyses = Analyses::read(path, &edited.outline.manifest.session_id)?;
-    let mut passing = Passing {
+    let read_by = ReadBy::of(path, &analyses, name)?;
+    let outline = &mut edited.outline;
+    outline.notes.extend(read_by.notes);
+    let mut anew = None;
+    if let Some((document, calibration)) = read_by.calibration {
+        let curve = calibration.curve().map_err(bad_calibration)?;
+        let found = decisions_among(&outline.entries)?;
+        anew = Some((curve, tares(&found).collect()));
+        outline.manifest.calibration = document;
+    }
+    Ok(Passing {
         edited,
         analyses,
-        left_out_s: Vec::new(),
-        anew: None,
-    };
-    let mut next = name.map(str::to_owned);
-    while let Some(name) = next.take() {
-        let one = passing.analyses.get(&name)?.clone();
-        let changed = changed_inputs(&one, &inputs_of(path)?);
-        let outline = &mut passing.edited.outline;
-        outline.notes.extend(made_before(&name, &changed));
-        match one.what {
-            Analysed::Fit { based_on, .. } => next = based_on,
-            Analysed::Recalibration { calibration, .. } => {
-                let own: Calibration =
-                    serde_json::from_value(calibration.clone()).map_err(bad_calibration)?;
-                let curve = own.curve().map_err(bad_calibration)?;
-                let found = decisions_among(&outline.entries)?;
-                passing.anew = Some((curve, tares(&found).collect()));
-                outline.manifest.calibration = calibration;
-                outline.notes.push(made_with(&name, &own));
-            }
-            Analysed::Mask { left_out_s } => {
-                outline.notes.push(masked(&name, left_out_s.len()));
-                passing.left_out_s = left_out_s;
-            }
-            Analysed::Withdrawal => {}
-        }
-    }
-    Ok(passing)
+        left_out_s: read_by.left_out_s,
+        anew,
+    })
 }
 
 impl Passing {

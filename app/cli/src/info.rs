@@ -150,10 +150,25 @@ fn text(info: &Info<'_>) -> String {
     );
     let signal = info.signal.map(said::signal);
     lines.extend(signal.map(|lines| format!("signal     {}", lines.join("\n           "))));
-    lines.push(format!(
+    lines.extend(recorded(info));
+    lines.extend(info.edits.iter().map(edit_text));
+    if !info.tags.is_empty() {
+        lines.push(format!("tags       {}", info.tags.join(", ")));
+    }
+    let review = info.review.as_ref().map(said::review);
+    lines.extend(review.map(|review| format!("review     {review}")));
+    lines.extend(info.analyses.iter().map(analysis_text));
+    let notes = info.notes.iter();
+    lines.extend(notes.map(|note| format!("note       {}", one_line(note))));
+    lines.join("\n")
+}
+
+/// What was recorded, and how that ended.
+fn recorded(info: &Info<'_>) -> Vec<String> {
+    let mut lines = vec![format!(
         "written by palpate {}, engine {}",
         info.software_version, info.engine_version
-    ));
+    )];
     lines.push(format!(
         "samples    {} over {:.1} s",
         info.samples, info.duration_s
@@ -194,19 +209,7 @@ fn text(info: &Info<'_>) -> String {
     );
     let facts = info.base.facts();
     lines.extend(facts.map(|(name, mm, error)| format!("{name:<10} {mm:.3} ± {error:.3} mm")));
-    lines.extend(info.edits.iter().map(edit_text));
-    if !info.tags.is_empty() {
-        lines.push(format!("tags       {}", info.tags.join(", ")));
-    }
-    let review = info.review.as_ref().map(said::review);
-    lines.extend(review.map(|review| format!("review     {review}")));
-    lines.extend(info.analyses.iter().map(analysis_text));
-    lines.extend(
-        info.notes
-            .iter()
-            .map(|note| format!("note       {}", one_line(note))),
-    );
-    lines.join("\n")
+    lines
 }
 
 fn imported_text(imported: &Imported) -> String {

@@ -268,9 +268,7 @@ fn read_failure(err: ReadError) -> Failure {
 fn sources_failure(err: SourcesError) -> Failure {
     match err {
         SourcesError::Folder { .. } => Failure::failed(err),
-        SourcesError::Source { path, reason } => {
-            source_failure(*reason).of(&path.display().to_string())
-        }
+        SourcesError::Source { reason, .. } => source_failure(*reason),
         SourcesError::Rejected(_) => Failure::usage(format!(
             "{err}; add --include-rejected to take them all the same"
         )),

@@ -81,9 +81,6 @@ fn failure(err: SelectFailure) -> Failure {
         SelectFailure::Sources(err) => sources_failure(err),
         SelectFailure::Specimens { .. } => Failure::usage(format!("--specimens: {err}")),
         SelectFailure::Select(SelectError::Fit(_) | SelectError::Ended) => Failure::failed(err),
-        SelectFailure::Select(SelectError::HoldOut(_)) => Failure::usage(format!(
-            "{err}; --specimens A,A,B names them, --hold-out says what"
-        )),
         err => Failure::usage(err),
     }
 }

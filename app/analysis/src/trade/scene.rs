@@ -10,7 +10,7 @@ use palpate_haptics::surface::{
 use palpate_model::units::{Newtons, Seconds};
 use palpate_model::viscoelastic::ModifiedKelvin;
 use palpate_rheology::integrators::Scheme;
-use palpate_rheology::trade::Cost;
+use palpate_rheology::trade::{Cost, FamilyRow};
 use std::hint::black_box;
 
 /// Tick of the scene in s.
@@ -158,6 +158,12 @@ pub fn measure_scene(
     let Some(costs) = costs else {
         return Ok(None);
     };
+    with_times(&mut curves, &costs, &rows);
+    Ok(Some(curves))
+}
+
+/// Gives every point its time; `costs` are those of meshes, cuts, integrators and families in turn.
+fn with_times(curves: &mut SceneCurves, costs: &[Cost], rows: &[FamilyRow]) {
     let mut micros = costs.iter().map(|cost: &Cost| 1e-3 * cost.ns);
     let of_meshes = micros.by_ref().take(curves.meshes.len());
     let slots = curves.meshes.iter_mut().map(|point| &mut point.cost_us);
@@ -182,7 +188,6 @@ pub fn measure_scene(
             cost_us,
         })
         .collect();
-    Ok(Some(curves))
 }
 
 #[cfg(test)]

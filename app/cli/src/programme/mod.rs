@@ -91,14 +91,7 @@ pub(super) fn run(
             },
         }
     };
-    for task in &programme.tasks {
-        if let Some(plan) = task.plan(1, None) {
-            gate(&plan).map_err(|reason| {
-                let message = format!("task '{}': {reason}", task.name);
-                refuse(file, &Problem::error(task.line, message))
-            })?;
-        }
-    }
+    check_gates(file, &programme, &gate)?;
     let folder = match &how.out {
         Some(folder) => folder.clone(),
         None => {
@@ -135,6 +128,23 @@ pub(super) fn run(
     let done = watch(&programme, &checksum(&text), laboratory, asking, output)?;
     drop(runner);
     leave(&programme, &folder, &done, output)
+}
+
+/// Refuses before anything moves what today's check of the rig does not let run.
+fn check_gates(
+    file: &Path,
+    programme: &Programme,
+    gate: &dyn Fn(&Plan) -> Result<Vec<String>, String>,
+) -> Result<(), Failure> {
+    for task in &programme.tasks {
+        if let Some(plan) = task.plan(1, None) {
+            gate(&plan).map_err(|reason| {
+                let message = format!("task '{}': {reason}", task.name);
+                refuse(file, &Problem::error(task.line, message))
+            })?;
+        }
+    }
+    Ok(())
 }
 
 /// Carries the programme out with a line of progress.

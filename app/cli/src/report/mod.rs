@@ -170,10 +170,9 @@ fn html(args: &ReportArgs, to: &Path, output: &Output) -> Result<(), Failure> {
     let made = dossier::made(wall_now().into());
     let page = dossier::write(&wanted, args.align.into(), &made, &output.count_bar(0));
     let page = page.map_err(|err| match err {
-        ReportError::Source(path, err) => match super::source_failure(*err) {
-            Failure::Usage(text) => Failure::Usage(format!("{}: {text}", path.display())),
-            Failure::Failed(text) => Failure::Failed(format!("{}: {text}", path.display())),
-        },
+        ReportError::Source(path, err) => {
+            super::source_failure(*err).of(&path.display().to_string())
+        }
         cancelled @ ReportError::Cancelled => Failure::failed(cancelled),
     })?;
     let (claims, _) = dossier::claims(&page).map_err(Failure::failed)?;

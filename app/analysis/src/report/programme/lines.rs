@@ -1,0 +1,120 @@
+//! What the page says of each run, and of each specimen.
+
+use crate::edited::Edited;
+use crate::source::SourceError;
+use palpate_runner::programme::{FINISHED, REFUSED};
+use palpate_sessions::Manifest;
+use serde::Serialize;
+use std::path::Path;
+
+/// One run in the table of the page.
+#[derive(Clone, Debug, Serialize)]
+pub struct RunLine {
+    /// Its task.
+    pub task: String,
+    /// Which repeat, from 1.
+    pub repeat: u32,
+    /// Which attempt at it, from 1.
+    pub attempt: u32,
+    /// Its session folder, from the programme's.
+    pub session: String,
+    /// How it ended; none if it broke off.
+    pub ending: Option<String>,
+    /// Whether its session is no longer what the journal says it was; none if it is.
+    pub lost: Option<Lost>,
+    /// Who ran it, as its session says.
+    pub operator: String,
+    /// What was indented, as its session says.
+    pub specimen: String,
+    /// What it is worth, with the reason where it is not valid; none if nobody said.
+    pub verdict: Option<String>,
+    /// Session time in s, where the session could be read.
+    pub duration_s: Option<f64>,
+    /// Highest force in N, where force was known.
+    pub force_peak_n: Option<f64>,
+}
+
+/// What became of a session that was recorded.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Lost {
+    /// It is not there.
+    Missing,
+    /// It is there and not as it was written.
+    Damaged,
+}
+
+impl Lost {
+    pub(super) const fn word(self) -> &'static str {
+        match self {
+            Self::Missing => "missing",
+            Self::Damaged => "damaged",
+        }
+    }
+
+    /// What became of a session, and why that is known. Of a run that broke off or was refused nothing is expected.
+    pub(super) fn of(
+        opened: &Result<Edited, SourceError>,
+        path: &Path,
+        ending: Option<&str>,
+    ) -> Option<(Self, String)> {
+        let ending = ending.filter(|ending| *ending != REFUSED)?;
+        match opened {
+            Err(err) if path.exists() => Some((Self::Damaged, err.to_string())),
+            Err(err) => Some((Self::Missing, err.to_string())),
+            // A recording that a full disk cut short ended by abort, and has no end either.
+            Ok(one) if ending == FINISHED && one.session.end.is_none() => Some((
+                Self::Damaged,
+                "it breaks off, and the journal says that it was finished; restore it from a backup".into(),
+            )),
+            Ok(_) => None,
+        }
+    }
+}
+
+/// What sessions tell of one specimen.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct SpecimenPart {
+    /// Its name.
+    pub specimen: String,
+    /// With which probe it was indented.
+    pub indenter: String,
+    /// What else is told of it, by key; not its place in the series.
+    pub told: Vec<(String, String)>,
+}
+
+impl SpecimenPart {
+    pub(super) fn of(manifest: &Manifest) -> Self {
+        let lines = manifest.about.lines().into_iter();
+        Self {
+            specimen: manifest.specimen.clone(),
+            indenter: manifest.indenter.clone(),
+            told: lines
+                .filter(|(key, _)| !key.starts_with("series."))
+                .map(|(key, value)| (key.to_owned(), value))
+                .collect(),
+        }
+    }
+
+    pub(super) fn text(&self) -> String {
+        let told = self.told.iter();
+        let told: Vec<String> = told
+            .map(|(key, value)| format!("  {key}: {value}"))
+            .collect();
+        let probe = match self.indenter.as_str() {
+            "" => String::new(),
+            indenter => format!(", with the {indenter}"),
+        };
+        format!("{}{probe}\n{}", self.specimen, told.join("\n"))
+    }
+}
+
+impl RunLine {
+    pub(super) fn ended_by(&self) -> String {
+        let ending = self.ending.as_deref().unwrap_or("breaking off");
+        match self.lost {
+            Some(lost) => format!("{ending}, now {}", lost.word()),
+            None => ending.to_owned(),
+        }
+    }
+}
