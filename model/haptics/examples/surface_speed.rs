@@ -10,15 +10,13 @@
 //! The longest ticks are mostly the machine's: the first line says what it does to work that is always
 //! the same.
 //!
-//! A naive tick recovers the whole grid, pushes with a queue and a set that allocate, and renews all
-//! normals; the others renew them where something changed, timed apart, since they belong to the
-//! thread of the graphics.
+//! A naive tick recovers the whole grid and pushes with a queue and a set that allocate.
 
 #![expect(clippy::print_stdout, reason = "an example that prints figures")]
 #![expect(clippy::disallowed_methods, reason = "it measures time")]
 
 use palpate_haptics::surface::{
-    Contact, Cut, Grid, HeightField, Method, Node, Normals, Recovery, Rect, Shear, Side, Surface,
+    Contact, Cut, Grid, HeightField, Method, Node, Recovery, Shear, Side, Surface,
 };
 use palpate_model::Seconds;
 use palpate_test_support::naive_surface as naive;
@@ -103,7 +101,7 @@ fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
     let recovery = Recovery::new(Seconds(TAU), Seconds(TICK)).expect("a recovery");
     let mut surface = Surface::new(field, method, recovery, Cut::NONE).expect("a surface");
     let mut times = Vec::with_capacity(ticks);
-    let (mut moved, mut dirty) = (0, Rect::EMPTY);
+    let mut moved = 0;
     // The first tenth is not counted: memory comes to the cache, and the trail of the tool appears.
     for tick in 0..ticks + ticks / 10 {
         let (node, z) = case.tool(n, tick);
@@ -111,32 +109,19 @@ fn measure(n: usize, case: Case, method: Method, ticks: usize) -> f64 {
         let start = Instant::now();
         let told = black_box(surface.tick(black_box(&contact)));
         let taken = start.elapsed().as_secs_f64();
-        dirty = told.dirty;
         if tick >= ticks / 10 {
             times.push(taken * 1e6);
             moved += told.moved.moved;
         }
     }
-    let rate = line(method.name(), &mut times, moved as f64 / ticks as f64);
-    if method == Method::Envelope {
-        let mut normals = Normals::new(surface.field().as_it_is());
-        let mut drawn = Vec::new();
-        for _ in 0..(ticks / 20).clamp(1, 200) {
-            let start = Instant::now();
-            black_box(normals.update(surface.field().as_it_is(), black_box(dirty)));
-            drawn.push(start.elapsed().as_secs_f64() * 1e6);
-        }
-        let [p50, p99, _, _] = percentiles(&mut drawn);
-        println!("  its normals, where dirty{p50:>10.1}{p99:>10.1}");
-    }
-    rate
+    line(method.name(), &mut times, moved as f64 / ticks as f64)
 }
 
-/// Nodes per ms of the naive tick without and with its normals.
-fn measure_naive(n: usize, case: Case, ticks: usize) -> [f64; 2] {
+/// Nodes per ms of the naive tick.
+fn measure_naive(n: usize, case: Case, ticks: usize) -> f64 {
     let (rest, mut now) = (vec![0.0; n * n], vec![0.0; n * n]);
     let keep = (-TICK / TAU).exp();
-    let (mut chain, mut whole, mut moved) = (Vec::new(), Vec::new(), 0);
+    let (mut chain, mut moved) = (Vec::new(), 0);
     for tick in 0..ticks {
         let (node, z) = case.tool(n, tick);
         let seed = usize::from(node.row) * n + usize::from(node.column);
@@ -146,14 +131,9 @@ fn measure_naive(n: usize, case: Case, ticks: usize) -> [f64; 2] {
         }
         moved += naive::push(&mut now, n, |_, _| SHEAR, (seed, z), naive::Order::First);
         chain.push(start.elapsed().as_secs_f64() * 1e6);
-        black_box(naive::normals(black_box(&now), n, 0.5));
-        whole.push(start.elapsed().as_secs_f64() * 1e6);
     }
-    let moved = moved as f64 / ticks as f64;
-    [
-        line("naive", &mut chain, moved),
-        line("naive, with its normals", &mut whole, moved),
-    ]
+    black_box(&now);
+    line("naive", &mut chain, moved as f64 / ticks as f64)
 }
 
 /// What the machine alone adds: the same few instructions each time, without memory.
@@ -203,8 +183,7 @@ fn main() {
                     few
                 };
                 let rate = measure(n, case, method, ticks.max(10));
-                let [chain, whole] = naive.map(|naive| rate / naive);
-                println!("    {chain:.0} times naive, {whole:.0} with its normals");
+                println!("    {:.0} times naive", rate / naive);
             }
         }
     }

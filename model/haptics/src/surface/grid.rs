@@ -172,31 +172,6 @@ impl Rect {
         }
     }
 
-    /// What is in both.
-    #[must_use]
-    pub fn intersected(self, other: Self) -> Self {
-        let meet = |a: [u32; 2], b: [u32; 2]| [a[0].max(b[0]), a[1].min(b[1])];
-        Self {
-            columns: meet(self.columns, other.columns),
-            rows: meet(self.rows, other.rows),
-        }
-    }
-
-    /// With a border of one more node, as far as the grid goes.
-    #[must_use]
-    pub fn grown(self, grid: &Grid) -> Self {
-        if self.is_empty() {
-            return self;
-        }
-        let grow = |[from, to]: [u32; 2], count: u16| {
-            [from.saturating_sub(1), (to + 1).min(u32::from(count))]
-        };
-        Self {
-            columns: grow(self.columns, grid.columns),
-            rows: grow(self.rows, grid.rows),
-        }
-    }
-
     /// How many nodes.
     #[must_use]
     pub fn nodes(&self) -> usize {

@@ -41,13 +41,6 @@ impl<'a> Heights<'a> {
         self.of
     }
 
-    /// One row.
-    #[inline(always)]
-    pub(super) fn row(&self, row: usize) -> &'a [f64] {
-        let columns = self.grid.columns();
-        &self.of[row * columns..(row + 1) * columns]
-    }
-
     /// Height and unit normal of the bilinear surface at a place in mm; `None` outside the mesh or where
     /// a number is none.
     #[must_use]
@@ -132,7 +125,7 @@ impl<'a> Heights<'a> {
 
 /// Unit normal of a face by its diagonals, from the heights of its corners.
 #[inline(always)]
-pub(super) fn face([a, b, c, d]: [f64; 4], spacing: f64) -> [f64; 3] {
+fn face([a, b, c, d]: [f64; 4], spacing: f64) -> [f64; 3] {
     // (1, 1, p / spacing) x (-1, 1, q / spacing), times the spacing.
     let (p, q) = (d - a, c - b);
     unit([q - p, -p - q, 2.0 * spacing])

@@ -3,7 +3,6 @@
 use super::grid::{Grid, Node, Spans};
 use super::heights::Heights;
 use super::mesh_error::MeshError;
-use serde::{Deserialize, Serialize};
 
 /// Heights are within a kilometre of zero: sums and differences of any two stay finite.
 pub const HIGHEST_MM: f64 = 1e6;
@@ -30,18 +29,8 @@ pub enum Pins {
     Nodes(Box<[bool]>),
 }
 
-/// MinDist and MaxDist: how near and how far neighbours may be along an axis, in mm (Gibson, "3D
-/// ChainMail", Symposium on Interactive 3D Graphics 1997). They are kept for meshes that have them; a
-/// height field moves along z alone, where they never act.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Distances {
-    /// MinDist.
-    pub min: f64,
-    /// MaxDist.
-    pub max: f64,
-}
-
-/// The parts of a mesh that have no effect, and why.
+/// The parts of a ChainMail mesh that have no effect, and why: MinDist and MaxDist, how near and how far neighbours may be
+/// along an axis (Gibson, "3D ChainMail", Symposium on Interactive 3D Graphics 1997).
 pub const INERT: [(&str, &str); 2] = [
     (
         "MinDist",
@@ -61,7 +50,6 @@ pub struct HeightField {
     pub(super) now: Box<[f64]>,
     pub(super) shear: Shear,
     pub(super) pins: Pins,
-    distances: Distances,
     /// Where `now` may differ from `rest`.
     pub(super) displaced: Spans,
     /// Nothing is now below or above these.
@@ -113,10 +101,6 @@ impl HeightField {
             rest: rest.into(),
             shear,
             pins: Pins::None,
-            distances: Distances {
-                min: 0.0,
-                max: 2.0 * grid.spacing(),
-            },
             displaced: Spans::none(&grid),
             bounds: rest_bounds,
             rest_bounds,
@@ -137,17 +121,6 @@ impl HeightField {
             counted("marks of pinned nodes", marks.len(), &self.grid)?;
         }
         self.pins = pins;
-        Ok(self)
-    }
-
-    /// With other distances than 0 and twice the spacing. They are [inert](INERT).
-    pub fn with_distances(mut self, distances: Distances) -> Result<Self, MeshError> {
-        let Distances { min, max } = distances;
-        let spacing = self.grid.spacing();
-        if !((0.0..=spacing).contains(&min) && max >= spacing) {
-            return Err(MeshError::Distances { min, max, spacing });
-        }
-        self.distances = distances;
         Ok(self)
     }
 
@@ -185,12 +158,6 @@ impl HeightField {
     #[must_use]
     pub fn shear(&self) -> &Shear {
         &self.shear
-    }
-
-    /// MinDist and MaxDist, which are [inert](INERT).
-    #[must_use]
-    pub fn distances(&self) -> Distances {
-        self.distances
     }
 
     /// What is pinned.

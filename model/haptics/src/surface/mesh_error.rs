@@ -43,18 +43,6 @@ pub enum MeshError {
     /// No limit.
     #[error("a MaxShear of {0} mm is not possible; it is zero or more, and may be infinite")]
     Shear(f64),
-    /// No distances.
-    #[error(
-        "MinDist {min} mm and MaxDist {max} mm do not fit nodes {spacing} mm apart; MinDist is from 0 to the spacing and MaxDist at least the spacing"
-    )]
-    Distances {
-        /// MinDist.
-        min: f64,
-        /// MaxDist.
-        max: f64,
-        /// Of the nodes.
-        spacing: f64,
-    },
     /// The surface at rest breaks its own limits.
     #[error(
         "at rest, column {column}, row {row} is {rise} mm from its neighbour in height, and MaxShear there is {limit} mm; make the rest surface smoother or MaxShear larger"

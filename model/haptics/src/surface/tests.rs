@@ -129,26 +129,6 @@ fn meshes_that_cannot_be_are_refused_in_words() {
     let field = made(&ramp, one(0.1)).unwrap();
     let marks = Pins::Nodes([true].into());
     assert!(field.clone().pinned(marks).is_err());
-    for (min, max) in [(-0.1, 2.0), (1.1, 2.0), (0.5, 0.9), (f64::NAN, 2.0)] {
-        let refused = field.clone().with_distances(Distances { min, max });
-        assert!(matches!(refused, Err(MeshError::Distances { .. })));
-    }
-}
-
-#[test]
-fn distances_are_kept_and_have_no_effect() {
-    let shape = |distances| {
-        let field = field(11).with_distances(distances).unwrap();
-        let mut surface = Surface::new(field, Method::Envelope, Recovery::NONE, Cut::NONE).unwrap();
-        let at = Node { column: 4, row: 5 };
-        surface.tick(&[Contact::at(surface.field().grid(), at, -1.3, Side::Push)]);
-        (surface.field().distances(), surface.heights().to_vec())
-    };
-    let [narrow, wide] =
-        [(1.0, 1.0), (0.0, f64::INFINITY)].map(|(min, max)| Distances { min, max });
-    assert_eq!((shape(narrow).0, shape(wide).0), (narrow, wide));
-    assert_eq!(shape(narrow).1, shape(wide).1);
-    assert_eq!(INERT.map(|(name, _)| name), ["MinDist", "MaxDist"]);
 }
 
 #[test]
