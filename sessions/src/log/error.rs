@@ -1,7 +1,10 @@
-//! Why a log could not be written.
+//! Why a log could not be written, and why one could not be read.
 
 use super::sink::Alteration;
+use crate::folder::LOG_FILE;
+use crate::manifest::RECORD_VERSION;
 use std::io;
+use std::path::PathBuf;
 use thiserror::Error;
 
 /// A session could not be written.
@@ -85,4 +88,56 @@ pub(crate) fn encode_error(what: &'static str) -> impl Fn(mcap::McapError) -> Lo
         what,
         reason: err.to_string(),
     }
+}
+
+/// A session could not be opened.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReadError {
+    /// Nothing is at the path.
+    #[error("there is no session at {}; check the path", path.display())]
+    Missing {
+        /// The path given.
+        path: PathBuf,
+    },
+    /// Something is at the path, but not a session.
+    #[error("{} is not a palpate session ({reason}); choose a session folder or its {LOG_FILE}", path.display())]
+    NotASession {
+        /// The path given.
+        path: PathBuf,
+        /// How it differs.
+        reason: String,
+    },
+    /// The session was written by a newer version of the program.
+    #[error(
+        "{} was written by palpate {software_version} with record version {record_version}; this palpate reads up to {RECORD_VERSION}; update palpate", path.display()
+    )]
+    Newer {
+        /// The log.
+        path: PathBuf,
+        /// The program that wrote it.
+        software_version: String,
+        /// Its record version.
+        record_version: u64,
+    },
+    /// The session is not as it was written.
+    #[error(
+        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or keep what is whole with palpate recover", path.display()
+    )]
+    Damaged {
+        /// The log.
+        path: PathBuf,
+        /// Where in the file.
+        offset: u64,
+        /// What is wrong there.
+        reason: String,
+    },
+    /// The system does not let the session be read.
+    #[error("cannot read {} ({source}); check its permissions and the disk", path.display())]
+    Io {
+        /// The log.
+        path: PathBuf,
+        /// What the system said.
+        source: io::Error,
+    },
 }

@@ -7,72 +7,19 @@
 //! The segments of a long recording are read one after the other as if they were one file: sample
 //! numbers, message numbers and entries must go on where the segment before stopped.
 
+pub use super::error::ReadError;
+
 use super::content::{Content, Part, Refusal};
 use super::files::{absent_spare, away, check_files, find_files};
 use super::frames::ChunkReader;
 use super::source::Source;
 use super::walk::walk;
 use crate::block::Block;
-use crate::folder::LOG_FILE;
 use crate::health::HealthSummary;
-use crate::manifest::{Manifest, RECORD_VERSION};
+use crate::manifest::Manifest;
 use crate::record::{EndRecord, Entry, Row};
 use palpate_model::Nanos;
-use std::io;
 use std::path::{Path, PathBuf};
-use thiserror::Error;
-
-/// A session could not be opened.
-#[derive(Debug, Error)]
-#[non_exhaustive]
-pub enum ReadError {
-    /// Nothing is at the path.
-    #[error("there is no session at {}; check the path", path.display())]
-    Missing {
-        /// The path given.
-        path: PathBuf,
-    },
-    /// Something is at the path, but not a session.
-    #[error("{} is not a palpate session ({reason}); choose a session folder or its {LOG_FILE}", path.display())]
-    NotASession {
-        /// The path given.
-        path: PathBuf,
-        /// How it differs.
-        reason: String,
-    },
-    /// The session was written by a newer version of the program.
-    #[error(
-        "{} was written by palpate {software_version} with record version {record_version}; this palpate reads up to {RECORD_VERSION}; update palpate", path.display()
-    )]
-    Newer {
-        /// The log.
-        path: PathBuf,
-        /// The program that wrote it.
-        software_version: String,
-        /// Its record version.
-        record_version: u64,
-    },
-    /// The session is not as it was written.
-    #[error(
-        "{} is damaged at byte {offset} ({reason}); restore it from a backup, or recover what is whole", path.display()
-    )]
-    Damaged {
-        /// The log.
-        path: PathBuf,
-        /// Where in the file.
-        offset: u64,
-        /// What is wrong there.
-        reason: String,
-    },
-    /// The system does not let the session be read.
-    #[error("cannot read {} ({source}); check its permissions and the disk", path.display())]
-    Io {
-        /// The log.
-        path: PathBuf,
-        /// What the system said.
-        source: io::Error,
-    },
-}
 
 /// A recorded session in memory.
 #[derive(Clone, Debug, PartialEq)]

@@ -107,6 +107,8 @@ fn specimen_is_read_with_what_the_file_says_of_it() {
         ("line 6".into(), "line 7".into())
     );
     assert_eq!(said("force"), "column 3 'Load' in N");
+    // One that nobody named has no name.
+    assert_eq!(names(&detected(&specimen("", 0))), [""]);
 }
 
 #[test]

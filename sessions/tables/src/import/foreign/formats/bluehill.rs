@@ -47,7 +47,7 @@ const LINES_OF_HEAD: usize = 2;
 /// Last word of the fact that names a specimen.
 const LABEL: &str = "specimen label";
 
-/// A line that no other program writes above names with a time, or nothing above them that Bluehill does not write.
+/// Names with a time, below a line that only Bluehill writes or below none that it does not.
 fn is_it(lines: &[Line<'_>], delimiter: Delimiter) -> bool {
     let lines = &lines[..lines.len().min(LINES_LOOKED_AT)];
     let find = |index: usize| Some((index, head(&lines[index..], delimiter).ok()??));
@@ -138,8 +138,10 @@ impl Specimen {
             .map(String::as_str)
             .filter(|value| !value.is_empty())
             .collect();
-        let is_title = values.is_empty() && key.to_lowercase().starts_with("specimen");
-        if is_title {
+        let word = key.to_lowercase();
+        let after = word.strip_prefix("specimen").map(str::trim);
+        let is_number = |after: &str| after.bytes().all(|byte| byte.is_ascii_digit());
+        if values.is_empty() && after.is_some_and(is_number) {
             self.name = key.to_owned();
         } else if key.is_empty() || texts.len() < 2 && !begins(texts, RAW_DATA) {
             return Err(format!(
