@@ -299,6 +299,10 @@ fn source_failure(err: SourceError) -> Failure {
             "--include-rejected of fit and select takes it all the same, and 'palpate verdict' changes the verdict",
         ),
         SourceError::Imported { .. } => with("'palpate info' tells what it holds"),
+        // The reader of tables says it in words only.
+        SourceError::Table(_) if err.to_string().contains("no header") => {
+            with("--columns names them")
+        }
         SourceError::NoCycles => {
             Failure::Failed(format!("{err}; 'palpate report' tells what happened in it"))
         }

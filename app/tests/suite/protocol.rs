@@ -157,8 +157,8 @@ fn a_built_in_protocol_is_shown_copied_and_previewed() {
     let picture = std::fs::read_to_string(at.join("plan.svg")).unwrap();
     assert_eq!(
         picture.matches("stroke-width=\"1.6\"").count(),
-        2,
-        "depth and force"
+        3,
+        "depth, speed and force"
     );
     let again = typed(at, "protocol preview copy.toml --plot plan.svg");
     assert_eq!(again.status.code(), Some(2), "never over another file");
