@@ -258,8 +258,11 @@ pub fn without_secrets(text: &str) -> String {
     let lines = text.lines().map(|line| {
         let small = line.to_lowercase();
         if SECRET.iter().any(|word| small.contains(word)) {
-            let key = line.split(['=', ':']).next().unwrap_or_default();
-            return format!("{} = \"{REMOVED}\"\n", key.trim_end());
+            // Without a key the line may be the secret.
+            return match line.split_once(['=', ':']) {
+                Some((key, _)) => format!("{} = \"{REMOVED}\"\n", key.trim_end()),
+                None => format!("# {REMOVED}\n"),
+            };
         }
         let words = line.split_inclusive([' ', '"', '\'', ',', '=']);
         let words: String = words.map(without_login).collect();

@@ -538,7 +538,7 @@ fn what_cannot_be_told_is_refused_with_its_line() {
         ("", "", 10, "'specimen-source'"),
         ("specimen-source", "series.repeat", 10, "series"),
         (source, "indenter.diameter_mm = 0", 10, "cannot be '0'"),
-        (source, "\"operator\" = \"x\"", 10, "operator"),
+        (source, "\"operator\" = \"x\"", 10, "duplicate key"),
         (source, "signal = [1]", 10, "signal"),
         (table, "[specimen.two]", 10, "'two'"),
         (table, "[specimen.9]", 10, "[specimen.9]"),
