@@ -8,6 +8,7 @@ mod engine_protocols;
 mod fast;
 mod faults;
 mod follow;
+mod gui_checks;
 mod gui_flows;
 mod gui_library;
 mod gui_link;

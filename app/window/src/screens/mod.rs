@@ -3,6 +3,7 @@
 pub mod after_stop;
 pub mod approach;
 pub mod calibration;
+pub mod checks;
 pub mod exact_fit;
 pub mod extremes;
 pub mod form;

@@ -6,6 +6,7 @@ use super::screen::ScreenEntry;
 pub const SCREENS: &[ScreenEntry] = &[
     super::rig::SCREEN,
     super::calibration::SCREEN,
+    super::checks::SCREEN,
     super::run::SCREEN,
     super::library::SCREEN,
     super::review::SCREEN,

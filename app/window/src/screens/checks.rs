@@ -1,0 +1,265 @@
+//! The daily checks of the rig over time: how far its zero and a known weight were off, and what was allowed.
+
+use super::screen::{Screen, ScreenEntry};
+use crate::command::Commands;
+use crate::plots::style::quiet;
+use crate::theme::Tokens;
+use crate::widgets::fact_row::{fact_ui, section_ui};
+use crate::widgets::remark::{alarm_ui, quiet_ui};
+use crate::widgets::table::{Column, Row, RowLook, table_ui};
+use crate::widgets::task_bar::work_ui;
+use crate::workbench::Workbench;
+use crate::workers::task::Task;
+use chrono::{DateTime, Local, Utc};
+use eframe::egui::{Context, Key, RichText, Ui, vec2};
+use egui_plot::{HoverPosition, Line, LineStyle, MarkerShape, Plot, PlotPoints, Points};
+use palpate_analysis::daily::{Deviation, HOW, PastCheck, past_checks};
+use std::path::PathBuf;
+
+/// The screen's line in the table.
+pub const SCREEN: ScreenEntry = ScreenEntry {
+    name: "Checks",
+    purpose: "the rig's daily checks over time",
+    key: Key::D,
+    open: |workbench| {
+        Box::new(ChecksScreen {
+            library: workbench.library.clone(),
+            rig: workbench.snapshot.rig.description.name.clone(),
+            task: Task::default(),
+            is_read: false,
+        })
+    },
+};
+
+/// Checks that are read: a year of working days, with room for those that were repeated.
+const CHECKS_MAX: usize = 400;
+
+/// Share of the height that both plots get.
+const PLOT_SHARE: f32 = 0.6;
+
+/// Seconds in a day: the unit of the time axis.
+const DAY_S: f64 = 86_400.0;
+
+/// What a plot shows.
+type Measured = fn(&PastCheck) -> Option<Deviation>;
+
+/// The two plots: head, what they show.
+const PLOTS: [(&str, Measured); 2] = [
+    ("Known weight: measured - expected (N)", |one| one.weight),
+    ("Zero: measured - expected (N)", |one| one.zero),
+];
+
+/// The screen's state.
+pub struct ChecksScreen {
+    library: Result<PathBuf, String>,
+    rig: String,
+    task: Task<Vec<PastCheck>>,
+    is_read: bool,
+}
+
+impl ChecksScreen {
+    /// The checks that were read last, oldest first.
+    #[must_use]
+    pub fn checks(&self) -> Option<&Result<Vec<PastCheck>, String>> {
+        self.task.answer()
+    }
+
+    fn read(&mut self, ctx: &Context) {
+        let (library, rig) = (self.library.clone(), self.rig.clone());
+        self.task.start("checks", ctx, move |progress| {
+            past_checks(&library?, &rig, CHECKS_MAX, progress)
+        });
+    }
+}
+
+impl Screen for ChecksScreen {
+    fn left_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, commands: &mut Commands) {
+        section_ui(ui, &format!("Daily checks of {}", self.rig));
+        quiet_ui(
+            ui,
+            "A check reads the empty cell and one known weight, and touches the home switch twice. It opens the rig for the day.",
+        );
+        ui.add_space(8.0);
+        work_ui(ui, "Read again  F6", &self.task, &Ok(()), commands);
+        section_ui(ui, "A new one");
+        quiet_ui(ui, &format!("Run '{HOW}' on the command line."));
+    }
+
+    fn middle_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        let checks = match self.task.answer() {
+            Some(Ok(checks)) => checks,
+            Some(Err(reason)) => return alarm_ui(ui, reason),
+            None => return quiet_ui(ui, "reading the library"),
+        };
+        if checks.is_empty() {
+            ui.label(
+                RichText::new("No daily check of this rig yet")
+                    .heading()
+                    .strong(),
+            );
+            let words = format!(
+                "Run '{HOW}' once a day before the first specimen; then how far zero and weight drift stands here."
+            );
+            ui.label(words);
+            return;
+        }
+        let height = ui.available_height() * PLOT_SHARE / PLOTS.len() as f32 - 26.0;
+        for (head, measured) in PLOTS {
+            ui.label(RichText::new(head).heading().strong());
+            ui.allocate_ui(vec2(ui.available_width(), height), |ui| {
+                deviations_ui(ui, head, checks, measured);
+            });
+        }
+        let columns = [
+            Column::words("time", 120.0),
+            Column::words("by", 80.0),
+            Column::words("result", 50.0),
+            Column::numbers("weight (N)", 72.0),
+            Column::numbers("allowed (N)", 78.0),
+            Column::numbers("zero (N)", 72.0),
+            Column::numbers("allowed (N)", 78.0),
+            Column::words("calibration", 160.0),
+        ];
+        let rows: Vec<Row> = checks.iter().rev().map(row).collect();
+        table_ui(ui, "daily_checks", &columns, &rows);
+    }
+
+    fn right_ui(&mut self, ui: &mut Ui, _workbench: &mut Workbench, _commands: &mut Commands) {
+        section_ui(ui, "Last check");
+        let Some(Ok(checks)) = self.task.answer() else {
+            return;
+        };
+        let Some(PastCheck { check, .. }) = checks.last() else {
+            return quiet_ui(ui, "none");
+        };
+        fact_ui(ui, "time", time_text(check.at));
+        fact_ui(ui, "by", &check.by);
+        for part in &check.parts {
+            section_ui(ui, &part.what);
+            match part.is_passed {
+                true => quiet_ui(ui, &part.sentence),
+                false => alarm_ui(ui, &part.sentence),
+            }
+        }
+        let failed = checks.iter().filter(|one| !one.check.is_passed).count();
+        section_ui(ui, "All of them");
+        fact_ui(ui, "failed", format!("{failed} of {}", checks.len()));
+    }
+
+    fn poll(&mut self, _ctx: &Context, _workbench: &mut Workbench) {
+        self.task.poll();
+    }
+
+    fn shown(&mut self, ctx: &Context) {
+        if !std::mem::replace(&mut self.is_read, true) {
+            self.read(ctx);
+        }
+    }
+
+    fn work(&mut self, ctx: &Context, _workbench: &mut Workbench) {
+        self.read(ctx);
+    }
+
+    fn cancel(&mut self) {
+        self.task.cancel();
+    }
+
+    fn is_busy(&self) -> bool {
+        self.task.standing().is_some()
+    }
+}
+
+/// Days since 1970, as the time axis has them.
+fn days(check: &PastCheck) -> f64 {
+    check.check.at.timestamp() as f64 / DAY_S
+}
+
+/// A moment by this computer's calendar.
+fn time_text(at: DateTime<Utc>) -> String {
+    at.with_timezone(&Local)
+        .format("%Y-%m-%d %H:%M")
+        .to_string()
+}
+
+/// The day of a place on the time axis.
+fn day_text(days: f64) -> String {
+    let at = DateTime::from_timestamp((days * DAY_S) as i64, 0);
+    at.map_or_else(String::new, |at| at.format("%Y-%m-%d").to_string())
+}
+
+/// Draws how far one reading of each check was off, between what was allowed.
+fn deviations_ui(ui: &mut Ui, head: &'static str, checks: &[PastCheck], measured: Measured) {
+    let tokens = Tokens::of(ui.visuals().dark_mode);
+    let known: Vec<(f64, Deviation)> = checks
+        .iter()
+        .filter_map(|one| Some((days(one), measured(one)?)))
+        .collect();
+    let line = |of: fn(&Deviation) -> f64| -> PlotPoints<'_> {
+        known.iter().map(|(at, one)| [*at, of(one)]).collect()
+    };
+    let plot = quiet(ui, Plot::new(head), tokens)
+        .include_y(0.0)
+        .x_axis_formatter(|mark, _| day_text(mark.value))
+        .label_formatter(|hover| match hover {
+            HoverPosition::NearDataPoint { position, .. } => {
+                Some(format!("{}\n{:+.4} N", day_text(position.x), position.y))
+            }
+            HoverPosition::Elsewhere { .. } => None,
+        });
+    // One check alone has no span of time; a day on either side gives it one.
+    let plot = match known.as_slice() {
+        [(at, _)] => plot.include_x(at - 1.0).include_x(at + 1.0),
+        _ => plot,
+    };
+    plot.show(ui, |plot_ui| {
+        for (name, points) in [
+            ("allowed", line(|one| one.limit)),
+            ("allowed below", line(|one| -one.limit)),
+        ] {
+            let limit = Line::new(name, points).color(tokens.limit);
+            plot_ui.line(limit.style(LineStyle::dashed_dense()).width(1.5));
+        }
+        plot_ui.line(Line::new("between", line(|one| one.newtons)).color(tokens.line));
+        for (name, is_within, shape, ink) in [
+            ("within", true, MarkerShape::Circle, tokens.series),
+            ("beyond", false, MarkerShape::Cross, tokens.alarm_text),
+        ] {
+            let points = known
+                .iter()
+                .filter(|(_, one)| (one.newtons.abs() <= one.limit) == is_within);
+            let points: PlotPoints<'_> = points.map(|(at, one)| [*at, one.newtons]).collect();
+            let points = Points::new(name, points).shape(shape);
+            plot_ui.points(points.radius(4.0).color(ink));
+        }
+    });
+}
+
+fn row(past: &PastCheck) -> Row {
+    let check = &past.check;
+    let force = |one: Option<Deviation>| {
+        let newtons = one.map(|one| format!("{:+.4}", one.newtons));
+        newtons.unwrap_or_else(|| "-".into())
+    };
+    let limit = |one: Option<Deviation>| {
+        let limit = one.map(|one| format!("{:.4}", one.limit));
+        limit.unwrap_or_else(|| "-".into())
+    };
+    let sentences = check.parts.iter().map(|part| part.sentence.as_str());
+    Row {
+        cells: vec![
+            time_text(check.at),
+            check.by.clone(),
+            if check.is_passed { "pass" } else { "FAIL" }.into(),
+            force(past.weight),
+            limit(past.weight),
+            force(past.zero),
+            limit(past.zero),
+            check.calibration.clone(),
+        ],
+        look: match check.is_passed {
+            true => RowLook::Plain,
+            false => RowLook::Alarm,
+        },
+        hint: Some(sentences.collect::<Vec<_>>().join("\n")),
+    }
+}
