@@ -254,7 +254,7 @@ fn rows_left_out_are_counted_and_gaps_are_told() {
     }
     let turned = read_one("t_s,x_mm,F_N\n0,0,0\n1,1,-1\n2,2,-2\n", &told());
     assert!(
-        turned.imported.remarks[0].contains("turn it with"),
+        turned.imported.remarks[0].contains("turn its sign"),
         "{:?}",
         turned.imported.remarks
     );
