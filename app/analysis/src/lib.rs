@@ -20,6 +20,7 @@ pub mod extremes;
 pub mod fidelity;
 pub mod find;
 pub mod fit;
+#[cfg(feature = "haptics")]
 pub mod follow_session;
 #[cfg(feature = "haptics")]
 pub mod haptics;
