@@ -139,8 +139,13 @@ fn colours_live_in_the_tokens() {
 fn files_stay_readable() {
     for (file, text) in sources(TOPS) {
         let lines = text.lines().count();
+        let is_test = file.components().any(|part| part.as_os_str() == "tests")
+            || file.file_stem().is_some_and(|name| {
+                let name = name.to_string_lossy();
+                name == "tests" || name.ends_with("_tests")
+            });
         assert!(
-            lines <= 800,
+            lines <= if is_test { 800 } else { 500 },
             "{} has {lines} lines; split it or write a decision page",
             file.display()
         );
