@@ -28,7 +28,7 @@ pub struct SupportBundleArgs {
 }
 
 #[derive(Serialize)]
-struct Made {
+struct BundleReport {
     file: PathBuf,
     files: Vec<Bundled>,
 }
@@ -69,7 +69,7 @@ pub(super) fn run(
         BundleError::Write { .. } => Failure::failed(err),
         BundleError::Read { .. } | BundleError::Session(_) => Failure::usage(err),
     })?;
-    let made = Made {
+    let made = BundleReport {
         file: request.to,
         files,
     };
