@@ -81,13 +81,17 @@ impl Runner {
         let snapshot = Arc::new(ArcSwap::from_pointee(main_loop.snapshot(0)));
         let shared = Arc::clone(&snapshot);
         let to_stop = requests.clone();
+        let (registered, is_registered) = sync_channel(1);
         let thread = std::thread::Builder::new()
             .name("runner".into())
             .spawn(move || {
                 let link = main_loop.rig.halt_handle();
                 main_loop.registered = Some(Registered::new(to_stop, link));
+                let _ = registered.send(());
                 main_loop.run(first, &receiver, &shared, &wake);
             })?;
+        // A panic anywhere from here on stops this rig, however late the thread gets its first turn.
+        let _ = is_registered.recv();
         Ok(Self {
             requests,
             snapshot,
@@ -119,6 +123,11 @@ impl Runner {
         self.thread
             .as_ref()
             .is_some_and(|thread| !thread.is_finished())
+    }
+
+    #[cfg(test)]
+    pub(super) fn thread_id(&self) -> Option<std::thread::ThreadId> {
+        Some(self.thread.as_ref()?.thread().id())
     }
 
     /// The newest snapshot.

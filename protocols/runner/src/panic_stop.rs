@@ -66,6 +66,11 @@ pub fn halt_open_rigs() {
     }
 }
 
+#[cfg(test)]
+pub(super) fn is_registered(runner: ThreadId) -> bool {
+    OPEN.load().iter().any(|rig| rig.runner == runner)
+}
+
 impl OpenRig {
     fn halt(&self) {
         let written = self.link.as_ref().map_or(0, HaltHandle::written);

@@ -2,7 +2,8 @@
 
 use super::clock::{HostTimes, TimeScale, host_times};
 use super::live_feed::{Estimator, LiveFeed};
-use super::main_loop::MainLoop;
+use super::main_loop::{MainLoop, Runner};
+use super::panic_stop::is_registered;
 use super::snapshot::Snapshot;
 use super::start::{AfterStop, Answers, RunRequest};
 use crate::replay::replay;
@@ -226,4 +227,14 @@ fn a_live_fit_that_panics_is_off_and_the_run_goes_on() {
     // At full pace nothing else is told: what is in the log does not depend on the computer.
     assert_eq!(panicking.beside.health.messages, 1);
     assert_eq!(sound.beside.health.messages, 0);
+}
+
+#[test]
+fn rig_is_stopped_by_a_panic_as_soon_as_its_runner_is_started() {
+    // Often enough that a thread which registers by itself is caught late.
+    for _ in 0..200 {
+        let rig = Box::new(SimRig::new(SimSettings::default()));
+        let runner = Runner::start(rig, TimeScale::Max, None, || {}).unwrap();
+        assert!(is_registered(runner.thread_id().unwrap()));
+    }
 }
